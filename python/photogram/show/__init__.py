@@ -1,1 +1,1 @@
-"""What reports and pictures of all programs are made of."""
+"""Elements of the reports and plots of all programs."""

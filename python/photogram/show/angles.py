@@ -1,4 +1,4 @@
-"""Angles as people read them."""
+"""Angles in degrees, minutes and seconds."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ ARCSEC = math.pi / 648000.0  # One second of arc in radians
 
 
 def degrees_minutes_seconds(angle: float, decimals: int) -> tuple[int, int, float]:
-    """Split the size of an angle in radians, its sign left out, with so many decimals of the seconds.
+    """Split the absolute value of an angle in radians, with rounded seconds.
 
-    It is rounded as a whole, so that no 60 appears.
+    The whole value is rounded, so that 60 seconds cannot occur.
     """
     scale: int = 10**decimals
     minutes, units = divmod(round(math.degrees(abs(angle)) * 3600 * scale), 60 * scale)

@@ -1,4 +1,4 @@
-"""Declared tables as cells: a column for each component, or a row. No other code writes their numbers."""
+"""Conversion of declared tables to cells: one column per component, or one row; formats numbers."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ _MOST_OF_DEGREES = 9
 
 
 def unit_written(unit: str) -> str:
-    """Return a unit with the signs that a page has for it."""
+    """Return a unit with the symbols of pages."""
     return _SIGNS.get(unit, unit)
 
 
 def written_sections(
     document: Document, draw: Callable[[Drawing], Picture | None] = lambda _: None
 ) -> list[Section]:
-    """Return the sections that people see: tables of cells, drawn pictures, and no empty parts."""
+    """Return the visible sections: tables of cells, drawn plots, without empty parts."""
     whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in document.sections]
     return [section for section in whole if section.parts]
 
@@ -72,8 +72,8 @@ def _written(
 def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
     """Return a part of a document; a declared table becomes a table of cells.
 
-    Columns without a head are left out. The deviations of a table give the decimals of its components: two
-    figures of the median. `numeral` writes numbers in another language.
+    Columns without a head are omitted. The standard deviations of a table define the decimals of its
+    components: two digits of the median. `numeral` formats numbers in another language.
     """
     if not isinstance(part, quantity.Table):
         return part
@@ -121,9 +121,9 @@ def _unit(each: Quantity, axis: Axis) -> str:
 
 
 def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:
-    """Return the decimals of components: two figures of the median deviation, of degrees four more.
+    """Return the decimals of components: two digits of the median deviation, for degrees four more.
 
-    None where nothing tells: in a column of several components whose deviation is not known.
+    None if unknown: in a column of several components without standard deviation.
     """
     count, of_rows = len(each.axes), each.of is not None
     if (
@@ -145,7 +145,7 @@ def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None
 
 
 def _plain(each: Quantity) -> list[Cell]:
-    """Return names, and numbers that have no axis."""
+    """Return names, and numbers without an axis."""
     if each.kind == "probability":
         values = np.asarray(each.values, dtype=float).tolist()
         return [Cell(probability_written(p), p) if math.isfinite(p) else Cell("") for p in values]
@@ -165,7 +165,7 @@ def _plain(each: Quantity) -> list[Cell]:
 
 
 def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cell:
-    """Return a number as people see it, with the unit of its axis and its decimals."""
+    """Return a formatted number in the unit of its axis."""
     if each.words and value in each.words:
         return Cell(each.words[value])
     if each.kind == "value" and axis.angle == "dms" and math.isfinite(value):

@@ -1,4 +1,4 @@
-"""Documents as JSON, as text, and as text in a few lines; `show.html` and `show.pdf` write them as pages."""
+"""Documents as JSON, text and summary; `show.html` and `show.pdf` create pages."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from photogram.show.cells import written, written_sections
 from photogram.show.page import Document, Fact, Facts, Layers, Part, Remarks, Section, Table, Text
 
 WIDTH = 100  # characters of a line of prose
-MAX_ROWS = 40  # of a table in a summary
+MAX_ROWS = 40  # maximum number of rows of a table in a summary
 
 TitledLines = tuple[str, list[str]]  # A section of text
 
 PLAIN = str.maketrans("µ–−ᵀ¹", "u--'1") | str.maketrans(
     {"′": "arcmin", "″": "arcsec", "°": "deg", "∞": "inf", "⁻": "^-", "²": "^2"}
 )
-"""Signs of pages as every terminal shows them."""
+"""Symbols of pages, replaced by ASCII for terminals."""
 
 
 def record(document: Document) -> dict[str, object]:
-    """Return the members of a JSON document: those of the document, and its tables by their keys."""
+    """Return the members of a JSON document, with its tables by their keys."""
     members: dict[str, Any] = {**document.members}
     for table in document.tables():
         if table.key and any(column.member for column in table.columns):
@@ -38,12 +38,12 @@ def record(document: Document) -> dict[str, object]:
 
 
 def to_json(document: Document) -> bytes:
-    """Return a document as JSON (UTF-8). What is not a number is null."""
+    """Return a document as JSON (UTF-8); values that are not numbers are null."""
     return json.to_json({"program": f"photogram {_photocore.__version__}", **record(document)})
 
 
 def text(document: Document) -> str:
-    """Return a document as a report: verdict, advice, highlights, sections, details; plots are left out."""
+    """Return a document as a text report: verdict, next steps, highlights, sections, details."""
     judged = [
         (title, [textwrap.fill(sentence, WIDTH) for sentence in sentences])
         for title, sentences in _judged(document)
@@ -56,9 +56,9 @@ def text(document: Document) -> str:
 
 
 def titled_lines(document: Document, *keys: str) -> list[TitledLines]:
-    """Return titles and lines: verdict and advice, a line for each sentence, key figures, sections with keys.
+    """Return titles and lines: verdict, next steps, key figures, and sections with the given keys.
 
-    All sections without keys; with keys sections have no introduction.
+    Without keys, all sections are returned; with keys, sections are without introduction.
     """
     titled = [*_judged(document), *_sections(document, keys)]
     return [(title.translate(PLAIN), [line.translate(PLAIN) for line in lines]) for title, lines in titled]
@@ -74,7 +74,7 @@ def _judged(document: Document) -> list[TitledLines]:
 
 
 def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
-    """Return the lines of key figures and sections below their titles; none without lines."""
+    """Return the lines of key figures and sections with their titles; empty ones are omitted."""
     figures = fact_lines([*document.head, *document.highlights])
     whole = replace(document, sections=[*document.sections, *document.details])
     titled = [("Key figures", figures)] + [
@@ -100,7 +100,7 @@ def _spaced(parts: Iterable[list[str]]) -> list[str]:
 
 
 def part_lines(part: Part, title: str = "") -> list[str]:
-    """Return the lines of a part below a title; none for plots."""
+    """Return the lines of a part with a title; empty for plots."""
     match written(part):
         case Table() as table if table.rows:
             head = [table.title] if table.title not in ("", title) else []
@@ -118,7 +118,7 @@ def part_lines(part: Part, title: str = "") -> list[str]:
 
 
 def summary(document: Document, *keys: str) -> list[str]:
-    """Return the lines of a summary: verdict, advice, tables with these keys (also in layers), highlights."""
+    """Return the lines of a summary: verdict, next steps, tables with these keys, highlights."""
     lines = [f"verdict: {each.headline}" for each in document.judgements]
     lines += [f"next: {sentence}" for sentence in document.advice]
     for table in document.tables(layers=True):
@@ -131,7 +131,7 @@ def summary(document: Document, *keys: str) -> list[str]:
 
 
 def table_text(table: Table) -> list[str]:
-    """Return the lines of a table: names to the left, numbers to the right, `*` behind marked numbers."""
+    """Return the lines of a table: names left-aligned, numbers right-aligned, `*` after marked numbers."""
     columns = [[f"{column.head} {column.unit}".rstrip().translate(PLAIN)] for column in table.columns]
     for row in table.rows:
         for texts, column, cell in zip(columns, table.columns, row, strict=True):
@@ -152,7 +152,7 @@ def table_text(table: Table) -> list[str]:
 
 
 def fact_lines(facts: Sequence[Fact]) -> list[str]:
-    """Return figures, one under the other, with their units, and notes in parentheses."""
+    """Return named values with units and notes in parentheses, one per line."""
     names = [
         fact.name if fact.name[1:2].isupper() else fact.name[:1].lower() + fact.name[1:] for fact in facts
     ]

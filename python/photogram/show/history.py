@@ -1,4 +1,4 @@
-"""Values on several occasions as tables and control charts, of whatever they are."""
+"""Values on several occasions as tables and control charts, for any quantities."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from photogram.statistics.history import Change, History, Series
     from photogram.statistics.verdict import Verdict
 
-ACROSS = 3  # Charts beside each other
+ACROSS = 3  # Number of charts in a row
 
 
 def history_part(history: History, whose: str, about: str = "", **members: object) -> Document:
-    """Return the document of a thing: changes, introduced by `about`, all values, and further members."""
+    """Return the document of one history: changes with the introduction `about`, all values, members."""
     own = quantity.members(history, "occasions", "times", "tests", "level", "limit")
     names, p = ("variance", "degrees_of_freedom"), "probability_above"
     constancy = quantity.members(history.constancy, *names, probability=p)
@@ -39,7 +39,7 @@ def history_part(history: History, whose: str, about: str = "", **members: objec
 
 
 def series(history: History, about: str = "") -> Table:
-    """Return a row for each quantity: mean, drift, the largest test of a step, and the changes."""
+    """Return one row per quantity: mean, drift, the largest test of a step, and the changes."""
     own = history.series
     axes = tuple(Axis.of(each.name, each.unit) for each in own)
     of, found = np.arange(len(own)), [", ".join(change.kind for change in each.changes) for each in own]
@@ -72,7 +72,7 @@ def _change(history: History, change: Change) -> dict[str, object]:
 
 
 def values(history: History) -> Table:
-    """Return all values: each occasion, and the difference from the others."""
+    """Return all values, one row per occasion, with the difference from the others."""
     own, occasions = history.series, history.occasions
     axes = tuple(Axis.of(each.name, each.unit) for each in own)
     of = np.repeat(np.arange(len(own)), len(occasions))
@@ -104,9 +104,9 @@ def history_document(
     more: Sequence[Section] = (),
     **fields: Any,
 ) -> Document:
-    """Return the document of calibrations in the order of their days, with what changed and `more` sections.
+    """Return the document of calibrations in the order of their dates, with changes and `more` sections.
 
-    `parts` are the documents of the histories; their tables are layers. `fields` are further fields.
+    `parts` are the documents of the histories; their tables become layers. `fields` are further fields.
     """
     days = next(column.values for column in calibrations.columns if column.member == "day")
     changes = layered("", "", parts).sections
@@ -138,10 +138,10 @@ _CHARTS = (
 
 
 def control_charts(history: History, title: str) -> Plot:
-    """Return every quantity over time: values with their standard deviations, mean, limits, what changed.
+    """Return every quantity over time: values with standard deviations, mean, limits and changes.
 
-    Dashed lines are where |t| of a value against the others reaches the limit of all tests. Marked is what is
-    beyond.
+    Dashed lines show values whose |t| against the others equals the critical value of all tests. Values
+    beyond are marked.
     """
     across = min(ACROSS, len(history.series))
     rows = -(-len(history.series) // across)

@@ -1,4 +1,4 @@
-"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`."""
+"""A page as one self-contained HTML file, with the extra `photogram[report]`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 LONG = 16  # Characters; longer words may be broken
-NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # What the script of a page reads
+NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # Numbers that the script of a page can read
 
 
 def page_html(page: Document) -> bytes:
-    """Return a page as an HTML file (UTF-8) that needs no network and no other file.
+    """Return a page as an HTML file (UTF-8) that needs neither a network nor other files.
 
-    It takes jinja2 (`pip install 'photogram[report]'`).
+    It requires jinja2 (`pip install 'photogram[report]'`).
     """
     environment, sections = _environment(), written_sections(page, inlined)
     tables = (
@@ -60,7 +60,7 @@ def _text(name: str) -> str:
 
 
 def _coded(text: str) -> Markup:
-    """Set what stands between grave accents as code."""
+    """Format text between grave accents as code."""
     from markupsafe import Markup, escape
 
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
@@ -78,7 +78,7 @@ def _attributes(column: Column, cell: Cell) -> dict[str, str]:
 
 
 def inlined(drawing: Drawing) -> Picture | None:
-    """Draw a picture; None where it has nothing to show."""
+    """Draw a plot; None if it is empty."""
     from photogram.show.sketch.svg import svg_of
 
     sketch = drawing.sketch()

@@ -1,4 +1,4 @@
-"""What every report for the browser says first: the verdict, and which tests were made."""
+"""The verdict and the tests, at the start of each HTML report."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MARKS: dict[Tone, str] = {
 
 
 def judged(verdict: Verdict, on: str = "") -> Judgement:
-    """Return a verdict as it stands on a page."""
+    """Return a verdict for a page."""
     tested = verdict.is_tested_as_a_whole
     if verdict.exit or verdict.warning:
         tone: Tone = "bad" if verdict.exit else "look"
@@ -55,12 +55,12 @@ def verdict_table(verdict: Verdict, words: Words | None = None) -> Table:
 
 
 def tests_section(verdict: Verdict) -> Section:
-    """Return the section of all tests of a verdict; empty, and so not shown, where there are none."""
+    """Return the section of all tests of a verdict; empty, and so hidden, without tests."""
     return Section("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [])
 
 
 def remarks_section(sentences: Iterable[object]) -> Section:
-    """Return the section of what was remarked on; empty, and so not shown, where that is nothing."""
+    """Return the section of warnings; empty, and so hidden, without warnings."""
     told = [str(each) for each in sentences]
     return Section("remarks", "Remarks", [Remarks(told)] if told else [])
 

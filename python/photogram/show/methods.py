@@ -1,6 +1,6 @@
-"""What results have in common: a verdict, a document, and a few lines in a terminal or a notebook.
+"""Common methods of results: verdict, document, and a summary in a terminal or notebook.
 
-Their methods `document` and `_findings` import the files that compose the document or the findings.
+Their methods `document` and `_findings` import the modules that create the document or the findings.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ Rows = list[tuple[str, str]]  # Names and texts
 WIDEST = 110  # Characters of a line
 MOST = 20  # Lines of a `repr`
 WHOLE = "verdict"  # This row is never truncated
-NAMED = 6  # Of a list
+NAMED = 6  # Maximum number of names of a list
 
 
 class Judged:
-    """What has a verdict."""
+    """Base class of results with a verdict."""
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Whether the result can be used, and if not, what is wrong; see `docs/tests.md`."""
-        from photogram.statistics.verdict import verdict  # what is only adjusted is not judged
+        """Verdict: whether the result can be used, and if not, the reason; see `docs/tests.md`."""
+        from photogram.statistics.verdict import verdict  # imported on demand
 
         return verdict(self._findings())
 
@@ -39,10 +39,10 @@ class Judged:
 
 
 class Documented:
-    """A result that is one document, from which all its forms are written."""
+    """Base class of results with a document, from which all output formats are created."""
 
     def document(self) -> Document:
-        """Return the document: judgement, sections, tables."""
+        """Return the document: verdict, sections, tables."""
         raise NotImplementedError
 
     def report(self) -> str:
@@ -58,7 +58,7 @@ class Documented:
         return to_json(self.document())
 
     def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+        """Return the HTML report, one self-contained file (docs/report.md).
 
         Needs jinja2 (`pip install 'photogram[report]'`).
         """
@@ -70,10 +70,10 @@ class Documented:
 
 
 class Brief:
-    """A thing that tells in a few lines what it is: a data class, declared with `repr=False`."""
+    """Base class with a short summary, for data classes declared with `repr=False`."""
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what it is in a line, and what else is to be told, most important first: its fields."""
+        """Return a title and rows of a summary, most important first; by default all fields."""
         named = [each.name for each in fields(self)]  # type: ignore[arg-type]
         return type(self).__name__, [(name, told(getattr(self, name))) for name in named]
 
@@ -104,13 +104,13 @@ class Brief:
 
 
 def few(names: Sequence[str]) -> str:
-    """Return how many names there are, and the first and last of them."""
+    """Return the number of names, and the first and last of them."""
     shown = list(names) if len(names) <= NAMED else [*names[: NAMED - 1], f"... {names[-1]}"]
     return f"{len(names):,}" + (f": {', '.join(shown)}" if shown else "")
 
 
 def told(value: object) -> str:
-    """Return a value in a line: numbers and words as they are, of others what they are and how many."""
+    """Return a value in one line: numbers and text unchanged, others by type and size."""
     if isinstance(value, Brief):
         return value.brief()[0]
     if value is None or isinstance(value, bool | int | float | str):

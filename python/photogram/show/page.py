@@ -1,6 +1,6 @@
-"""What a document consists of: a judgement, and sections with tables, figures and facts.
+"""Elements of a document: verdict, and sections with tables, plots and facts.
 
-Programs compose documents from their results and know no HTML; `show.html`, `show.pdf` and `show.forms` write
+Programs create documents from their results without HTML; `show.html`, `show.pdf` and `show.forms` format
 documents.
 """
 
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from photogram.show.sketch.plot import Plot
 
 Tone = Literal["", "good", "look", "bad"]
-"""How a thing is to be taken: no colour stands without words that say the same."""
+"""Meaning of a colour; the text always has the same meaning."""
 
-MOST_DECIMALS = 12  # Of a fixed-point column
+MOST_DECIMALS = 12  # Maximum number of decimals of a fixed-point column
 LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell as people read it."""
+    """A formatted cell."""
 
     text: str
-    number: float | None = None  # Value that the text is of
+    number: float | None = None  # Value of the text
     id: str = ""  # Target of links
-    goes_to: str = ""  # `id` of the cell that it links to, if the page has one
+    goes_to: str = ""  # `id` of the linked cell, if the page has one
     tone: Tone = ""  # Marked cells have the tone `look`
 
 
@@ -49,7 +49,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table whose cells are written; `note` says what is not in it."""
+    """A table of formatted cells; `note` describes missing rows."""
 
     title: str
     columns: Sequence[Column]
@@ -60,7 +60,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Fact:
-    """A figure with its name: `value` is written as it stands, `note` says what it means."""
+    """A named value: `value` is printed unchanged, `note` explains it."""
 
     name: str
     value: str
@@ -71,7 +71,7 @@ class Fact:
 
 @dataclass(frozen=True)
 class Facts:
-    """Named figures, one under the other."""
+    """Named values, one per line."""
 
     caption: str
     facts: Sequence[Fact]
@@ -80,18 +80,18 @@ class Facts:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture that is still to be drawn."""
+    """A plot that is not yet drawn."""
 
-    name: str  # Unique on the page; parts of the picture are named after it
-    title: str  # A word for switching, and what is to be seen
+    name: str  # Unique on the page; prefix of the identifiers of its parts
+    title: str  # Short name and subject
     caption: str
-    sketch: Callable[[], Plot | None]  # Declares the picture; None where there is nothing to draw
+    sketch: Callable[[], Plot | None]  # Creates the plot; returns None if there are no data
     kind: str = field(default="drawing", init=False)
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as markup that stands in the page."""
+    """A plot as markup of the page."""
 
     name: str
     title: str
@@ -102,7 +102,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Layers:
-    """Parts of which one is shown at a time: all of them on paper, and where no script runs."""
+    """Alternative parts of which one is shown at a time; all on paper and without scripts."""
 
     name: str
     parts: Sequence[Drawing | Picture | Table | quantity.Table]
@@ -119,7 +119,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Remarks:
-    """Sentences, one under the other; of long ones the rest is folded away."""
+    """Sentences, one per line; long lists are collapsed."""
 
     sentences: Sequence[str]
     most: int = 12
@@ -131,7 +131,7 @@ Part = Table | quantity.Table | Facts | Drawing | Picture | Layers | Text | Rema
 
 @dataclass(frozen=True)
 class Section:
-    """A section; one without parts is left out. An annex begins on a sheet of its own."""
+    """A section, omitted if empty. An annex starts on a new sheet."""
 
     key: str
     title: str
@@ -141,13 +141,13 @@ class Section:
 
     @classmethod
     def of(cls, table: quantity.Table) -> Section:
-        """Return a section that consists of a table."""
+        """Return a section with one table."""
         return cls(table.key, table.title, [table], table.about)
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What stands on top of a page: whether the result can be used."""
+    """The verdict at the top of a page: whether the result can be used."""
 
     mark: str  # Few words
     # First sentence, further sentences
@@ -159,27 +159,27 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Document:
-    """What people and programs read of a result: its report, and its JSON document."""
+    """Content of a result for people and programs: its report, and its JSON document."""
 
     # Kind of the document, and title of the job
     what: str
     title: str
-    judgements: Sequence[Judgement] = ()  # One for each adjusted thing
+    judgements: Sequence[Judgement] = ()  # One per adjusted object
     advice: Sequence[Phrase | str] = ()  # Next steps
     highlights: Sequence[Fact] = ()  # Key figures
     sections: Sequence[Section] = ()
-    members: Mapping[str, object] = field(default_factory=dict)  # Members of JSON besides tables
+    members: Mapping[str, object] = field(default_factory=dict)  # Members of JSON in addition to tables
     details: Sequence[Section] = ()  # Sections that pages omit
     phases: Mapping[str, float] = field(default_factory=dict)  # Seconds in phases of the engine
     head: Sequence[Fact] = ()  # Client, author
-    # Language; names of the link to the top and of the list of sections; text for `{}` hidden sentences;
-    # page numbers
+    # Language; names of the link to the top and of the list of sections; text for `{}` hidden sentences; page
+    # numbers
     language: str = "en"
     first: str = "Verdict"
     contents: str = "Sections"
     more: str = "{} more"
     numbers: str = "Page {number} of {total}"
-    numeral: Callable[[str], str] = str  # Writes numbers of tables as the language does
+    numeral: Callable[[str], str] = str  # Formats numbers of tables in the language
 
     def with_sections(self, *more: Section) -> Document:
         """Return the page with more sections at its end."""
@@ -206,19 +206,19 @@ class Document:
 
 
 def about(code: str, **fields: Any) -> str:
-    """Return the explanation of a section, table or fact that the words of documents have for a code."""
+    """Return the explanation of a section, table or fact with a code."""
     return words_of("en")(f"about.{code}", **fields)
 
 
 def layered_tables(name: str, tables: Sequence[quantity.Table]) -> Sequence[Layers | quantity.Table]:
-    """Return several tables as layers, a single table as it is."""
+    """Return several tables as layers, or a single table unchanged."""
     return [Layers(f"{name}-layers", tables)] if len(tables) > 1 else tables
 
 
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:
-    """Return one document of several with the same tables: tables of one key are layers of a section.
+    """Return one document of several with the same tables, which become layers of a section.
 
-    Layers, judgements and highlights have the titles of their documents, `more` are further fields.
+    Layers, verdicts and highlights have the titles of their documents; `more` are further fields.
     """
     sections, titles = [], [document.title for document in documents]
     for tables in zip(*(document.tables() for document in documents), strict=True):
@@ -239,14 +239,14 @@ def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -
 
 
 def number_text(value: float | str | None, decimals: int | None, figures: int = 4) -> str:
-    """Return a value in a column with so many decimals, or significant figures; integers and texts stay."""
+    """Return a value with decimals or significant figures; integers and texts are unchanged."""
     if value is None or isinstance(value, str | int):
         return "" if value is None else f"{value}"
     return significant(value, figures) if decimals is None else fixed(value, decimals)
 
 
 def fixed(value: float, decimals: int) -> str:
-    """Return a number in fixed point, zero without a sign; one that is too long for it with an exponent."""
+    """Return a number in fixed point, zero without a sign; very long numbers with an exponent."""
     if not abs(value) < 1e15:
         return significant(value)
     text = f"{value:.{decimals}f}"
@@ -254,7 +254,7 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def significant(value: float, figures: int = 4) -> str:
-    """Return a number with so many significant figures, without an exponent where that is readable."""
+    """Return a number with significant figures, without an exponent if readable."""
     if not math.isfinite(value):
         return "–" if math.isnan(value) else "∞" if value > 0 else "-∞"
     if value == 0:
@@ -274,10 +274,10 @@ def probability_written(value: float) -> str:
 def decimals_of(
     deviations: Floats, *, smallest: bool = False, unknown: int = 4, most: int = MOST_DECIMALS
 ) -> int:
-    """Return with how many decimals values are written whose standard deviations are these, in their unit.
+    """Return the number of decimals of values with these standard deviations, in their unit.
 
-    The smallest of them keeps two significant figures, or the median; `unknown` where none is known, `most`
-    at the most.
+    The smallest or the median deviation has two significant figures. `unknown` is returned if none is known,
+    `most` is the maximum.
     """
     known = np.asarray(deviations, dtype=float)
     known = known[np.isfinite(known) & (known > 0)]

@@ -1,6 +1,6 @@
 """Documents as PDF on A4, typeset by Typst (`pip install 'photogram[pdf]'`).
 
-Equal documents give equal bytes.
+Equal documents result in equal bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from photogram.show.sketch.svg import LETTERS
 from photogram.words import Phrase
 
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
-"""Fonts that the library contains; for other letters it searches the fonts of the machine."""
+"""Fonts included in the library; for other letters it uses fonts of the machine."""
 
 LONGEST = 30  # Longest word that is not broken, characters
 

@@ -1,7 +1,7 @@
-"""Quantities: each declared once, as arrays with a name and a unit, and written everywhere from here.
+"""Quantities: arrays with a name and a unit, declared once for all output formats.
 
-A table is a list of quantities of the same n things. `frame` makes files of commas and data frames of it,
-`records` JSON documents, `results.saved` Parquet, `show.forms` text, `show.cells` pages for the browser.
+A table is a list of quantities of the same n items. `frame` creates CSV files and data frames, `records` JSON
+documents, `results.saved` Parquet, `show.forms` text, `show.cells` pages for the browser.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ class Axis:
 
     name: str
     unit: str = ""  # Empty without a unit
-    angle: Literal["", "dms", "deg"] = ""  # Notation for people: degrees, minutes, seconds; degrees; radians
-    suffix: str = ""  # Unit in the names of columns
-    # Unit of differences and deviations for people, and its factor
+    angle: Literal["", "dms", "deg"] = ""  # Notation in reports: degrees, minutes, seconds; degrees; radians
+    suffix: str = ""  # Suffix of column names for the unit
+    # Unit of differences and deviations in reports, and its factor
     small: str = ""
     factor: float = 1.0
     label: str = ""  # Name on pages if it differs from `name`
 
     @classmethod
     def of(cls, name: str, unit: str, suffix: str = "") -> Axis:
-        """Return an axis whose deviations have its own unit."""
+        """Return an axis whose deviations have the same unit."""
         return cls(name, unit, suffix=suffix, small=unit)
 
     @classmethod
@@ -48,7 +48,7 @@ class Axis:
         return cls(name, "rad", angle, "_deg" if angle else "_rad", "arcsec", 1.0 / ARCSEC)
 
     def outward(self, kind: str) -> float:
-        """Return by what a number of a kind of quantity is multiplied for people."""
+        """Return the factor of numbers of a kind in reports."""
         if kind == "value":
             return math.degrees(1.0) if self.angle == "deg" else 1.0
         return self.factor
@@ -56,7 +56,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Link:
-    """Of which photos or points (`kind`) names are: `rows` of all; on a page theirs are `here`, or not."""
+    """Photos or points (`kind`) of names: `rows` among all; `here` if the page row is their own."""
 
     kind: str
     rows: Indices
@@ -65,37 +65,37 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """What is known of n things: one number or name of each, or k components."""
+    """A quantity of n items: one number or name of each, or k components."""
 
-    values: Any  # (n,), or (n, k) with k axes; (n,) also with one common axis
-    axes: tuple[Axis, ...] = ()  # The components, also if each row is of one of them (`of`)
+    values: Any  # (n,), or (n, k) with k axes; (n,) also with a common axis
+    axes: tuple[Axis, ...] = ()  # The components, also if each row has one of them (`of`)
     # `value`: in the unit of its axis, angles in degrees; `deviation`, `difference`: in the small unit;
-    # `number`: without a unit; `name`: text, or the number of a thing
+    # `number`: without a unit; `name`: text, or the number of an item
     kind: Kind = "number"
     # Prefix of columns in files and data frames; None: omitted there
     name: str | None = None
     # Name in JSON, or names of parts of its components; empty: omitted there
     member: str | Mapping[str, slice] = ""
     about: str = ""  # Description in Parquet; `{}` is the name of an axis
-    # Columns of pages; `{}` is the name of an axis. `figures` significant figures if nothing fixes the
-    # decimals. A quantity without a head is omitted.
+    # Columns of pages; `{}` is the name of an axis. `figures` significant figures if the decimals are not
+    # defined. A quantity without a head is omitted.
     head: str = ""
     decimals: int | None = None
     figures: int = 3
     words: Mapping[float, str] | None = None  # Texts for single numbers, such as `fixed` for 0
-    seen: Bools | None = None  # Which values are visible; None: all
-    # Which values are marked; None: none
+    seen: Bools | None = None  # Mask of visible values; None: all
+    # Mask of marked values; None: none
     marked: Bools | None = None
     link: Link | None = None  # Target of a name on a page
     of: Indices | None = None  # (n,) the axis of each row
 
     @property
     def single(self) -> bool:
-        """Whether each thing has one value."""
+        """Whether each item has one value."""
         return not self.axes or self.of is not None or np.ndim(self.values) == 1
 
     def unit(self, axis: Axis) -> str:
-        """Return the unit of a component for people."""
+        """Return the unit of a component in reports."""
         if self.kind == "number":
             return ""
         if self.kind == "value":
@@ -103,10 +103,7 @@ class Quantity:
         return axis.small
 
     def outward(self) -> Floats:
-        """Return the numbers that people see, in the units in which they read them.
-
-        Degrees for angles that are written so; what is written in degrees, minutes and seconds is in radians.
-        """
+        """Return the numbers in the units of reports; angles are in degrees for the notation `deg` only."""
         values = np.asarray(self.values, dtype=float)
         if self.seen is not None:
             values = np.where(self.seen, values, np.nan)
@@ -116,7 +113,7 @@ class Quantity:
         return values
 
     def at(self, rows: Indices, axes: Indices | None = None) -> Quantity:
-        """Return the quantity of some things; with `axes`, one component of each if it has several."""
+        """Return the quantity of some items; with `axes`, one component of each if it has several."""
         one = axes is not None and not self.single
         parts: dict[str, Any] = {
             name: np.asarray(part)[(rows, axes) if one else rows]
@@ -127,31 +124,31 @@ class Quantity:
         return replace(self, **{**parts, "link": link, "of": axes if one else parts.get("of")})
 
 
-Quantities = Sequence[Quantity]  # Quantities of the same things
+Quantities = Sequence[Quantity]  # Quantities of the same items
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table of a result, declared once: all forms of a document are written from it."""
+    """A table of a result, declared once for all forms of a document."""
 
-    # Name in JSON documents: `a.b` for a part of member `a`; empty if another member has its rows
+    # Name in JSON documents: `a.b` for a part of member `a`; empty if another member contains its rows
     key: str
     title: str
     columns: Quantities
     note: str = ""  # a remark on this table
     about: str = ""  # the meaning of the columns
-    deviations: Floats | None = None  # (n,) or (n, k): the decimals of values follow from them
-    shown: Indices | None = None  # people see these (r,) rows, or these (r, 2) rows and components; None: all
-    keyed: bool = False  # JSON documents have an object with a member for each name of the first column
+    deviations: Floats | None = None  # (n,) or (n, k) standard deviations, which define decimals
+    shown: Indices | None = None  # (r,) visible rows, or (r, 2) visible rows and components; None: all
+    keyed: bool = False  # Whether JSON documents have an object with one member per name of the first column
 
     @property
     def visible(self) -> bool:
-        """Whether people see a part of it: a table without rows or heads is in JSON and in files only."""
+        """Whether reports show it; tables without rows or heads are in JSON and files only."""
         rows = self.columns[0].values if self.shown is None else self.shown
         return len(rows) > 0 and any(column.head for column in self.columns)
 
     def frame(self) -> pd.DataFrame:
-        """Return the columns that have a name as a data frame."""
+        """Return the named columns as a data frame."""
         import pandas as pd
 
         return pd.DataFrame(frame(self.columns))
@@ -164,14 +161,14 @@ class Table:
         return records(self.columns)
 
     def csv(self) -> bytes:
-        """Return the columns that have a name as text of commas, below their units."""
+        """Return the named columns as CSV, after their units."""
         return csv_text(frame(self.columns), unit_comments(self.columns))
 
 
 def of_each(
     things: Sequence[Any], attribute: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
 ) -> Quantity:
-    """Return an attribute (`a.b`) of n things; its `name` in JSON documents, unless `member` is another."""
+    """Return an attribute (`a.b`) of n items; `member` is its name in JSON documents."""
     found = [*map(attrgetter(attribute), things)]
     values = np.array(found, dtype=object if kind == "name" else None)
     return Quantity(values, axes, kind, **{"member": more.get("name") or attribute, **more})
@@ -180,7 +177,7 @@ def of_each(
 def attribute(
     thing: object, name: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
 ) -> Quantity:
-    """Return an attribute of a result, an array with n rows, as a quantity with the name of the attribute."""
+    """Return an attribute of a result, an array with n rows, as a quantity with the same name."""
     return Quantity(attrgetter(name)(thing), axes, kind, **{"name": name, "member": name, **more})
 
 
@@ -190,17 +187,17 @@ def column(name: str, values: Any, head: str = "", **more: Any) -> Quantity:
 
 
 def named(table: Quantities, name: str) -> Quantity:
-    """Return the quantity with a name of its columns."""
+    """Return the quantity with this column name."""
     return next(column for column in table if column.name == name)
 
 
 def chosen(table: Quantities, rows: Indices) -> list[Quantity]:
-    """Return the table of some of its things."""
+    """Return the table of some of its items."""
     return [each.at(rows) for each in table]
 
 
 def long(table: Quantities, places: Indices) -> list[Quantity]:
-    """Return a table with a row for each of some components: (r, 2) of which thing, and of which axis."""
+    """Return a table with one row per component; (r, 2) items and axes."""
     rows, axis = places.T
     several = [each for each in table if not each.single]
     found = chosen([each for each in table if each.single], rows) + component(several[0].axes, axis)
@@ -208,7 +205,7 @@ def long(table: Quantities, places: Indices) -> list[Quantity]:
 
 
 def component(axes: tuple[Axis, ...], of: Indices) -> list[Quantity]:
-    """Return which component each row of a table is of, and its unit."""
+    """Return the component of each row of a table, and its unit."""
     names, units = (
         np.array([getattr(axis, what) for axis in axes], dtype=object)[of] for what in ("name", "unit")
     )
@@ -220,7 +217,7 @@ def component(axes: tuple[Axis, ...], of: Indices) -> list[Quantity]:
 
 
 def joined(tables: Sequence[Quantities]) -> list[Quantity]:
-    """Return tables of the same quantities, one under the other."""
+    """Return concatenated tables of the same quantities."""
     found = []
     for parts in zip(*tables, strict=True):
         values = np.concatenate([np.asarray(each.values) for each in parts])
@@ -234,12 +231,12 @@ def joined(tables: Sequence[Quantities]) -> list[Quantity]:
 
 
 def frame(table: Quantities) -> dict[str, Any]:
-    """Return the columns of files and data frames: angles in degrees, names that say other units."""
+    """Return the columns of files and data frames: angles in degrees, other units in the names."""
     return {name: values for name, _, values in _columns(table)}
 
 
 def units(table: Quantities) -> dict[str, list[str]]:
-    """Return the names of the columns of `frame` by their units, if the names do not have the unit."""
+    """Return the names of the columns of `frame` by unit, if the unit is not in the name."""
     names: dict[str, list[str]] = {}
     for name, unit, _ in _columns(table):
         names.setdefault(unit, []).append(name)
@@ -247,12 +244,12 @@ def units(table: Quantities) -> dict[str, list[str]]:
 
 
 def unit_comments(table: Quantities) -> list[str]:
-    """Return a line for each unit of the columns of `frame`."""
+    """Return one line per unit of the columns of `frame`."""
     return [f"unit of {', '.join(names)}: {unit}" for unit, names in units(table).items()]
 
 
 def _columns(table: Quantities) -> Iterator[tuple[str, str, Any]]:
-    """Return the names of columns, their units without those in the names, and their values."""
+    """Yield the names of columns, their units if not in the name, and their values."""
     for each in table:
         if each.name is None:
             continue
@@ -263,20 +260,20 @@ def _columns(table: Quantities) -> Iterator[tuple[str, str, Any]]:
             plain = each.kind == "number"
             suffix = "" if plain else axis.suffix
             name = f"{each.name}_{axis.name}{suffix}".removeprefix("_")
-            with np.errstate(over="ignore"):  # infinite then
+            with np.errstate(over="ignore"):  # infinite in this case
                 values = np.degrees(column) if axis.angle and suffix else column
             yield name, "" if plain or suffix else axis.unit, values
 
 
 def members(thing: object, *names: str, **others: str) -> dict[str, Any]:
-    """Return attributes as members of a JSON document: under their names, then some (`a.b`) under others."""
+    """Return attributes as members of JSON: by name, and others (`a.b`) with other names."""
     attributes = {**dict(zip(names, names, strict=True)), **others}
     values = {name: attrgetter(attribute)(thing) for name, attribute in attributes.items()}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 
 def members_of_each(things: Sequence[object], *names: str, **others: str) -> list[Quantity]:
-    """Return attributes of n things, as of `members`, that only JSON documents contain."""
+    """Return attributes of n items, as in `members`, for JSON documents only."""
     rows = [members(thing, *names, **others) for thing in things]
     return [Quantity([row[name] for row in rows], member=name) for name in (*names, *others)]
 

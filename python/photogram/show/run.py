@@ -1,4 +1,4 @@
-"""How a report came about: program, options, inputs and times, so that it can be made again."""
+"""Reproducibility of a report: program, options, inputs and times."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from photogram.messages import printable
 from photogram.show.page import Fact, Facts, Part, Section
 from photogram.show.quantity import Axis, Quantity, Table
 
-LISTED = 200  # Listed input files
+LISTED = 200  # Maximum number of listed input files
 BYTES, SECONDS = (Axis.of("", "bytes"),), (Axis.of("", "s"),)
 
 
@@ -31,17 +31,17 @@ class InputFile:
 class Run:
     """A run of a command."""
 
-    command: str  # With its options
+    command: str  # With options
     options: Mapping[str, str]  # All options with their values
     inputs: Sequence[InputFile]  # The files that were read
     began: datetime
     seconds: float  # Up to the report
     others: int = field(default=0)
-    """Files that were read and are not among `inputs`."""
+    """Number of read files that are not in `inputs`."""
 
 
 def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
-    """Return regular files with sizes and SHA-256 sums, `LISTED` at most, and how many more there are."""
+    """Return regular files with sizes and SHA-256 sums, at most `LISTED`, and the number of others."""
     found = []
     every = [each for each in dict.fromkeys(paths) if each.is_file()]
     for path in every[:LISTED]:
@@ -52,7 +52,7 @@ def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
 
 
 def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
-    """Return the last section of a report: a command's run, or None, and seconds in phases of the engine."""
+    """Return the last section of a report: a command's run, or None, and seconds per engine phase."""
     made = [Fact("photogram", _photocore.__version__), Fact("Python", platform.python_version())]
     if run is not None:
         stamp = run.began.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S")

@@ -1,7 +1,7 @@
-"""How pictures of all programs look: colours that colour-blind readers tell apart, and sizes of letters.
+"""Style of all plots: colours for colour-blind readers, and letter sizes.
 
-The colours of kinds are those of Okabe and Ito (2008, "Color Universal Design"); ordered values have
-`cividis` (Nunez, Anderton and Renslow, PLoS ONE 13, 2018), signed ones blue over white to vermilion.
+The colours of categories are the ones of Okabe and Ito (2008, "Color Universal Design"). Ordered values use
+`cividis` (Nunez, Anderton and Renslow, PLoS ONE 13, 2018), signed ones blue to white to vermilion.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ GREEN = "#009e73"
 PURPLE = "#cc79a7"
 ORANGE = "#e69f00"
 SKY = "#56b4e9"
-COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)  # Of kinds, in this order
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)  # Colours of categories, in this order
 INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"
 SOFT = "#5c5c5c"
-"""Of letters that are not to stand out: 6.7 to 1 on white; FAINT, of lines, has 3.4."""
-"""What is drawn as it is, what a reader should look at, and what only helps."""
+"""Colour of secondary text: contrast 6.7 to 1 on white; FAINT, for lines, has 3.4."""
+"""Colours of normal, marked and auxiliary elements."""
 DPI = 120  # Dots per inch of PNG files
 MATPLOTLIB = "matplotlib", "plots in formats other than SVG", "plots"  # Package, its use, and its extra
 
@@ -47,7 +47,7 @@ SETTINGS: dict[str, Any] = {
     "legend.frameon": False,
     "legend.title_fontsize": 8.0,
     "svg.hashsalt": "photogram",
-    # Letters stay letters: pictures are smaller, and can be searched.
+    # Text is stored as text: plots are smaller and can be searched.
     "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"],
@@ -55,7 +55,7 @@ SETTINGS: dict[str, Any] = {
 
 
 def need(package: str, user: str, extra: str) -> None:
-    """Raise an error with the name of the extra if a package is absent."""
+    """Raise an error with the name of the extra if a package is missing."""
     try:
         import_module(package)
     except ModuleNotFoundError as error:
@@ -66,7 +66,7 @@ def need(package: str, user: str, extra: str) -> None:
 
 
 def styled() -> AbstractContextManager[None]:
-    """Return a context in which axes, letters and legends are those of the house."""
+    """Return a context with the style of axes, letters and legends."""
     need(*MATPLOTLIB)
     from matplotlib import rc_context
 
@@ -75,7 +75,7 @@ def styled() -> AbstractContextManager[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return a figure that belongs to no window (inches)."""
+    """Return a figure without a window (inches)."""
     need(*MATPLOTLIB)
     from matplotlib.figure import Figure
 
@@ -83,9 +83,9 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def round_length(value: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is not above a value.
+    """Return the largest of 1, 2, 5 times a power of ten that does not exceed a value.
 
-    For a value that is not positive, which has none, it is 1.
+    1 if the value is not positive.
     """
     if not value > 0:
         return 1.0

@@ -1,1 +1,1 @@
-"""Pictures as they are declared, panels of marks; drawn on axes of matplotlib, or straight as SVG."""
+"""Declared plots, panels of marks; drawn on matplotlib axes, or directly as SVG."""

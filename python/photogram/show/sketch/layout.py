@@ -1,6 +1,6 @@
-"""Where the panels of a picture go: margins come from the widths of words, and boxes have what is left.
+"""Layout of the panels of a plot: margins follow from text widths, and boxes use the remaining space.
 
-All in points, from the upper left corner, downwards.
+All units are points, from the upper left corner, downwards.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from photogram.show.sketch.marks import Level, Line, Markers, Panel, Polygons, S
 HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0  # Sizes of letters
 HEAD_LINE, TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 15.0, 13.0, 9.6, 11.5, 12.0
 SWATCH = 16.0  # Width of the sample of a mark in a legend
-GAP = 8.0  # Between unrelated things
-COLOUR_BAR = 62.0  # Width of a bar of colours with its numbers and name
+GAP = 8.0  # Between unrelated items
+COLOUR_BAR = 62.0  # Width of a colour bar with its numbers and name
 MIN_SIDE = 40.0  # Of a box
 NO_TICKS = Ticks(np.empty(0), [])
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A panel and where it goes."""
+    """A panel and its position."""
 
     panel: Panel
     box: Box = (0.0, 0.0, 0.0, 0.0)  # Left, upper, right and lower side of the area between the axes
-    # Ticks of the axes; `numbered`: whether the axis across has its numbers
+    # Ticks of the axes; `numbered`: whether the horizontal axis has numbers
     across: Ticks = NO_TICKS
     up: Ticks = NO_TICKS
     numbered: bool = False
     # Lines of title and notes
     title: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    # Width of the numbers at the left of all panels of its column
+    # Width of the numbers at the left of all panels in its column
     beside: float = 0.0
 
     def at(self, places: Floats) -> Floats:
-        """Return (..., 2) places in the units of the axes as points of the picture."""
+        """Return (..., 2) positions in the units of the axes as points of the plot."""
         left, top, right, low = self.box
         first, last = self.panel.even(self.panel.limits)
         part = (self.panel.even(places) - first) / (last - first)
@@ -75,7 +75,7 @@ class Placed:
 
     @property
     def legend_size(self) -> tuple[float, float]:
-        """Width and height of a legend of marks below each other."""
+        """Width and height of a legend with one mark per line."""
         labels = [mark.label for mark in self.panel.labelled]
         return SWATCH + 6.0 + widest(labels, LEGEND), LEGEND_LINE * len(labels)
 
@@ -105,7 +105,7 @@ class Placed:
 
     @property
     def end(self) -> tuple[float, float]:
-        """How far to the right and down anything of the panel reaches."""
+        """Right and lower limit of the panel with all its text."""
         (left, _, right, low), panel = self.box, self.panel
         ends = [left + widest(self.title, TITLE), left + widest(self.notes, NOTE)]
         ends.append(right + 0.5 * widest(self.across.texts[-1:], NUMBER))
@@ -123,7 +123,7 @@ def heading(sketch: Sketch) -> list[str]:
 
 
 def laid_out(sketch: Sketch) -> list[Placed]:
-    """Return the panels of a picture with their places."""
+    """Return the panels of a plot with their positions."""
     panels = [_opened(panel) for panel in sketch.panels if panel is not None]
     if not panels:
         return []
@@ -146,7 +146,7 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     belows = _largest(rows, [each.below + NOTE_LINE * len(each.notes) + GAP for each in found])
     high = max((whole_high - head - tops.sum() - belows.sum()) / sketch.rows, MIN_SIDE)
     sizes = np.array([_size(panel, wide, high) for panel in panels])
-    heights = _largest(rows, sizes[:, 1])  # Panels that are lower than there is room leave none of it
+    heights = _largest(rows, sizes[:, 1])  # Panels lower than the available height do not leave a gap
     left = np.cumsum(lefts + rights + wide) - rights - wide
     top = head + np.cumsum(tops + belows + heights) - belows - heights
     corners = np.column_stack([left[columns], top[rows]])
@@ -160,21 +160,21 @@ def laid_out(sketch: Sketch) -> list[Placed]:
 
 
 def _largest(groups: Any, values: Any) -> Floats:
-    """Return the largest value of each group, 0 of none."""
+    """Return the largest value of each group, 0 for empty groups."""
     found = np.zeros(groups.max() + 1)
     np.maximum.at(found, groups, values)
     return found
 
 
 def _opened(panel: Panel) -> Panel:
-    """Return a panel whose limits are apart: of one value they are a little beside it."""
+    """Return a panel with different limits; equal ones are extended slightly."""
     first, last = panel.limits
     room = np.where(first == last, 1e-6 * np.maximum(np.abs(first), 1.0), 0.0)
     return replace(panel, limits=np.stack([first - room, last + room])) if room.any() else panel
 
 
 def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float, float]:
-    """Return how much room numbers, names at the left and what is at the right need in a cell of a size."""
+    """Return the widths of numbers, names at the left and elements at the right in a cell."""
     across, up = _ticks(panel, 0.75 * wide, high)
     named = LABEL + 6.0 if up.named(panel.up) else 0.0
     right = GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
@@ -197,7 +197,7 @@ def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
 
 
 def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
-    """Return width and height of a box that may be so wide and high."""
+    """Return width and height of a box within limits."""
     if not panel.equal:
         return wide, high
     across, up = np.abs(panel.limits[1] - panel.limits[0]).tolist()
@@ -206,7 +206,7 @@ def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
 
 
 def _curves(panel: Panel) -> list[Floats]:
-    """Return (n, 2) places on what a legend should not hide."""
+    """Return (n, 2) points that a legend should not cover."""
     found: list[Floats] = []
     for mark in panel.marks:
         if isinstance(mark, (Line, Markers, Polygons)):

@@ -1,4 +1,4 @@
-"""Widths of words, and free places for names: pictures are laid out before they are drawn."""
+"""Widths of words, and free positions for names: the layout precedes the drawing."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from photogram.lazy_dataclasses import dataclass
 
 Box: TypeAlias = tuple[float, float, float, float]  # Left, low, right and high side
 NOWHERE = np.empty((0, 2))
-# Advance widths of DejaVu Sans 2.37 from space to tilde, in thousandths of the size. Of the letters that
-# pages have it is the widest, so that what fits with it fits with the others.
+# Advance widths of DejaVu Sans 2.37 from space to tilde, in thousandths of the size. It is the widest of the
+# fonts of pages, so that the text also fits with the others.
 _ASCII = (
     "318 401 460 838 636 950 780 275 390 390 500 838 318 361 318 337 636 636 636 636 636 636 636 636 636 636"
     " 337 337 838 838 838 531 1000 684 686 698 770 632 575 775 752 295 295 656 557 863 748 787 603 787"
@@ -22,24 +22,24 @@ _ASCII = (
     " 278 579 278 974 634 612 635 635 411 521 392 634 592 818 592 592 525 636 337 636 838"
 )
 _WIDTHS = {chr(32 + k): int(width) for k, width in enumerate(_ASCII.split())} | dict.fromkeys("±×−", 838)
-_OTHER = 640  # Latin, Greek and Cyrillic letters, about
+_OTHER = 640  # Latin, Greek and Cyrillic letters, approximately
 _EAST_ASIAN = 1000  # Letters from 0x2E80
 
 
 def width(text: str, size: float) -> float:
-    """Return how wide a line of text is, in the unit of the size of its letters."""
+    """Return the width of a line of text, in the unit of the letter size."""
     return (
         size / 1000.0 * sum(_WIDTHS.get(each, _EAST_ASIAN if each >= "\u2e80" else _OTHER) for each in text)
     )
 
 
 def widest(texts: Sequence[str], size: float) -> float:
-    """Return how wide the widest of some lines is; 0 of none."""
+    """Return the largest width of some lines; 0 without lines."""
     return max((width(text, size) for text in texts), default=0.0)
 
 
 def wrapped(text: str, size: float, room: float) -> list[str]:
-    """Return a text as lines that are no wider than there is room, broken between words and where it is."""
+    """Return the lines of a text within a width, broken between words and at line breaks."""
     lines: list[str] = []
     for given in text.split("\n"):
         own: list[str] = []
@@ -56,10 +56,10 @@ def wrapped(text: str, size: float, room: float) -> list[str]:
 def free_names(
     texts: Sequence[str], places: Floats, avoid: Floats, size: float, room: Box, taken: list[Box]
 ) -> Iterator[tuple[int, Box]]:
-    """Yield the rows and the boxes of names that have room at one of eight sides of their places.
+    """Yield rows and boxes of names that fit at one of eight sides of their points.
 
-    Boxes are within `room` and cover no place, none to `avoid`, and no other of the boxes that are `taken`,
-    to which they are added; `size` of letters.
+    Boxes are within `room`. They cover no point, none of `avoid`, and none of the boxes `taken`, to which
+    they are added. `size` is the letter size.
     """
     obstacles, gap, high = np.concatenate([places, avoid]), 4.0 / 7.0 * size, 8.0 / 7.0 * size
     for row, (text, (x, y)) in enumerate(zip(texts, places.tolist(), strict=True)):
@@ -74,9 +74,9 @@ def free_names(
 def first_free(
     boxes: Iterable[Box], room: Box, taken: list[Box], places: Floats = NOWHERE, gap: float = 0.0
 ) -> Box | None:
-    """Return the first box within `room` that covers no place and has a gap from the boxes that are taken.
+    """Return the first box within `room` that covers no point and has a gap from the boxes `taken`.
 
-    It is added to them.
+    It is added to `taken`.
     """
     for left, low, right, high in boxes:
         inside = room[0] <= left and right <= room[2] and room[1] <= low and high <= room[3]
@@ -89,7 +89,7 @@ def first_free(
 
 
 def overlap(one: Box, other: Box) -> bool:
-    """Return whether two boxes have something in common."""
+    """Return whether two boxes overlap."""
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
@@ -99,7 +99,7 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True, eq=False)
 class Ticks:
-    """Values along an axis and how they are written; `power`, if any, goes with the name of the axis."""
+    """Values along an axis with their texts; `power`, if any, is added to the name of the axis."""
 
     values: Floats
     texts: list[str]
@@ -110,14 +110,14 @@ class Ticks:
         return f"{name} (× {self.power})".strip() if self.power else name
 
     def signed(self, decimal: str) -> Ticks:
-        """Return the same with the decimal sign of a language."""
+        """Return the ticks with the decimal sign of a language."""
         return Ticks(self.values, [text.replace(".", decimal) for text in self.texts], self.power)
 
 
 def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool = False) -> Ticks:
     """Return the ticks of an axis with (2,) limits; `length` of the axis and `size` of letters are points.
 
-    Numbers `across` are side by side. Logarithmic axes have 1, 2, 5 times powers of ten.
+    With `across`, numbers are next to each other. Logarithmic axes have 1, 2, 5 times powers of ten.
     """
     low, high = sorted(limits.tolist())
     if log and (ratios := _ratios(low, high, length, size, across=across)):
@@ -134,14 +134,14 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool
         found = _written(values, step)
         if not across or widest(found.texts, size) + 1.6 * size < step / extent * length:
             return found
-    # An axis that is too short for two of these has its ends, or one of them.
+    # A short axis without space for two of these has its ends, or one of them.
     ends = _written(np.array([low, high]), step / 10.0)
     fit = not across or widest(ends.texts, size) + size < length
     return ends if fit else _written(ends.values[:1], step / 10.0)
 
 
 def _ratios(low: float, high: float, length: float, size: float, *, across: bool) -> Ticks | None:
-    """Return ticks of a logarithmic axis, as many as there is room for; None where that is fewer than two."""
+    """Return ticks of a logarithmic axis within the available space; None if fewer than two."""
     powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
     for steps in ((1.0, 2.0, 5.0), (1.0, 5.0), (1.0,)):
         every = np.outer(powers, steps).ravel()

@@ -1,4 +1,4 @@
-"""What panels of pictures are made of: marks in the units of their axes, sizes in points (1/72 inch)."""
+"""Elements of panels: marks in the units of their axes, sizes in points (1/72 inch)."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from photogram.show.style import BLUE, INK, VERMILION
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Mark:
-    """What stands on a panel; marks of a higher `layer` lie over others."""
+    """An element of a panel; marks of a higher `layer` cover others."""
 
     layer: float = 2.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Labelled(Mark):
-    """A mark that stands in the legend where it has a `label`."""
+    """A mark that is listed in the legend if it has a `label`."""
 
     label: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Shades:
-    """Colours of values from `low` to `high`: of the map `ordered` or `signed`; `label` of their bar.
+    """Colours of values from `low` to `high` of the map `ordered` or `signed`; `label` of the colour bar.
 
-    Where they are `log`, equal ratios of values have equal steps of colour.
+    If `log`, equal ratios of values have equal steps of colour.
     """
 
     low: float
@@ -41,7 +41,7 @@ class Shades:
     log: bool = False
 
     def parts(self, values: Floats) -> Floats:
-        """Return where values lie between the ends, which are 0 and 1."""
+        """Return relative positions of values, 0 and 1 at the ends."""
         if self.log:
             return np.asarray(np.log(values / self.low) / np.log(self.high / self.low))
         return (values - self.low) / (self.high - self.low)
@@ -49,16 +49,16 @@ class Shades:
 
 @dataclass(frozen=True, eq=False)
 class Markers(Labelled):
-    """Small signs at (n, 2) places."""
+    """Small symbols at (n, 2) points."""
 
     places: Floats
-    shape: str  # As matplotlib has them: `.`, `o`, `+`, `^`, `s`, `D`, `*`, and the markersize
+    shape: str  # As in matplotlib: `.`, `o`, `+`, `^`, `s`, `D`, `*`, and the markersize
     size: float
     colour: str = INK
-    face: str = ""  # Colour within the outline; that of the outline where nothing is given
+    face: str = ""  # Fill colour; default: the colour of the outline
     edge: float = 1.0  # Width of the outline
     opacity: float = 1.0
-    # (n,) values whose colours the markers have, the smallest on top, or the largest where `rising`
+    # (n,) values that define the colours, the smallest on top, or the largest if `rising`
     values: Floats | None = None
     shades: Shades | None = None
     rising: bool = False
@@ -66,7 +66,7 @@ class Markers(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Line(Labelled):
-    """A line through (n, 2) places, or k lines through (k, n, 2); `dash` is nothing, `--` or `:`."""
+    """A line through (n, 2) points, or k lines through (k, n, 2); `dash` is empty, `--` or `:`."""
 
     places: Floats
     colour: str = INK
@@ -77,7 +77,7 @@ class Line(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Level(Mark):
-    """A line over the whole panel at a height."""
+    """A horizontal line over the whole panel."""
 
     height: float
     colour: str
@@ -87,7 +87,7 @@ class Level(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Arrows(Labelled):
-    """Arrows from (n, 2) places by (n, 2) vectors, in one colour or n; `width` of the shaft in panels."""
+    """Arrows from (n, 2) points by (n, 2) vectors, in one colour or n; `width` of the shaft in panels."""
 
     places: Floats
     vectors: Floats
@@ -97,7 +97,7 @@ class Arrows(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Polygons(Labelled):
-    """Closed outlines through (n, v, 2) places; colours and opacities of their insides and edges, if any."""
+    """Closed outlines through (n, v, 2) points; colours and opacities of interior and edge, if any."""
 
     places: Floats
     face: str
@@ -110,9 +110,9 @@ class Polygons(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Ellipses(Mark):
-    """Ellipses about (n, 2) places: (n, 2) semi-axes, and (n,) degrees from the axis across to the first.
+    """Ellipses about (n, 2) points: (n, 2) semi-axes, and (n,) degrees from the horizontal axis.
 
-    Those with `fill`, an opacity, are filled and have no outline.
+    With `fill`, an opacity, ellipses are filled and without outline.
     """
 
     places: Floats
@@ -125,7 +125,7 @@ class Ellipses(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Mark):
-    """Equal cells from the first corner to the second in the colours of (rows, columns) values; NaN: none."""
+    """Equal cells between two corners in the colours of (rows, columns) values; NaN: empty."""
 
     corners: Floats
     values: Floats
@@ -135,21 +135,21 @@ class Mesh(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Contours(Mark):
-    """Areas between lines of equal value, of a grid."""
+    """Areas between contour lines of a grid."""
 
-    across: Floats  # (columns,) and (rows,) places along the axes
+    across: Floats  # (columns,) and (rows,) positions along the axes
     up: Floats
     values: Floats  # (rows, columns); NaN: none
-    levels: Floats  # Of the lines, upwards; each is written on its lines
+    levels: Floats  # Levels of the lines, ascending; each is written on its lines
     shades: Shades
-    colour: str = "white"  # Of the lines
+    colour: str = "white"  # Colour of the lines
     width: float = 0.9
-    steps: int = 1  # Of colour from one level to the next
+    steps: int = 1  # Number of colours between two levels
     layer: float = field(default=1.0, kw_only=True)
 
     @property
     def bounds(self) -> Floats:
-        """The values between which areas have one colour."""
+        """Limits of the areas of one colour."""
         places = np.arange(self.steps * (len(self.levels) - 1) + 1) / self.steps
         along = np.log(self.levels) if self.shades.log else self.levels
         found = np.interp(places, np.arange(len(self.levels)), along)
@@ -158,7 +158,7 @@ class Contours(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Texts(Mark):
-    """Words at (n, 2) places, which are their `start`, `middle` or `end`."""
+    """Words at (n, 2) points, which are their `start`, `middle` or `end`."""
 
     places: Floats
     texts: Sequence[str]
@@ -170,7 +170,7 @@ class Texts(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Names(Mark):
-    """Names beside (n, 2) places, where there is room: they cover no other place, and none to `avoid`."""
+    """Names near (n, 2) points, if there is space; they cover no other point and none of `avoid`."""
 
     places: Floats
     texts: Sequence[str]
@@ -186,7 +186,7 @@ def band(across: Floats, low: Floats, high: Floats, colour: str, opacity: float,
 
 
 def bars(edges: Floats, heights: Floats, colour: str, opacity: float, label: str) -> Polygons:
-    """Return a histogram, of (n + 1,) edges and (n,) heights from 0, as the band that it is."""
+    """Return a histogram of (n + 1,) edges and (n,) heights from 0 as a band."""
     across, up = np.repeat(edges, 2)[1:-1], np.repeat(heights, 2)
     return band(across, np.zeros(len(up)), up, colour, opacity, label)
 
@@ -205,13 +205,13 @@ def ellipse_axes(covariances: Floats) -> tuple[Floats, Floats]:
 
 
 def error_bars(places: Floats, low: Floats, high: Floats) -> Floats:
-    """Return (n, 2, 2) upright ends of bars through (n, 2) places, from (n,) values to (n,) others."""
+    """Return (n, 2, 2) ends of vertical bars through (n, 2) points, from (n,) values to (n,) others."""
     return np.stack([np.column_stack([places[:, 0], each]) for each in (low, high)], axis=1)
 
 
 MAPS = {
-    # Of the 256 colours of cividis (Nunez, Anderton and Renslow, PLoS ONE 13, 2018); straight lines between
-    # these are within 4 of 255 of all of them.
+    # Of the 256 colours of cividis (Nunez, Anderton and Renslow, PLoS ONE 13, 2018); linear interpolation
+    # between these is within 4 of 255 of all.
     "ordered": (
         (0, 21, 34, 52, 147, 179, 205, 232, 251, 255),
         "00224e 003170 1e3a6f 36466c 8f8a78 aea371 c9b965 e7d150 fde334 fee838",
@@ -221,45 +221,45 @@ MAPS = {
 
 
 def stops(name: str) -> tuple[Floats, Floats]:
-    """Return (n,) places from 0 to 1 and (n, 3) colours, 0 to 255, of a map."""
+    """Return (n,) positions from 0 to 1 and (n, 3) colours, 0 to 255, of a map."""
     places, colours = MAPS[name]
     return np.array(places) / 255.0, np.array([list(bytes.fromhex(each)) for each in colours.split()], float)
 
 
 def rgb(shades: Shades, values: Floats) -> Indices:
-    """Return (..., 3) red, green and blue, 0 to 255, of values; those beyond have the colours of the ends."""
+    """Return (..., 3) red, green and blue, 0 to 255, of values; colours are clipped at the ends."""
     places, colours = stops(shades.map)
     parts = shades.parts(values)
     return np.stack([np.interp(parts, places, own) for own in colours.T], axis=-1).round().astype(np.int64)
 
 
 def hexadecimal(colour: Indices) -> str:
-    """Return red, green and blue as the pages write them."""
+    """Return red, green and blue in hexadecimal notation."""
     return "#{:02x}{:02x}{:02x}".format(*colour.tolist())
 
 
 ScaleBar: TypeAlias = tuple[float, str, str]
-"""Length in the unit of the axis across, colour, and what it stands for."""
+"""Length in the unit of the horizontal axis, colour, and meaning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One pair of axes with what is on it."""
+    """One pair of axes with its marks."""
 
     limits: Floats  # (2, 2) values at the lower left and at the upper right corner
     marks: Sequence[Mark] = ()
     title: str = ""
     across: str = ""
     up: str = ""
-    equal: bool = False  # Whether a unit is equally long along both axes
-    notes: Sequence[str] = ()  # Below the panel
+    equal: bool = False  # Whether both axes have the same scale
+    notes: Sequence[str] = ()  # Notes below the panel
     bars: Sequence[ScaleBar] = ()  # Scale bars of enlarged marks, below the title
     # Position: `beside`, `above`, `below`, a corner (`upper right` ...), `best` (the emptiest), or empty
     legend: str = ""
     # Names at 0, 1, 2 ... instead of numbers
     across_names: Sequence[str] = ()
     up_names: Sequence[str] = ()
-    turned: bool = False  # Whether names across are vertical
+    turned: bool = False  # Whether names of the horizontal axis are vertical
     # Without lines of axes; without numbers
     bare: bool = False
     unnumbered: bool = False
@@ -275,14 +275,14 @@ class Panel:
         return [mark for mark in self.marks if isinstance(mark, Labelled) and mark.label]
 
     def even(self, places: Floats) -> Floats:
-        """Return (..., 2) places as they are spaced: their logarithms along axes that have these."""
+        """Return (..., 2) positions with logarithms along logarithmic axes."""
         log = np.array([self.log_across, self.log_up])
         return np.where(log, np.log10(np.where(log, places, 1.0)), places) if log.any() else places
 
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A picture: its panels row by row, None where one is empty."""
+    """A plot: its panels row by row, None if empty."""
 
     # Maximum size, inches
     width: float
@@ -295,22 +295,22 @@ class Sketch:
 
     @property
     def rows(self) -> int:
-        """How many rows of panels there are."""
+        """Number of rows of panels."""
         return -(-len(self.panels) // self.columns)
 
 
 def spread(*values: Floats | float) -> tuple[float, float]:
-    """Return limits with some room around values; values that are not finite do not count."""
+    """Return limits with a margin around finite values."""
     every = np.concatenate([np.ravel(each) for each in values])
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 0.0)
-    # As wide as matplotlib has it: a twentieth on either side.
+    # The margin of matplotlib: a twentieth on either side.
     room = 0.05 * (high - low) or 0.05 * (abs(low) or 1.0)
     return low - room, high + room
 
 
 def around(places: Floats, part: float = 0.08) -> Floats:
-    """Return (2, 2) limits around (n, 2) places with room on all sides, a part of their larger extent."""
+    """Return (2, 2) limits around (n, 2) points with a margin, a part of their larger extent."""
     low, high = places.min(axis=0), places.max(axis=0)
     room = part * (float((high - low).max()) or 1.0)
     return np.array([low - room, high + room])

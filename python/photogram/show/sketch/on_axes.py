@@ -1,4 +1,4 @@
-"""Panels with their marks on axes of matplotlib, an extra (`pip install 'photogram[plots]'`)."""
+"""Panels with their marks on matplotlib axes, an extra (`pip install 'photogram[plots]'`)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 
 def on_axes(sketch: Sketch, ax: Any) -> None:
-    """Draw a plot on axes, as many as it has panels, or in a figure or subfigure, which gets the axes."""
+    """Draw a plot on one axes object per panel, or in a figure or subfigure."""
     with styled():
         from matplotlib.figure import FigureBase
 
@@ -87,7 +87,7 @@ def _panel(axes: Any, panel: Panel) -> None:
 
 
 def _around(axes: Any, panel: Panel) -> None:
-    """Add the legend, the scale bars above the axes with the title over them, and the notes below."""
+    """Add the legend, the scale bars and title above the axes, and the notes below."""
     from matplotlib.collections import PathCollection
     from matplotlib.transforms import ScaledTranslation
 
@@ -138,9 +138,9 @@ def _colours(shades: marks.Shades) -> dict[str, Any]:
 
 
 def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
-    """Write names beside their places: none covers another name or place."""
+    """Write names near their points, without overlaps."""
     named = [(axes, mark) for axes, panel in drawn for mark in panel.marks if isinstance(mark, marks.Names)]
-    # Legends and axes of equal scales get their final places in the second layout.
+    # Legends and axes with equal scales have their final positions in the second layout.
     for axes, _ in named[:1] * 2:
         lay_out(axes.figure)
     for axes, mark in named:
@@ -156,7 +156,7 @@ def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
 
 
 def lay_out(whole: Any) -> None:
-    """Put axes and legends of a figure where they will be drawn."""
+    """Compute the final positions of axes and legends of a figure."""
     whole = whole.canvas.figure
     if (engine := whole.get_layout_engine()) is not None:
         engine.execute(whole)
@@ -165,14 +165,14 @@ def lay_out(whole: Any) -> None:
 
 
 def draw(mark: marks.Mark, axes: Any) -> None:
-    """Draw a mark into axes whose limits are final; `Names` are drawn after the layout of all panels."""
+    """Draw a mark on axes with final limits; `Names` are drawn after the layout of all panels."""
     given: dict[str, Any] = {"zorder": mark.layer, "label": getattr(mark, "label", "") or None}
     match mark:
         case marks.Markers():
             _markers(mark, axes, given)
         case marks.Line():
             lines = np.atleast_3d(mark.places.T).T
-            ends = np.full((len(lines), 1, 2), np.nan)  # No line leads from one to the next
+            ends = np.full((len(lines), 1, 2), np.nan)  # Lines are not connected
             places = np.concatenate([lines, ends], axis=1).reshape(-1, 2)
             axes.plot(*places.T, **_stroke(mark), alpha=mark.opacity, solid_capstyle="butt", **given)
         case marks.Level():

@@ -1,4 +1,4 @@
-"""A plot as users have it: shown in notebooks, saved as a file, or drawn on axes of matplotlib."""
+"""A plot for users: displayed in notebooks, saved as a file, or drawn on matplotlib axes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TIMELESS: dict[str, Any] = {"png": {"Software": None}, "pdf": {"CreationDate": N
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plot(Sketch):
-    """A plot: panels with marks, which nothing has drawn yet. Notebooks show it as SVG.
+    """A plot with panels of marks, drawn on demand. Notebooks display it as SVG.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class Plot(Sketch):
         return self._svg(f"plot{zlib.crc32(self.render()):08x}")
 
     def _svg(self, name: str) -> str:
-        """Return the plot as SVG on white ground, for pages and programs with dark ones."""
+        """Return the plot as SVG on a white background, for dark pages."""
         head, sign, content = svg_of(self, name, self._name).partition(">")
         return f'{head}{sign}<rect width="100%" height="100%" fill="white"/>{content}' if content else head
 
@@ -70,10 +70,10 @@ class Plot(Sketch):
         Raises
         ------
         InputError
-            matplotlib has no such format.
+            If matplotlib does not support the format.
         ModuleNotFoundError
-            matplotlib is absent, which all formats but `svg` need (`pip install 'photogram[plots]'`), or
-            contourpy, which contours need (`pip install 'photogram[report]'`).
+            If matplotlib is not installed (`pip install 'photogram[plots]'`; not needed for `svg`), or
+            contourpy for contours (`pip install 'photogram[report]'`).
         """
         if ending == "svg":
             return self._svg("plot").encode()
@@ -95,9 +95,9 @@ class Plot(Sketch):
         Raises
         ------
         InputError
-            The suffix is the name of no format.
+            If the suffix is not a supported format.
         ModuleNotFoundError
-            As of :meth:`render`.
+            As in :meth:`render`.
         """
         from photogram.io.writing import write_whole
 
@@ -105,12 +105,12 @@ class Plot(Sketch):
         write_whole({path: self.render(path.suffix.lower().removeprefix(".") or "png")})
 
     def figure(self) -> Figure:
-        """Return the plot as a figure of matplotlib that belongs to no window.
+        """Return the plot as a matplotlib figure without a window.
 
         Raises
         ------
         ModuleNotFoundError
-            matplotlib is absent (`pip install 'photogram[plots]'`).
+            If matplotlib is not installed (`pip install 'photogram[plots]'`).
         """
         from photogram.show.sketch.on_axes import lay_out, on_axes
 
@@ -131,9 +131,9 @@ class Plot(Sketch):
         Raises
         ------
         InputError
-            The number of axes differs from the number of panels.
+            If the numbers of axes and panels differ.
         ModuleNotFoundError
-            matplotlib is absent (`pip install 'photogram[plots]'`).
+            If matplotlib is not installed (`pip install 'photogram[plots]'`).
         """
         from photogram.show.sketch.on_axes import on_axes
 
@@ -141,7 +141,7 @@ class Plot(Sketch):
 
 
 def side_by_side(panels: Sequence[Panel], most: int, side: float, title: str = "") -> Plot:
-    """Return a picture of panels about as high as wide, `side` inches, so many in a row at most."""
+    """Return a plot of square panels, `side` inches, at most `most` in a row."""
     columns = min(len(panels), most)
     height = side * -(-len(panels) // columns) + (0.3 if title else 0.0)
     return Plot(max(side * columns, 5.0), height, panels, columns, title=title)

@@ -1,4 +1,4 @@
-"""A picture straight as SVG, without matplotlib: the page of a block is there in a moment."""
+"""A plot written directly as SVG, which is faster than matplotlib."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ NAMED: Attributes = {"font_size": LABEL, "text_anchor": "middle"}
 
 
 def svg_of(sketch: Sketch, name: str, title: str) -> str:
-    """Return a picture as an SVG element; empty without panels.
+    """Return a plot as an SVG element; empty without panels.
 
-    Identifiers of its parts begin with `name`; `title` describes it for readers who cannot see it.
+    Identifiers of its parts begin with `name`; `title` is its text alternative.
     """
     panels = layout.laid_out(sketch)
     if not panels:
@@ -107,7 +107,7 @@ def _across(placed: Placed, places: Sequence[float]) -> str:
 
 
 def _above(placed: Placed) -> str:
-    """Return title and scale bars over a box."""
+    """Return title and scale bars above a box."""
     panel, (left, top, _, _) = placed.panel, placed.box
     first, found = top - placed.above - 3.0, []
     for k, line in enumerate(placed.title, 1):
@@ -120,7 +120,7 @@ def _above(placed: Placed) -> str:
 
 
 def _legend(placed: Placed) -> tuple[str, list[Box]]:
-    """Return a legend and the boxes that it covers."""
+    """Return a legend and its boxes."""
     marks, where = placed.panel.labelled, placed.panel.legend
     if not where or not marks:
         return "", []
@@ -138,14 +138,14 @@ def _legend(placed: Placed) -> tuple[str, list[Box]]:
 
 
 def _entry(mark: Labelled, x: float, y: float) -> str:
-    """Return a sample of a mark and its name, their middle at a height."""
+    """Return a sample of a mark and its name, centred at a height."""
     own = Placed(Panel(np.array([[0.0, 0.0], [SWATCH, 8.0]])), (x, y - 4.0, x + SWATCH, y + 4.0))
     name = text(x + SWATCH + 6.0, y + 0.36 * LEGEND, mark.label, font_size=LEGEND)
     return element("g", svg(sample(mark), own), fill="none") + name
 
 
 def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
-    """Return a bar of colours with numbers beside it, at the right of panels."""
+    """Return a colour bar with numbers, to the right of panels."""
     top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
     left = max(each.right_side for each in beside) + GAP
     right = left + 9.0

@@ -1,4 +1,4 @@
-"""Marks as SVG: those of one look share an element, for thousands of points are to be no large page."""
+"""Marks as SVG; marks with the same style share an element to limit the file size."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from photogram.show.style import need
 
 Attributes: TypeAlias = dict[str, str | float]
 COLOURS_OF_MAP = 48
-MIN_LABELLED_LENGTH = 30.0  # Points of a line on which its level is written
-MIN_GAP = 4.0  # Points between levels that are written
-MAX_EXACT_PLACES = 300  # Lines of more places have coordinates in tenths of a point, others in hundredths
+MIN_LABELLED_LENGTH = 30.0  # Least length of a line with a level text, points
+MIN_GAP = 4.0  # Points between level texts
+MAX_EXACT_PLACES = 300  # Longer lines have coordinates in tenths of a point, others in hundredths
 MAX_COORDINATE = 1e5  # Points
-DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}  # Strokes and gaps in widths of the line
+DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}  # Dashes and gaps in line widths
 _POINTS = np.pi / 5 * np.arange(10)
-# Corners of signs in halves of their size; a star has outer and inner corners in turn.
+# Corners of symbols in half sizes; a star has outer and inner corners in turn.
 CORNERS = {
     "^": np.array([[0.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
     "s": np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
     "D": np.sqrt(2.0) * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]),
     "*": np.resize([1.0, 0.38], (10, 1)) * np.stack([np.sin(_POINTS), -np.cos(_POINTS)], axis=1),
 }
-# Of words over other things
+# Text over other elements
 HALO: Attributes = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
 
 
 def element(name: str, content: str = "", /, **attributes: str | float) -> str:
-    """Return an element without attributes that are empty."""
+    """Return an element without empty attributes."""
     written = "".join(
         f' {key.replace("_", "-")}="{escape(value) if isinstance(value, str) else number(value)}"'
         for key, value in attributes.items()
@@ -49,17 +49,17 @@ def element(name: str, content: str = "", /, **attributes: str | float) -> str:
 
 
 def number(value: float) -> str:
-    """Return a number with two decimals at most."""
+    """Return a number with at most two decimals."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 
 def text(x: float, y: float, words: str, **attributes: str | float) -> str:
-    """Return words whose line begins at a place, or as `text_anchor` says."""
+    """Return text that begins at a point, or as in `text_anchor`."""
     return element("text", escape(words), x=x, y=y, **attributes)
 
 
 def path(data: str, **attributes: str | float) -> str:
-    """Return a path; nothing where it has no data."""
+    """Return a path; empty without data."""
     return element("path", d=data, **attributes) if data else ""
 
 
@@ -69,25 +69,25 @@ def place(left: float, top: float, right: float, low: float) -> Attributes:
 
 
 def upwards(x: float, y: float) -> str:
-    """Return the rotation of words that are read upwards from a place."""
+    """Return the rotation of upward text at a point."""
     return f"rotate(-90 {number(x)} {number(y)})"
 
 
 def joined(places: Floats, end: str = "") -> str:
-    """Return a line through (n, 2) points of the picture."""
+    """Return a line through (n, 2) points of the plot."""
     decimals = 1 if len(places) > MAX_EXACT_PLACES else 2
     known = np.clip(places[np.isfinite(places).all(axis=1)], -MAX_COORDINATE, MAX_COORDINATE).round(decimals)
     return "M" + " ".join(f"{x:g} {y:g}" for x, y in known.tolist()) + end if len(known) > 1 else ""
 
 
 def _each(places: Floats, sign: str) -> str:
-    """Return the same sign from each of (n, 2) points of the picture, once where they are the same."""
+    """Return the same symbol at each of (n, 2) points, without duplicates."""
     found = dict.fromkeys((round(x, 1), round(y, 1)) for x, y in places.tolist())
     return "".join(f"M{x} {y}{sign}" for x, y in found)
 
 
 def svg(mark: marks.Mark, placed: Placed) -> str:
-    """Return a mark on a panel; `Names` come last, and are not cut at the sides of the panel."""
+    """Return a mark on a panel; `Names` are last, and not clipped."""
     match mark:
         case marks.Markers():
             return _markers(mark, placed)
@@ -136,7 +136,7 @@ def _signs(mark: marks.Markers, at: Floats, colour: str) -> str:
     size, half = number(mark.size), number(0.5 * mark.size)
     look: Attributes = {"stroke": colour, "stroke_width": mark.edge, "opacity": _opacity(mark)}
     if mark.shape == "." or (mark.shape == "o" and not mark.face):
-        # Half of the size and an outline: what matplotlib makes of a `.`.
+        # Half the size plus an outline, as for `.` in matplotlib.
         look["stroke_width"] = mark.size if mark.shape == "o" else 0.5 * mark.size + mark.edge
         return path(_each(at, "h0"), **look, stroke_linecap="round")
     start = np.array([-0.5 * mark.size, 0.0])
@@ -166,7 +166,7 @@ def _arrows(mark: marks.Arrows, placed: Placed) -> str:
     lengths = np.hypot(*(ends - tails).T)
     with np.errstate(invalid="ignore"):
         along = (ends - tails) / lengths[:, np.newaxis]
-    # Heads of short arrows are as small as these.
+    # Heads of short arrows are not longer than the arrow.
     head = np.minimum(4.5 * thick, lengths)
     necks = ends - head[:, np.newaxis] * along
     aside = (head * 1.75 / 4.5)[:, np.newaxis] * np.column_stack([-along[:, 1], along[:, 0]])
@@ -188,7 +188,7 @@ def _polygons(mark: marks.Polygons, placed: Placed) -> str:
         return path("".join(outlines), fill=mark.face, opacity=mark.face_opacity)
     inside: Attributes = {"fill": mark.face, "fill_opacity": f"{mark.face_opacity:.3g}"}
     edge: Attributes = {"stroke": mark.edge, "stroke_opacity": mark.edge_opacity, "stroke_width": mark.width}
-    # Each by itself: where many lie over each other, it is darker.
+    # Separate outlines, so that overlapping areas are darker.
     return element("g", "".join(map(path, outlines)), **inside, **edge)
 
 
@@ -237,9 +237,9 @@ def _png(pixels: Indices) -> bytes:
 
 
 def names(placed: Placed, taken: list[Box]) -> str:
-    """Return the names on a panel, which keep clear of each other and of boxes that are taken."""
+    """Return the names on a panel, without overlaps with each other and with boxes `taken`."""
     left, top, right, low = placed.box
-    # As if upwards: names are tried above their places first.
+    # With y upwards, so that positions above the points are tried first.
     found, taken = [], [(box[0], -box[3], box[2], -box[1]) for box in taken]
     for mark in placed.panel.marks:
         if isinstance(mark, marks.Names):
@@ -250,7 +250,7 @@ def names(placed: Placed, taken: list[Box]) -> str:
 
 
 def sample(mark: Labelled) -> Labelled:
-    """Return what a legend shows of a mark, on a panel of 16 by 8 points."""
+    """Return the sample of a mark for a legend, on a panel of 16 by 8 points."""
     line = np.array([[0.0, 4.0], [16.0, 4.0]])
     if isinstance(mark, marks.Markers):
         return replace(mark, places=np.array([[8.0, 4.0]]), size=max(mark.size, 4.0), values=None)
@@ -264,7 +264,7 @@ def sample(mark: Labelled) -> Labelled:
 
 def _generator(mark: marks.Contours) -> Any:
     need("contourpy", "contours", "report")
-    from contourpy import FillType, LineType, contour_generator  # of matplotlib, loaded in a moment
+    from contourpy import FillType, LineType, contour_generator  # part of matplotlib, fast to import
 
     kinds: Any = {"fill_type": FillType.OuterOffset, "line_type": LineType.Separate}
     return contour_generator(mark.across, mark.up, np.ma.masked_invalid(mark.values), **kinds)
@@ -275,7 +275,7 @@ def _contours(mark: marks.Contours, placed: Placed) -> str:
     below, beyond = np.nanmin(mark.values) - 1.0, max(np.nanmax(mark.values), bounds[-1]) + 1.0
     middles = mark.shades.parts(bounds[:-1]) / 2 + mark.shades.parts(bounds[1:]) / 2
     colours = rgb(Shades(0.0, 1.0, "", mark.shades.map), middles)
-    # What is below the first has its colour, too; no seams, for each lies over those before.
+    # Values below the first level have its colour as well; each area covers the previous ones, without seams.
     for low, colour in zip([below, *bounds[1:-1].tolist()], colours, strict=True):
         rings = [
             placed.at(ring)
@@ -289,7 +289,7 @@ def _contours(mark: marks.Contours, placed: Placed) -> str:
 
 
 def levels_written(placed: Placed, taken: list[Box]) -> str:
-    """Return the levels of contours on their lines; the room that they take is added to what is taken."""
+    """Return the levels of contours on their lines; their boxes are added to `taken`."""
     found = []
     for mark in (each for each in placed.panel.marks if isinstance(each, marks.Contours)):
         made = _generator(mark)
@@ -304,7 +304,7 @@ def levels_written(placed: Placed, taken: list[Box]) -> str:
 
 
 def _along(line: Floats, wide: float) -> Iterator[Box]:
-    """Yield boxes in the middle of a line and nearer to its ends; none of a short line."""
+    """Yield boxes in the middle of a line and nearer to its ends; none for a short line."""
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     for part in (0.5, 0.3, 0.7, 0.15, 0.85) if lengths[-1] >= MIN_LABELLED_LENGTH else ():
         x, y = (float(np.interp(part * lengths[-1], lengths, own)) for own in line.T)
