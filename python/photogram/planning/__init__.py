@@ -1,4 +1,4 @@
-"""Planning: what a network promises before it is flown, for several patterns of control side by side."""
+"""Planning: predicted quality of a network before flight, for several patterns of control."""
 
 from photogram.planning.pattern import ControlQuality, MotionQuality, Pattern, PhotoQuality, PointQuality
 

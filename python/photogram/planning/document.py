@@ -1,4 +1,4 @@
-"""The document of a plan: patterns of a network side by side, tables of each pattern as layers."""
+"""The document of a plan: compared patterns of a network, with tables of each pattern as layers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality
 from photogram.words import Phrase, phrase
 
-ALIKE = 1.05  # largest ratio of standard deviations of patterns that are called alike
+ALIKE = 1.05  # largest ratio of standard deviations of patterns that count as equal
 MIN_IMPROVEMENT = 1.1  # ratio of standard deviations from which a known readout time is recommended
 MAX_UNCHECKED = 0.01  # share of image coordinates without a check from which more rays are recommended
 MIN_REDUNDANCY = 0.2  # redundancy number of control below which more control is recommended
@@ -107,7 +107,7 @@ def _pattern_members(pattern: Pattern) -> dict[str, object]:
 
 
 def points_table(pattern: Pattern) -> Table:
-    """Return the quality of new points: a row for each group, also of groups without points."""
+    """Return the quality of new points, one row per group, also of groups without points."""
     axes = tuple(Axis.of(axis, pattern.block.linear_unit) for axis in pattern.axes)
     groups = partial(of_each, pattern.points)
     columns = [
@@ -166,7 +166,7 @@ def _motion(pattern: Pattern) -> Table:
 def _deviations(
     pattern: Pattern, axes: Sequence[Axis], rms: Sequence[float], largest: Sequence[float], more: Quantity
 ) -> Table:
-    """Return a table with a row for each unknown, of which each has its unit."""
+    """Return a table with one row per unknown and its unit."""
     own, of = tuple(axes), np.arange(len(axes))
     columns = [
         replace(component(own, of)[0], head="Unknown"),
@@ -287,7 +287,7 @@ def _improvements(pattern: Pattern) -> list[float]:
 
 
 def _remarks(patterns: Sequence[Pattern]) -> list[str]:
-    """Return each remark once, with the names of its patterns unless it concerns all."""
+    """Return each message once, with the names of its patterns unless it concerns all."""
     names: dict[str, list[str]] = {}
     for pattern in patterns:
         for message in pattern.result.messages:
@@ -299,7 +299,7 @@ def _remarks(patterns: Sequence[Pattern]) -> list[str]:
 
 
 def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
-    """Return a picture with a panel for each pattern, in one scale of lengths and one of colours."""
+    """Return a plot with one panel per pattern, with common scales of length and colour."""
     heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
     if heights.size == 0:
         raise PhotogramError(phrase("plan.new-points"))
@@ -327,7 +327,7 @@ def _panel(pattern: Pattern, limits: Floats, shades: Shades) -> Panel:
     sd = pattern.point_sd[new, 2]
     size = float(np.sqrt(np.clip(2e4 / max(1, len(sd)), 2, 30)))
     marks: list[Mark] = [
-        # The worst on top: where points are dense, they are what a planner looks for.
+        # The worst points are drawn on top, because a planner looks for them.
         Markers(plan[new], "o", size, values=sd, shades=shades, rising=True, layer=1.0),
         Markers(pattern.photo_plan, "+", 4.0, FAINT, label="photo"),
     ]

@@ -1,4 +1,4 @@
-"""Networks side by side: predicted, then shown as table, text, JSON and picture."""
+"""Comparison of predicted networks as table, text, JSON and plot."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plan(Documented):
-    """Patterns of a network side by side.
+    """Predicted patterns of a network for comparison.
 
     Attributes
     ----------
     patterns
-        One or more, in the order in which they were given.
+        One or more, in the given order.
     """
 
     patterns: tuple[Pattern, ...]
 
     def table(self) -> pd.DataFrame:
-        """Return the quality of new points: a row for each pattern and group of points.
+        """Return the quality of new points, one row per pattern and group of points.
 
-        Columns are those of :class:`photogram.planning.PointQuality`, standard deviations one for each axis
-        (`rms_sd_X`, `max_sd_X`, ...); groups without points in any pattern are left out.
+        Columns are the attributes of :class:`photogram.planning.PointQuality`, with one standard deviation
+        per axis (`rms_sd_X`, `max_sd_X`, ...). Groups without points in any pattern are omitted.
         """
         import pandas as pd  # pandas takes long to import
 
@@ -64,7 +64,7 @@ class Plan(Documented):
         Raises
         ------
         PhotogramError
-            The plan has no new points.
+            If the plan lacks new points.
         """
         from photogram.planning.document import plan_sketch
 
@@ -77,30 +77,29 @@ def plan(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Plan:
-    """Predict networks and put them side by side.
+    """Predict several networks for comparison.
 
     Parameters
     ----------
     patterns
-        Planned blocks by name, ready for :func:`photogram.predict`: the same photos with different control,
-        for instance, or different overlaps.
+        Planned blocks by name, as for :func:`photogram.predict`, for example the same photos with different
+        control, or different overlaps.
     threads, progress
-        As for :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
 
     Raises
     ------
     InputError
-        No block, blocks whose lengths have different units or whose axes differ, or whatever
-        :func:`photogram.predict` refuses.
+        If there is no block, units or axes of blocks differ, or :func:`photogram.predict` raises it.
     RankError
-        A pattern that does not determine all unknowns; its message begins with the name of the pattern.
+        If a pattern does not determine all unknowns; the message begins with the name of the pattern.
     """
     if len({(block.linear_unit, block.geographic) for block in patterns.values()}) != 1:
         raise InputError(phrase("plan.spaces"))
     made = []
     for name, block in patterns.items():
         tied = np.isfinite(block.point_sd).any() or np.isfinite(block.photo_position_sd).any()
-        # Of trajectories, what is given of them.
+        # For trajectories, their given values.
         if not (tied or on_shared(block).any()):
             raise RankError(
                 phrase("error.at", what=name, message=phrase("plan.datum")), list(block.photo_ids), []

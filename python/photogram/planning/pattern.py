@@ -1,8 +1,8 @@
-"""One pattern of a plan: a predicted block, its standard deviations as lengths, its places and its scale.
+"""One pattern of a plan: a predicted block with standard deviations as lengths, locations and scale.
 
-Points are grouped by their place in the block, not by their distance to control: it is the same for every
-pattern of control, so that the rows of two patterns hold the same points, and it is how the accuracy of
-blocks is usually tabulated: weak at the border, where rays are few and come from one side, uniform inside.
+Points are grouped by their location in the block, not by their distance to control. So groups of different
+patterns contain the same points. The accuracy of blocks is usually tabulated this way: it is low at the
+border, with few rays from one side, and uniform inside.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class MotionQuality:
-    """What is expected of a motion that all photos, or all trajectories, have.
+    """Expected quality of the motion of all photos, or of all trajectories.
 
     Attributes
     ----------
     unknown
         "readout time" with its name, "velocity", "rate" (of photos with motions of their own), "position of
-        trajectories" or "rotation of trajectories" (anywhere between their images).
+        trajectories" or "rotation of trajectories" (anywhere between their observations).
     unit
         "s", the linear unit a second, "rad/s", the linear unit or "rad".
     rms_sd, max_sd
@@ -55,25 +55,25 @@ class MotionQuality:
 
 @dataclass(frozen=True)
 class PointQuality:
-    """What a group of new points promises.
+    """Expected quality of a group of new points.
 
     Attributes
     ----------
     grouping, group
         `rays`, `location` or `all`, and the name of the group.
     points
-        Their number.
+        Number of points.
     rms_sd, max_sd
         Root mean square and largest of their expected standard deviations in the three coordinates, linear
         unit.
     redundancy
         Mean redundancy number of their image coordinates.
     unchecked
-        Share of image coordinates with less redundancy than 0.01: gross errors there cannot be found.
+        Share of image coordinates with a redundancy below 0.01, whose gross errors cannot be detected.
     detectable
-        Minimal detectable error of the other image coordinates, millimetres: the median; NaN for none.
+        Median minimal detectable error of the other image coordinates, millimetres; NaN for none.
     effect
-        What such an error moves at most when it stays in, in standard deviations: the median; NaN for none.
+        Median of the largest effect of such an undetected error, in standard deviations; NaN for none.
     """
 
     grouping: str
@@ -89,16 +89,16 @@ class PointQuality:
 
 @dataclass(frozen=True)
 class PhotoQuality:
-    """What the photos promise in one unknown.
+    """Expected quality of one unknown of the photos.
 
     Attributes
     ----------
     unknown
-        Its name.
+        Name of the unknown.
     rms_sd, max_sd
         Root mean square and largest of the expected standard deviations: linear unit, radians for angles.
     redundancy
-        Mean redundancy number of the given values as observations; NaN where none is weighted.
+        Mean redundancy number of the given values as observations; NaN if none is weighted.
     """
 
     unknown: str
@@ -109,22 +109,22 @@ class PhotoQuality:
 
 @dataclass(frozen=True)
 class ControlQuality:
-    """How control is checked in one component.
+    """Reliability of one component of control.
 
     Attributes
     ----------
     component
-        Its name.
+        Name of the component.
     held
-        How many control points hold it.
+        Number of control points with this component weighted or fixed.
     sd
         Root mean square of its a priori standard deviations, linear unit.
     redundancy
-        Mean redundancy number of those that are weighted (not fixed); NaN for none.
+        Mean redundancy number of the weighted (not fixed) ones; NaN for none.
     detectable
-        Minimal detectable error, linear unit: the median; NaN for none.
+        Median minimal detectable error, linear unit; NaN for none.
     effect
-        What such an error moves at most when it stays in, in standard deviations: the median; NaN for none.
+        Median of the largest effect of such an undetected error, in standard deviations; NaN for none.
     """
 
     component: str
@@ -137,16 +137,16 @@ class ControlQuality:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """A planned network with what it promises.
+    """A planned network with its expected quality.
 
     Attributes
     ----------
     name
-        Of the pattern, for tables.
+        Name of the pattern, for tables.
     result
         The predicted block (a priori unit weight).
     known
-        The same if its readout times were known; None where they are, or where there are none.
+        The prediction for known readout times; None if they are known or do not exist.
     """
 
     name: str
@@ -165,7 +165,7 @@ class Pattern:
 
     @cached_property
     def point_sd(self) -> Floats:
-        """(n, 3) expected standard deviations along `axes`, linear unit; NaN for points left out."""
+        """(n, 3) expected standard deviations along `axes`, linear unit; NaN for excluded points."""
         return self.result.point_sd * self._point_units
 
     @cached_property
@@ -177,27 +177,27 @@ class Pattern:
 
     @cached_property
     def control_sd(self) -> Floats:
-        """(n, 3) a priori standard deviations of control, linear unit; infinite where not held."""
+        """(n, 3) a priori standard deviations of control, linear unit; infinite for free components."""
         return self.block.point_sd * self._point_units
 
     @property
     def new_points(self) -> NDArray[np.bool_]:
-        """(n,) which points are to be determined: those that take part and are not control."""
+        """(n,) mask of points to be determined: used points that are not control."""
         return np.asarray(self.result.used_points & (self.result.point_kinds != "control"))
 
     @cached_property
     def point_plan(self) -> Floats:
-        """(n, 2) points in plan, linear unit: X, Y, or the tangent plane amid the photos, x pointing east."""
+        """(n, 2) points in plan, linear unit: X, Y, or the tangent plane at the photos, x to the east."""
         return self._plan(self.result.point_positions)
 
     @cached_property
     def photo_plan(self) -> Floats:
-        """(P, 2) photo stations in plan, as `point_plan`."""
+        """(P, 2) photo stations in plan, like `point_plan`."""
         return self._plan(self.result.photo_positions)
 
     @cached_property
     def point_locations(self) -> NDArray[np.str_]:
-        """(n,) `corner`, `edge` or `interior`, as :func:`~photogram.planning.pattern.locations` has it."""
+        """(n,) `corner`, `edge` or `interior`; see :func:`~photogram.planning.pattern.locations`."""
         stations = [self.photo_plan]
         if on_shared(self.block).any():
             # A strip of a scanner is as long as its trajectory.
@@ -207,12 +207,12 @@ class Pattern:
 
     @cached_property
     def scale(self) -> float:
-        """How long a millimetre in the photo is on the ground, linear unit: the mean of all images."""
+        """Mean length on the ground of one millimetre in the photo, linear unit."""
         return float(self._scales.mean())
 
     @cached_property
     def unit(self) -> float:
-        """The standard deviation of image coordinates on the ground, linear unit: the mean of all images."""
+        """Mean standard deviation of image coordinates on the ground, linear unit."""
         rms = np.sqrt((self.result.block.image_sd[self.result.used_images] ** 2).mean(axis=1))
         return float((self._scales * rms).mean())
 
@@ -244,7 +244,7 @@ class Pattern:
 
     @cached_property
     def motion(self) -> list[MotionQuality]:
-        """Readout times, velocities and rates of photos, trajectories; nothing where nothing moves."""
+        """Readout times, velocities and rates of photos, trajectories; empty without motion."""
         block, trajectories = self.block, self.result.trajectories
         if not block.timed:
             return []
@@ -268,7 +268,7 @@ class Pattern:
 
     @property
     def known_rms_sd(self) -> tuple[float, float, float] | None:
-        """What `rms_sd` of all new points would be, were the readout times known; None where they are."""
+        """`rms_sd` of all new points for known readout times; None if they are known."""
         if self.known is None or not self.new_points.any():
             return None
         sd = (self.known.point_sd * self._point_units)[self.new_points]
@@ -276,7 +276,7 @@ class Pattern:
 
     @cached_property
     def control(self) -> list[ControlQuality]:
-        """Held components of control, by axis."""
+        """Weighted or fixed components of control, by axis."""
         qualities = []
         for name, sd, numbers in zip(
             self.axes, self.control_sd.T, self.result.point_redundancy.T, strict=True
@@ -309,7 +309,7 @@ class Pattern:
 
     @cached_property
     def _point_units(self) -> Floats:
-        """(n, 3) how long a unit of the coordinates of points is, linear unit."""
+        """(n, 3) lengths of the units of point coordinates, linear unit."""
         return geometry.lengths_of_units(self.result.point_positions, self.block.spheroid)
 
     @cached_property
@@ -322,18 +322,18 @@ class Pattern:
         return self._cartesian_plan(geometry.Cartesian(self.block.spheroid).positions(positions))
 
     def _cartesian_plan(self, xyz: Floats) -> Floats:
-        """Return the plan of places in X, Y, Z, geocentric where the space is geographic."""
+        """Return the plan of positions in X, Y, Z, geocentric if the space is geographic."""
         if not self.block.geographic:
             return xyz[:, :2]
         axes = geometry.Cartesian(self.block.spheroid)
-        # The mean of geocentric coordinates knows no antimeridian.
+        # Geocentric coordinates avoid the antimeridian.
         centre = axes.positions(self.result.photo_positions).mean(axis=0)
         frame = geometry.local_frames(axes.from_cartesian(centre[np.newaxis]))[0]
         return np.asarray((xyz - centre) @ frame[:2].T)
 
 
 def with_known_readout(block: Block) -> Block | None:
-    """Return a block whose readout times are known; None where all of them are."""
+    """Return a block with known readout times; None if all are known."""
     known: dict[int, Readout] = {}
     timed = []
     for each in block.timed:
@@ -348,9 +348,9 @@ def with_known_readout(block: Block) -> Block | None:
 def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
     """Return the location of each of (n, 2) points in plan, (n,): one of `LOCATIONS`.
 
-    The block is the smallest rectangle around its (P, 2) photo stations, P at least 1. A point in it lies in
-    the interior, one beyond a side of it at an edge, one beyond two sides in a corner. So a single strip has
-    flanks and ends, but hardly an interior.
+    The block is the smallest rectangle around its (P, 2) photo stations, P at least 1. Points inside are in
+    the interior, points beyond one side at an edge, and points beyond two sides in a corner. So a single
+    strip has flanks and ends, but hardly an interior.
     """
     axes = _axes(stations)
     turned, extent = points @ axes.T, stations @ axes.T
@@ -359,9 +359,9 @@ def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
 
 
 def _axes(points: Floats) -> Floats:
-    """Rows: the unit vectors along the sides of the smallest rectangle around points in plan.
+    """Return the unit vectors (rows) along the sides of the smallest rectangle around points.
 
-    One of its sides lies along a side of the convex hull (Freeman and Shapira, 1975).
+    One of its sides is on the convex hull (Freeman and Shapira, 1975).
     """
     corners = hull(points)
     sides = np.roll(corners, -1, axis=0) - corners
@@ -375,7 +375,7 @@ def _axes(points: Floats) -> Floats:
 
 
 def _times_on_trajectories(block: Block) -> dict[str, Floats]:
-    """Return the times at which the trajectories that photos share are looked at, by their names."""
+    """Return the evaluated times of trajectories that photos share, by name."""
     found: dict[str, list[Floats]] = {}
     for each, trajectory, _, own in timed_images(block):
         if each.trajectory is not None and len(own):
