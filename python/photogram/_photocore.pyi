@@ -1759,9 +1759,9 @@ class BlockSolution(_NetworkSolution):
     ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], list[float], int]]:
         """Adjusted shared unknowns, in the input order.
 
-        Change, position (3), rotation matrix row by row (9), cofactors row by row for rotations about the
-        adjusted axes, cofactors with the unknowns of the previous one in its block (empty for the first),
-        redundancy numbers, and the number of observations and images.
+        Change, position (3), rotation matrix row by row (9); cofactors row by row for rotations about the
+        adjusted axes. Then cofactors with the unknowns of the previous one in its block (empty for the
+        first), redundancy numbers, and the number of observations and images.
         """
 
     @property

@@ -31,8 +31,8 @@ STACK = 160 << 20  # Bytes of addresses for the stack of a thread, its share of 
 def available_memory(root: Path = Path("/")) -> int | None:
     """Return the memory available to this process without swapping, bytes; None if unknown.
 
-    The minimum of the available memory reported by Linux, the unused memory of the control groups
-    (containers) of the process, and the unused part of its limits (`ulimit -v`, `ulimit -d`).
+    The minimum of three values: the available memory reported by Linux, the unused memory of the control
+    groups (containers), and the unused part of the limits (`ulimit -v`, `ulimit -d`).
     """
     threads = os.cpu_count() or 1
     own = addresses_of_a_thread(root)

@@ -135,9 +135,10 @@ def adjust(
         report will follow. The adjustment then takes about 5 % longer and stores data for the tests, if there
         is enough memory. This requires convergence, no loss and no inner constraints.
     tolerance
-        Iterate until no unknown changes by more than this fraction of its standard deviation (a-priori unit
-        weight), or until the convergence rate predicts less than a tenth of it. A step that increases the sum
-        of squares is damped (Levenberg-Marquardt). `AsPublished`: the criterion of the 1987 program.
+        Convergence limit: largest change of an unknown, as a fraction of its standard deviation (a-priori
+        unit weight). The iteration also ends if the convergence rate predicts less than a tenth of it. A step
+        that increases the sum of squares is damped (Levenberg-Marquardt). `AsPublished`: the criterion of the
+        1987 program.
     max_iterations
         Maximum number of iterations. None: 50; 200 with a loss, which needs reweighting, or with free camera
         parameters, which converge slowly in weak networks; 400 with a splined lens, whose knots may depend on

@@ -336,8 +336,8 @@ def _on_nominal(
 ) -> tuple[_photocore.FoundRow, list[Message]] | None:
     """Orient photos relatively and transform the model to nominal coordinates of points.
 
-    None if no point has both constrained and free coordinates, if the model contains fewer than three points
-    with coordinates, or if these points are collinear.
+    None if no point has both constrained and free coordinates. None if the model contains fewer than three
+    points with coordinates, or if these are collinear.
     """
     held = np.isfinite(block.point_sd)
     if not (held.any(axis=1) & ~held.all(axis=1)).any():

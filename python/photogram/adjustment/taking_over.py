@@ -1,8 +1,8 @@
 """Update of trajectory tables by large attitude corrections.
 
-Corrections r(t) are additive but rotations are not, so that bases suit small corrections only. If corrections
-of images and records exceed half a radian, the rotation in the middle is applied to the table, A0 Exp(r),
-exactly at all times. The corrections r then restart at zero (docs/moving.md).
+Corrections r(t) are additive but rotations are not, so that bases suit small corrections only. Corrections of
+images and records may exceed half a radian. The rotation in the middle is then applied to the table, A0
+Exp(r), exactly at all times. The corrections r then restart at zero (docs/moving.md).
 """
 
 from __future__ import annotations

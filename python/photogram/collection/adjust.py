@@ -46,8 +46,8 @@ def adjust(
 
     Points with a free coordinate and images on one photo only are excluded. Points that converge to the
     station of a photo, because inconsistent rays meet there, are excluded as well, as they would ruin the
-    numerical precision. Such points are a hundred times nearer than others, while every other photo has the
-    images of point and station within three standard deviations, before and after a step. Points that diverge
+    numerical precision. Such points are a hundred times nearer than others. In every other photo, the images
+    of point and station agree within three standard deviations, before and after a step. Points that diverge
     to infinity on parallel or divergent rays are also excluded. Photos without remaining images do not
     change. If weighted or fixed values define no datum, cofactors refer to minimum constraints: position and
     attitude of the first photo, and one translation component of another. Residuals, redundancy numbers and

@@ -108,8 +108,8 @@ def adjust_in_parts(
     OutOfMemoryError
         If a part, or the data shared by parts, exceed the memory; the message proposes a remedy.
     InputError
-        As in :func:`photogram.adjust`. If there are more parts than photos, photos or observations are on
-        trajectories, a cluster does not respond, workers are incompatible, or the folder contains another
+        As in :func:`photogram.adjust`. If there are more parts than photos, or photos or observations are on
+        trajectories. If a cluster does not respond, workers are incompatible, or the folder contains another
         run.
     ModuleNotFoundError
         If a cluster is requested and dask.distributed is not installed (extra `distributed`).

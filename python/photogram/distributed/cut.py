@@ -1,10 +1,10 @@
 """Nested dissection of the photos of a block by position, and the work per node of the tree.
 
-Photos and other reduced unknowns are the vertices of a graph, points and observations are its edges. An edge
-contains all vertices that it touches. The photos are halved by position, recursively. The separator consists
-of the photos on the smaller side of a cut that share an edge with the other side. All photos of a remaining
-edge are then in one part, or in separators between this part and the root (George 1973; Lipton, Rose and
-Tarjan 1979).
+Photos and other unknowns of the reduced normal equations are the vertices of a graph, points and observations
+are its edges. An edge contains all vertices that it touches. The photos are halved by position, recursively.
+The separator consists of the photos on the smaller side of a cut that share an edge with the other side. All
+photos of a remaining edge are then in one part, or in separators between this part and the root (George 1973;
+Lipton, Rose and Tarjan 1979).
 
 To count the work in advance, parts are cut further until the pieces have the size of the fronts of the
 factorisation. Multiply-adds and memory are then computed for dense panels, as in multifrontal elimination of

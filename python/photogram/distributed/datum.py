@@ -45,9 +45,9 @@ class Mover:
     def __call__(self, nodes: Sequence[tuple[Indices, Floats]]) -> list[dict[str, np.ndarray]]:
         """Transform values (N,) with names (N, 3) of the unknowns of each node in the whole block.
 
-        Return for each node the new `values` (N,), the columns `b` and `t` (d, N), the `condition` that
-        limits rounding errors, and the unknowns `staying` in the datum. InputError if points and photos do
-        not define the datum; others as in :func:`photogram.adjust`.
+        Return for each node the new `values` (N,) and the columns `b` and `t` (d, N). Also return the
+        `condition`, a measure of rounding errors, and the unknowns `staying` in the datum. InputError if
+        points and photos do not define the datum; others as in :func:`photogram.adjust`.
         """
         names, values = (np.concatenate(each) for each in zip(*nodes, strict=True))
         network = block_network(self.block, self.options)

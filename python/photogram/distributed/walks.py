@@ -107,8 +107,8 @@ class Walks:
     def invert(self, up: Up, after: str, variance: float | None, datum: InDatum | None) -> None:
         """Invert from the root down; every node writes its results.
 
-        The results of a node and the contributions of its children remain until all descendants are finished,
-        because they are needed again if a worker is lost.
+        The results of a node and the contributions of its children remain until all descendants are finished.
+        They are needed again if a worker is lost.
         """
         done: dict[int, Handle] = {}
         left = [1 + sum(1 for other in self.nodes if node in self.tree.above(other)) for node in self.nodes]

@@ -145,8 +145,9 @@ class Cartesian:
 def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
     """Return (n, 3) lengths of the coordinate units at positions, in the linear unit.
 
-    They are 1 in rectangular space. In geographic space they are the radius of the parallel for longitude and
-    the radius of curvature of the meridian for latitude, both at the height of the position.
+    They are 1 in rectangular space. In geographic space, the length for longitude is the radius of the
+    parallel. The length for latitude is the radius of curvature of the meridian. Both refer to the height of
+    the position.
     """
     values = _floats(positions)
     if spheroid is None:
@@ -271,9 +272,9 @@ def refraction_shift(
 
     Returns
     -------
-    (n, 3) vectors in the linear unit, along X, Y, Z or the geocentric axes. They contain the lift dZ of
-    the GIANT guide (Appendices F and G) along the up direction of the camera, and the lift of the ray by
-    Snell's law along the up direction of the point. Zero if no model applies.
+    (n, 3) vectors in the linear unit, along X, Y, Z or the geocentric axes. The lift dZ of the GIANT guide
+    (Appendices F and G) is along the up direction of the camera. The lift of the ray by Snell's law is along
+    the up direction of the point. Zero if no model applies.
 
     Raises
     ------

@@ -102,7 +102,7 @@ def photographed(
     """Assign cameras cyclically to the photos of a simulated block; return truth and block.
 
     Truth and block must have the same principal distance. Errors and standard deviations of image coordinates
-    are converted as angles near the axis, so that they are proportional to the principal distance of a
+    are converted as angles near the axis. They are therefore proportional to the principal distance of a
     camera. `start_cameras` define the initial values and unknowns of the block; None: cameras are fixed.
     InputError if cameras have different units, numbers of cameras differ, or a point is not in any image.
     """

@@ -1,9 +1,9 @@
 """Data structuring of the 1987 program: bandwidth of normal equations (GIANT guide, Appendix A).
 
 Unknowns form sets of three: two per station, one per point. Frames and their points are processed in order.
-The first image of a point adds the sets of all stations that observe the point and are not yet included, in
-the order of the frames, then the set of the point. A station is open from its entry until its last point.
-Points share one set of storage.
+The first image of a point adds the missing sets of all stations that observe it, in the order of the frames.
+The set of the point follows. A station is open from its entry until its last point. Points share one set of
+storage.
 """
 
 from __future__ import annotations

@@ -91,8 +91,8 @@ def calibrated(camera: Camera) -> Camera:
 def with_one_focal_length(camera: Camera, size: tuple[float, float] | None = None) -> Camera:
     """Return an equivalent camera with one focal length f in the smallest model; fx = fy required.
 
-    The camera is unchanged if fx differs from fy, if no model contains its values and unknowns, or if that
-    model requires the `size` of the image (width and height in pixels) and none is given.
+    The camera is unchanged if fx differs from fy, or if no model contains its values and unknowns. It is also
+    unchanged if that model requires the missing `size` of the image (width and height in pixels).
     """
     sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     values = camera.parameters
