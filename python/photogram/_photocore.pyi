@@ -1,7 +1,7 @@
-"""The numerical core, compiled. Private: use it through the modules of `photogram`.
+"""Compiled numerical core. Private: use it through the modules of `photogram`.
 
-Arrays are float64. Angles are radians, image coordinates millimetres, lengths the linear unit of the object
-space. All functions release the GIL.
+Arrays are float64. Unless specified otherwise, angles are in radians, image coordinates in millimetres and
+lengths in the linear unit of the object space. All functions release the GIL.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,39 +23,39 @@ FoundRow = tuple[
     int | None,
     float | None,
 ]
-"""What `find_first_values` returns."""
+"""Result of `find_first_values`."""
 
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
 CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], list[str]]
-"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable
-part; parts of poses that do: positions `along` and `across` the view, `tilt`, `swing` about the view."""
+"""Photos; shared cameras; shared unknowns; cameras with significant parameters; significant components of
+poses: positions `along` and `across` the view, `tilt`, `swing` about the view."""
 
 FailureRow = tuple[str, str, list[CombinationRow], list[int], list[float]]
 """Why a network cannot be adjusted, as in :class:`BlockError`."""
 
 CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
-"""Of an adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the
-normal equations (k), photos, images."""
+"""Adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the normal
+equations (k), number of photos, number of images."""
 
 ContributionRow = tuple[_Floats, _Floats, _Floats]
-"""What a node leaves to the one above: matrix, right-hand side, diagonal; see :class:`FormedNode`."""
+"""Contribution of a node to its parent: matrix, right-hand side, diagonal; see :class:`FormedNode`."""
 
 _DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
-"""What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, radius."""
+"""Datum: its name, points, photos, use of scale, photos whose attitudes count, radius."""
 
 RefractionRow = tuple[str | None, str | None, float, float, float]
 """Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
-(linear unit), refractive index of the water, metres in the linear unit."""
+(linear unit), refractive index of the water, metres per linear unit."""
 
 FlownRow = tuple[
     _Floats, _Floats, _Floats, _Floats, list[tuple[int, list[float]]], list[tuple[int, list[float]]]
 ]
-"""What `flown` returns."""
+"""Result of `flown`."""
 
 class TrajectoryRow(TypedDict):
-    """A trajectory as the core takes it; coefficients are indices among the common unknowns."""
+    """Trajectory in the format of the core; coefficients are indices of shared unknowns."""
 
     times: list[float]
     positions: _Floats
@@ -73,16 +73,16 @@ class TrajectoryRow(TypedDict):
 __version__: str
 
 def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
-    """Probability that a chi-square variable exceeds `x`, or is less than it.
+    """Return the probability that a chi-square variable exceeds `x`, or is less than it.
 
     Parameters
     ----------
     x
-        Not negative.
+        Value of the variable, not negative.
     dof
         Degrees of freedom, positive, not necessarily whole.
     upper
-        Whether the probability of larger values is meant, or that of smaller ones.
+        Whether to return the probability of larger values, or else of smaller ones.
 
     Returns
     -------
@@ -90,16 +90,16 @@ def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
     """
 
 def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -> float:
-    """Return the value that a chi-square variable exceeds (`upper`), or falls short of, with a probability.
+    """Return the value that a chi-square variable exceeds (`upper`) with a probability.
 
     Parameters
     ----------
     probability
-        Between 0 and 1; small ones keep their digits on either side.
+        Between 0 and 1; small values on either side retain their precision.
     dof
         Degrees of freedom, positive, not necessarily whole.
     upper
-        The side on which the probability lies.
+        Whether it is the probability of larger values.
 
     Returns
     -------
@@ -107,14 +107,14 @@ def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -
     """
 
 def normal(z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (n,) the probabilities that a normal variable lies below values."""
+    """Return (n,) the probabilities that a normal variable is less than each value."""
 
 def student(t: float, dof: float) -> float:
-    """Probability that the absolute value of Student's variable exceeds that of `t`.
+    """Return the probability that the absolute value of Student's variable exceeds `t`.
 
     Returns
     -------
-    NaN for arguments that cannot be.
+    NaN for invalid arguments.
     """
 
 def student_limit(probability: float, dof: float) -> float:
@@ -122,77 +122,77 @@ def student_limit(probability: float, dof: float) -> float:
 
     Returns
     -------
-    NaN for arguments that cannot be.
+    NaN for invalid arguments.
     """
 
 def fisher(x: float, first: float, second: float) -> float:
-    """Probability that Fisher's variable of `first` and `second` degrees of freedom exceeds `x`.
+    """Return the probability that an F variable of two degrees of freedom exceeds `x`.
 
     Returns
     -------
-    NaN for arguments that cannot be.
+    NaN for invalid arguments.
     """
 
 def fisher_limit(probability: float, first: float, second: float) -> float:
-    """Return the value that Fisher's variable of two degrees of freedom exceeds with a probability.
+    """Return the value that an F variable of two degrees of freedom exceeds with a probability.
 
     Returns
     -------
-    NaN for arguments that cannot be.
+    NaN for invalid arguments.
     """
 
 def log_chi_square(x: _Floats, dof: _Floats) -> _Floats:
-    """Logarithms of the probabilities that chi-square variables exceed values.
+    """Return the logarithms of the probabilities that chi-square variables exceed values.
 
     Parameters
     ----------
     x
-        (n,) not negative.
+        (n,) values, not negative.
     dof
         (n,) degrees of freedom, positive.
 
     Returns
     -------
-    (n,) natural logarithms, also where the probability is less than the smallest number; NaN for arguments
-    outside these ranges.
+    (n,) natural logarithms, also for probabilities below the smallest number; NaN for arguments outside these
+    ranges.
     """
 
 def log_fisher(x: _Floats, first: _Floats, second: _Floats) -> _Floats:
-    """Logarithms of the probabilities that Fisher's variables exceed values.
+    """Return the logarithms of the probabilities that F variables exceed values.
 
     Parameters
     ----------
     x
-        (n,) not negative.
+        (n,) values, not negative.
     first, second
         (n,) degrees of freedom, positive.
 
     Returns
     -------
-    (n,) natural logarithms, also where the probability is less than the smallest number; NaN for arguments
-    outside these ranges.
+    (n,) natural logarithms, also for probabilities below the smallest number; NaN for arguments outside these
+    ranges.
     """
 
 def noncentral_chi_square(x: float, dof: float, noncentrality: float) -> float:
-    """Probability that a noncentral chi-square variable exceeds `x`; NaN for arguments that cannot be."""
+    """Return the probability that a noncentral chi-square variable exceeds `x`; NaN if invalid."""
 
 def noncentral_fisher(x: float, first: float, second: float, noncentrality: float) -> float:
-    """Probability that a noncentral F variable exceeds `x`; NaN for arguments that cannot be.
+    """Return the probability that a noncentral F variable exceeds `x`; NaN if invalid.
 
-    With `second` infinite it is that of the noncentral chi-square variable over `first`.
+    If `second` is infinite, the variable is noncentral chi-square divided by `first`.
     """
 
 def detectable_noncentrality(level: float, power: float, first: float, second: float) -> float:
-    """Return the noncentrality (Baarda's lambda0) at which a test is significant with a given probability.
+    """Return the noncentrality (Baarda's lambda0) at which a test has a given power.
 
     Parameters
     ----------
     level
-        Of the test: probability that it rejects where nothing is wrong.
+        Significance level: probability of rejection if nothing is wrong.
     power
-        Probability that it does where something is; more than the level.
+        Probability of rejection if something is wrong; more than the level.
     first, second
-        Degrees of freedom of the F test; with `second` infinite of the chi-square test.
+        Degrees of freedom of the F test; of the chi-square test if `second` is infinite.
 
     Returns
     -------
@@ -200,51 +200,50 @@ def detectable_noncentrality(level: float, power: float, first: float, second: f
     """
 
 def level_of_equal_power(noncentrality: float, power: float, dof: float) -> tuple[float, float]:
-    """Return level and critical value of the chi-square test that finds a noncentrality with a given power.
+    """Return level and critical value of the chi-square test with a given power.
 
-    With the noncentrality of one test for all others it is Baarda's B-method. NaN for arguments that cannot
-    be.
+    With the same noncentrality for all tests, this is the B-method of Baarda. NaN for invalid arguments.
     """
 
 def film_readings(
     numbers: _Floats, vectors: _Floats, places: _Floats
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return readings of places in a camera's frame, and their partials.
+    """Return the readings of positions in the camera frame, with partial derivatives.
 
     Parameters
     ----------
     numbers
-        What is never unknown of a film: mirrored, rows down, pitch, o1, o2, hx, hy; 0, 1 or 2 for nothing, h
-        or g; whether it has a roll and curves; the number of its pattern and what that takes.
+        Fixed properties of a film: mirrored, rows down, pitch, o1, o2, hx, hy; 0 (none), 1 (h) or 2 (g);
+        whether it has a roll and curves; number and numbers of its pattern.
     vectors
-        (k, 3) the numbers of its unknowns: placement, size, h or g, roll, scanner, curves, weights.
+        (k, 3) values of its unknowns: placement, size, h or g, roll, scanner, curves, weights.
     places
-        (n, 2) mm.
+        (n, 2) positions in mm.
 
     Returns
     -------
-    (n, 2) readings, and (n, 2, 10) partials by x, y, t1, t2, theta, m, b1, b2 and both of h or g; NaN where
-    the scanner has no reading.
+    (n, 2) readings, and (n, 2, 10) partial derivatives by x, y, t1, t2, theta, m, b1, b2 and both of h or g.
+    NaN outside the range of the scanner.
     """
 
 def film_places(numbers: _Floats, vectors: _Floats, readings: _Floats) -> NDArray[np.float64]:
-    """Return (n, 2) the places in a camera's frame that have readings (n, 2); NaN where there are none.
+    """Return (n, 2) positions in the camera frame of readings (n, 2); NaN if undefined.
 
-    `numbers` and `vectors` as of :func:`film_readings`.
+    `numbers` and `vectors` as in :func:`film_readings`.
     """
 
 def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
-    """Return the models of cameras, `CAMERAS`, by their names.
+    """Return the properties of the camera models, `CAMERAS`, by name.
 
     Returns
     -------
-    Of each its formula, its parameters with the power of the unit of the image in which they are measured (0
-    for plain numbers), how many of these, the last ones, are constants that are never unknown, and its
-    direction: `forward`, lens terms are functions of ideal coordinates, or `backward`, of measured ones.
+    For each model: its formula, its parameters with the power of the image unit (0 for dimensionless
+    numbers), the number of constants, which are the last parameters and always fixed, and its direction. Lens
+    terms are functions of ideal coordinates (`forward`) or of measured ones (`backward`).
     """
 
 def camera_images(model: str, parameters: _Floats, u: _Floats, knots: _Floats | None = None) -> _Floats:
-    """Images of directions.
+    """Project directions into the image.
 
     Parameters
     ----------
@@ -255,97 +254,98 @@ def camera_images(model: str, parameters: _Floats, u: _Floats, knots: _Floats | 
     u
         (n, 3) in the axes of the photo: x right, y up, z back towards the viewer; the camera looks along -z.
     knots
-        Of a splined model: dx, dy of each, row by row, of any shape; None for zeros.
+        For a splined model: dx, dy of each knot, row by row, in any shape; None for zeros.
 
     Returns
     -------
-    (n, 2) in the unit of the camera; not finite where there are none.
+    (n, 2) in the unit of the camera; not finite if undefined.
 
     Raises
     ------
     ValueError
-        A model that there is not, other shapes or numbers of parameters.
+        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_rays(model: str, parameters: _Floats, xy: _Floats, knots: _Floats | None = None) -> _Floats:
-    """Directions of image positions; arguments as in :func:`camera_images`.
+    """Compute the directions of image positions; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, 3) unit vectors in the axes of the photo, in front of it; NaN where no direction has the image.
+    (n, 3) unit vectors in the axes of the photo, in front of it; NaN if no direction has the image.
 
     Raises
     ------
     ValueError
-        A model that there is not, other shapes or numbers of parameters.
+        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
-    """Corrected image positions of a backward camera; arguments as in :func:`camera_images`.
+    """Correct image positions by a backward camera; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, 2) g, compared with c (u1, u2) / u3.
+    (n, 2) g, to compare with c (u1, u2) / u3.
 
     Raises
     ------
     ValueError
-        A model that there is not or that is forward, other shapes or numbers of parameters.
+        If the model does not exist or is forward, or a shape or number of parameters is wrong.
     """
 
 def camera_partials(
     model: str, parameters: _Floats, u: _Floats, knots: _Floats | None = None
 ) -> tuple[_Floats, _Floats, _Floats]:
-    """Images of directions with their partials; arguments as in :func:`camera_images`.
+    """Project directions with partial derivatives; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, 2) images, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for those that are constants
-    of a lens; not finite where there are none. Those of a backward camera are the ones of the measured
-    position that corresponds to u.
+    (n, 2) images, (n, 2, 3) partial derivatives by u, (n, 2, k) by the parameters, 0 for constants of a lens;
+    not finite if undefined. For a backward camera, derivatives refer to the measured position that
+    corresponds to u.
 
     Raises
     ------
     ValueError
-        A model that there is not, other shapes or numbers of parameters.
+        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_patches(model: str, parameters: _Floats, u: _Floats) -> tuple[_Indices, _Floats]:
-    """Knots that images depend on; arguments as in :func:`camera_images`.
+    """Return the knots that affect images; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, s) numbers of knots, row by row, and (n, s) their weights, s = 16 of order 3, 9 of order 2: partials
-    of the image by a knot are diag(fx, fy) times its weight.
+    (n, s) numbers of knots, row by row, and (n, s) weights; s = 16 for order 3, 9 for order 2. The derivative
+    of an image by a knot is diag(fx, fy) times its weight.
 
     Raises
     ------
     ValueError
-        A model without knots, constants that are none of a spline, other shapes or numbers of parameters.
+        If the model does not support knots, constants of the spline are invalid, or a shape or number of
+        parameters is wrong.
     """
 
 def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
-    """Return the radius up to which the radial part of a lens is one-to-one, and what it becomes.
+    """Return the radius up to which a lens is radially one-to-one, and its image there.
 
-    Of a forward camera the radius is the tangent of the angle from the axis, of a fisheye the angle (rad),
-    and becomes what the focal length multiplies; `brown_forward` has lengths in the image. Of a backward
-    camera it is that of the measured position from the principal point, which becomes that of the corrected
-    one. Infinite where only the image ends.
+    For a forward camera, the radius is the tangent of the angle from the axis, for a fisheye the angle (rad).
+    It is mapped to the value that is multiplied by the focal length; `brown_forward` has lengths in the
+    image. For a backward camera, both are distances from the principal point: of the measured and of the
+    corrected position. Infinite if only the image ends.
 
     Returns
     -------
-    None where the lens is one-to-one everywhere.
+    None if the lens is one-to-one everywhere.
 
     Raises
     ------
     ValueError
-        A model that there is not, or another number of parameters.
+        If the model does not exist, or the number of parameters is wrong.
     """
 
 def attitudes_from_numbers(
     representation: str, numbers: _Floats, boresight: _Floats
 ) -> tuple[_Floats, _Floats]:
-    """Attitudes from numbers (`docs/conventions.md`).
+    """Convert numbers to attitudes (`docs/conventions.md`).
 
     Parameters
     ----------
@@ -354,55 +354,55 @@ def attitudes_from_numbers(
         "yaw_pitch_roll", "rotation_vector", "rotation_vector_to_photo", "rotation_vector_to_vision",
         "quaternion" or "quaternion_to_vision".
     numbers
-        (n, 3), angles in radians; of quaternions (n, 4), w, x, y, z of any length but zero.
+        (n, 3), angles in radians; quaternions (n, 4), w, x, y, z of any length except zero.
     boresight
-        (3, 3), photo axes from body axes; of yaw, pitch, roll.
+        (3, 3), photo axes from body axes; for yaw, pitch, roll.
 
     Returns
     -------
-    (n, 3, 3) matrices A, photo to object; and K, (n, 3, k), the partials of the rotation step rho by the
-    numbers: A steps by Exp(rho), about the photo's own axes.
+    (n, 3, 3) matrices A, photo to object; and K, (n, 3, k), the partial derivatives of the rotation step rho
+    by the numbers. A step multiplies A by Exp(rho), about the photo's own axes.
 
     Raises
     ------
     ValueError
-        An argument of another shape, or another representation; the message names it.
+        If a shape or the representation is wrong; the message names the argument.
     """
 
 def numbers_of_attitudes(
     representation: str, attitudes: _Floats, boresight: _Floats
 ) -> tuple[_Floats, _Floats]:
-    """Numbers of attitudes, the inverse of `attitudes_from_numbers`.
+    """Convert attitudes to numbers, the inverse of `attitudes_from_numbers`.
 
     Parameters
     ----------
     representation, boresight
-        As there.
+        As in `attitudes_from_numbers`.
     attitudes
         (n, 3, 3) matrices A, photo to object.
 
     Returns
     -------
-    (n, k) numbers, and their partials by the rotation step, (n, k, 3); NaN where two angles turn about one
-    axis: one of them is zero then.
+    (n, k) numbers, and their partial derivatives by the rotation step, (n, k, 3). If two rotation axes
+    coincide, derivatives are NaN and one of the angles is zero.
 
     Raises
     ------
     ValueError
-        An argument of another shape, or another representation; the message names it.
+        If a shape or the representation is wrong; the message names the argument.
     """
 
 def nadir_boresight(quarters: int) -> _Floats:
-    """Photo axes from body axes, (3, 3), of a camera that looks at the nadir.
+    """Return photo axes from body axes, (3, 3), of a nadir camera.
 
     Parameters
     ----------
     quarters
-        Of a turn that the top of the picture is turned by from forward to the right wing: 0 to 3.
+        Direction of the top of the image, in quarter circles from forward to the right wing: 0 to 3.
     """
 
 def rotation_matrix(angles: _Floats) -> _Floats:
-    """Rotation matrices M = M_kappa M_phi M_omega.
+    """Compute rotation matrices M = M_kappa M_phi M_omega.
 
     Parameters
     ----------
@@ -416,11 +416,11 @@ def rotation_matrix(angles: _Floats) -> _Floats:
     Raises
     ------
     ValueError
-        An argument of another shape; the message names it and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def rotation_angles(matrices: _Floats) -> _Floats:
-    """Angles omega, phi, kappa of rotation matrices, the inverse of `rotation_matrix`.
+    """Compute omega, phi, kappa of rotation matrices, the inverse of `rotation_matrix`.
 
     Parameters
     ----------
@@ -429,17 +429,17 @@ def rotation_angles(matrices: _Floats) -> _Floats:
 
     Returns
     -------
-    (n, 3) omega and kappa in [-pi, pi], phi in [-pi/2, pi/2], radians. Where phi is +-pi/2 only omega + kappa
-    or omega - kappa is determined; the angles returned give the matrix.
+    (n, 3) omega and kappa in [-pi, pi], phi in [-pi/2, pi/2], radians. If phi is +-pi/2, only omega + kappa
+    or omega - kappa is determined; the returned angles reproduce the matrix.
 
     Raises
     ------
     ValueError
-        An argument of another shape; the message names it and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def vector_rotations(vectors: _Floats) -> _Floats:
-    """Rotation matrices of (n, 3) rotation vectors: axis times angle, radians (Rodrigues).
+    """Convert (n, 3) rotation vectors to matrices: axis times angle, radians (Rodrigues).
 
     Returns
     -------
@@ -448,11 +448,11 @@ def vector_rotations(vectors: _Floats) -> _Floats:
     Raises
     ------
     ValueError
-        An argument of another shape; the message names it and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def rotation_vectors(matrices: _Floats) -> _Floats:
-    """Rotation vectors of (n, 3, 3) rotation matrices, the inverse of `vector_rotations`.
+    """Convert (n, 3, 3) rotation matrices to vectors, the inverse of `vector_rotations`.
 
     Returns
     -------
@@ -461,11 +461,11 @@ def rotation_vectors(matrices: _Floats) -> _Floats:
     Raises
     ------
     ValueError
-        An argument of another shape; the message names it and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
-    """Geocentric X, Y, Z of geographic positions.
+    """Convert geographic positions to geocentric X, Y, Z.
 
     Parameters
     ----------
@@ -482,11 +482,11 @@ def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
     Raises
     ------
     ValueError
-        An argument of another shape (the message names it and its shape) or axes that make no spheroid.
+        If a shape is wrong (the message names the argument) or the axes are invalid.
     """
 
 def geocentric_to_geographic(xyz: _Floats, a: float, b: float) -> _Floats:
-    """Geographic positions of geocentric X, Y, Z, the inverse of `geographic_to_geocentric`.
+    """Convert geocentric X, Y, Z to geographic positions.
 
     Parameters
     ----------
@@ -497,13 +497,13 @@ def geocentric_to_geographic(xyz: _Floats, a: float, b: float) -> _Floats:
 
     Returns
     -------
-    (n, 3) longitude (rad, in [-pi, pi], 0 on the axis), latitude (rad), height (linear unit of the axes), to
-    the rounding of the coordinates.
+    (n, 3) longitude (rad, in [-pi, pi], 0 on the axis), latitude (rad), height (linear unit of the axes),
+    accurate to the rounding of the coordinates.
 
     Raises
     ------
     ValueError
-        An argument of another shape (the message names it and its shape) or axes that make no spheroid.
+        If a shape is wrong (the message names the argument) or the axes are invalid.
     """
 
 def project(
@@ -516,18 +516,18 @@ def project(
     photo_to_ground: bool,
     refraction: RefractionRow | None,
 ) -> _Floats:
-    """Image coordinates of points, row by row: point i on the photo of row i.
+    """Project points into photos row by row: point i into photo i.
 
-    x = c u1/u3, y = c u2/u3 with u = M d (ground-to-photo) or M^T d (photo-to-ground); d is the vector from
-    the projection centre to the point: in object space axes when rectangular, in the local vertical frame of
-    the station (east, north, up) when geographic.
+    x = c u1/u3, y = c u2/u3 with u = M d (ground-to-photo) or M^T d (photo-to-ground). d is the vector from
+    the projection centre to the point: in object space axes if rectangular, in the local vertical frame of
+    the station (east, north, up) if geographic.
 
     Parameters
     ----------
     points
         (n, 3) X, Y, Z, or longitude (rad), latitude (rad), height.
     positions
-        (n, 3) projection centres, likewise.
+        (n, 3) projection centres, in the same system.
     attitudes
         (n, 3) omega, phi, kappa in radians.
     principal_distances
@@ -535,9 +535,9 @@ def project(
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
-        The sense of the angles.
+        Direction of the angles.
     refraction
-        What bends the rays; None for straight ones.
+        Refraction model; None for straight rays.
 
     Returns
     -------
@@ -546,8 +546,7 @@ def project(
     Raises
     ------
     ValueError
-        An argument of another shape or length (the message names it and its shape), axes that make no
-        spheroid, or refraction that cannot be.
+        If a shape or length is wrong (the message names the argument), or axes or refraction are invalid.
     """
 
 def refraction_shift(
@@ -557,7 +556,7 @@ def refraction_shift(
     spheroid: tuple[float, float] | None,
     refraction: RefractionRow,
 ) -> _Floats:
-    """From points to where cameras see them, row by row.
+    """Compute the refraction displacement of points as seen by cameras, row by row.
 
     Parameters
     ----------
@@ -566,7 +565,7 @@ def refraction_shift(
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     refraction
-        What bends the rays.
+        Refraction model.
 
     Returns
     -------
@@ -575,19 +574,18 @@ def refraction_shift(
     Raises
     ------
     ValueError
-        An argument of another shape or length (the message names it and its shape), axes that make no
-        spheroid, or refraction that cannot be.
+        If a shape or length is wrong (the message names the argument), or axes or refraction are invalid.
     """
 
 class BlockError(Exception):
-    """A block that cannot be adjusted.
+    """Block that cannot be adjusted.
 
-    `args` is (kind, message, combinations, points, seconds): kind is `undetermined points`, `undetermined
-    photos`, `no intersection`, `coarse` (too large for double precision), `outside` (a time that a trajectory
-    does not reach), `not finite`, `memory`, `empty` or `input`; combinations are what undetermined
-    combinations of unknowns move (of `coarse` and `outside`, the photos concerned, in one), points a list of
-    point indices: of `outside` the point of the image that is, none where it is the photo itself. Seconds
-    are, of `outside`, the time and the first and the last that the trajectory reaches, counted as its own.
+    `args` is (kind, message, combinations, points, seconds). kind is `undetermined points`, `undetermined
+    photos`, `no intersection`, `coarse` (too large for double precision), `outside` (a time beyond the reach
+    of a trajectory), `not finite`, `memory`, `empty` or `input`. combinations are undetermined combinations
+    of unknowns; for `coarse` and `outside`, the photos concerned, in one. points is a list of point indices;
+    for `outside` the point of the image, empty for the photo itself. seconds, for `outside`: the time and the
+    reach of the trajectory, relative to its origin.
     """
 
 def find_first_values(
@@ -604,64 +602,64 @@ def find_first_values(
     *,
     threads: int,
 ) -> FoundRow:
-    """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
+    """Compute poses of photos from known data, in cartesian object space (`docs/first-values.md`).
 
     Parameters
     ----------
     photo_positions, photo_attitudes
-        (P, 3) and (P, 3, 3), photo to object: given poses; NaN where none is.
+        (P, 3) and (P, 3, 3), photo to object: given poses; NaN if unknown.
     observed_positions, observed_attitudes
-        The same as observed; NaN where they were not.
+        (P, 3) and (P, 3, 3) observed poses; NaN if not observed.
     point_positions, point_sd
-        (n, 3) control in the linear unit, and its standard deviations; infinite where it is not held.
+        (n, 3) control in the linear unit, and its standard deviations; infinite for free coordinates.
     image_photos, image_points
         (m,) indices into photos and points.
     directions, direction_sd
-        (m, 3) unit directions in the axes of the photos, not finite where there is none, and (m,) their
-        standard deviations in radians.
+        (m, 3) unit directions in the axes of the photos, not finite if undefined, and (m,) their standard
+        deviations in radians.
     threads
-        As for `block_network`.
+        As in `block_network`.
 
     Returns
     -------
-    (P, 3) positions and (P, 3, 3) attitudes, NaN where none was found; for each photo (`given`, `resected`,
-    `observed` or `oriented`, 0, 0), or why it has none: (`points`, known points, 0), (`misfit`, known points,
-    0) or (`apart`, what its model has in common, photos of the model); (n, 3) positions of points; (m,)
-    whether an image was set aside; (n,) whether the images of a control point agree with each other but not
-    with its coordinates; the photo that is the datum, if nothing else is; the median of the angles
-    between observed and computed directions, radians.
+    (P, 3) positions and (P, 3, 3) attitudes, NaN if not found. For each photo (`given`, `resected`,
+    `observed` or `oriented`, 0, 0), or the reason: (`points`, known points, 0), (`misfit`, known points, 0)
+    or (`apart`, objects that its model shares with known data, photos of the model). (n, 3) positions of
+    points. (m,) whether an image was rejected. (n,) whether the images of a control point agree with each
+    other but not with its coordinates. The photo that defines the datum, if nothing else does. The median
+    angle between observed and computed directions, radians.
 
     Raises
     ------
     ValueError
-        An argument of another shape or length, an index out of range; the message names it.
+        If a shape, length or index is wrong; the message names the argument.
     """
 
 def trajectory_span(trajectory: TrajectoryRow) -> tuple[float, float]:
-    """Return the first and the last time that a trajectory may be asked for, counted as its own."""
+    """Return the first and the last defined time of a trajectory, relative to its origin."""
 
 def flown(trajectory: TrajectoryRow, position: _Floats, rotation: _Floats, times: list[float]) -> FlownRow:
-    """Return a trajectory at n times (docs/moving.md).
+    """Evaluate a trajectory at n times (docs/moving.md).
 
     Parameters
     ----------
     trajectory
-        As of :func:`block_network`; which unknowns its coefficients are does not matter.
+        As in :func:`block_network`; indices of coefficients are ignored.
     position, rotation
         (K, 3) coefficients of positions, and of rotations in radians.
     times
-        Seconds, counted as those of the trajectory.
+        Seconds, relative to the origin of the trajectory.
 
     Returns
     -------
-    (n, 3) positions; (n, 9) attitudes, axes of the coefficients of positions, and right Jacobians of the
-    corrections r, row by row; for each time the number of the first function of positions that is not zero
-    and the values from there on, and the same of rotations.
+    (n, 3) positions; (n, 9) attitudes, axes of the position coefficients, and right Jacobians of the
+    corrections r, row by row. For each time, the index of the first nonzero basis function of positions and
+    the values from there on; the same for rotations.
 
     Raises
     ------
     InputError
-        Times that do not increase, more or fewer coefficients than functions.
+        If times do not increase, or the number of coefficients is wrong.
     """
 
 def block_network(
@@ -702,111 +700,111 @@ def block_network(
     memory: int | None,
     points_given: bool,
 ) -> BlockNetwork:
-    """Return a block as it is adjusted by least squares (GIANT guide, sections 4 to 9).
+    """Create a block for adjustment by least squares (GIANT guide, sections 4 to 9).
 
     Standard deviations are infinite for free unknowns, zero for fixed ones. Positions are X, Y, Z, or
-    longitude (rad), latitude (rad), height when a spheroid is given.
+    longitude (rad), latitude (rad), height if a spheroid is given.
 
     Parameters
     ----------
     photo_positions, photo_attitudes
-        (P, 3) initial values, at which fixed components stay; omega, phi, kappa in radians.
+        (P, 3) initial values, which fixed components retain; omega, phi, kappa in radians.
     photo_positions_observed, photo_attitudes_observed
-        (P, 3) observed values where weighted; angles may differ from initial ones by whole turns.
+        (P, 3) observed values of weighted components; angles may differ from initial ones by full circles.
     photo_position_sd, photo_attitude_sd
         (P, 3) standard deviations of the observed values.
     photo_cameras
-        (P,) indices into the cameras; photos with the same one share its unknowns.
+        (P,) camera indices; photos of one camera share its unknowns.
     cameras
-        Model, parameters in its order and their standard deviations, covariance matrix of those that are
-        weighted row by row, None where these were observed one by one; knots, None where there are none.
+        Model, parameters in the order of the model and their standard deviations; covariance matrix of the
+        weighted parameters row by row, None if uncorrelated; knots, None if absent.
     point_positions, point_sd
-        (n, 3) coordinates, NaN where unknown, and standard deviations, finite for held components.
+        (n, 3) coordinates, NaN if unknown, and standard deviations, finite for control.
     image_photos, image_points
         (m,) indices.
     image_xy, image_sd
         (m, 2) millimetres.
     observation_groups
-        Observations beside images, each kind with its name, (k, p) indices of points, (k, q) of photos and
-        (k, c) of common unknowns (-1 for none), (k, v) values and (k, r, r) covariance matrices of its r
-        components. Values: `distance` the length (unknown: instrument), `equal height` the difference,
-        `difference` three components (NaN where not observed), `control` three coordinates, `on level` the
-        height above it, `on plane` the distance from it, `on plumb line` and `on line` none, `position` three
-        coordinates, the lever arm where it is known and the time (unknowns: lever arm, shift, drift),
-        `attitude` two matrices row by row (body to object; body to photo where that is known; unknown:
-        boresight), `relative` a translation and a matrix, `base` the length (two sensors, -1 for the frame),
-        `prior` none, `velocity` three components and
-        the lever arm where it is known (unknown: lever arm), `rate` three components and the matrix body to
-        photo where that is known (unknowns: boresight, bias), `smoothness` three components and a factor for
-        each coefficient. Lengths in the unit of the object space, angles in radians, times in seconds.
+        Additional observations, by type: name, (k, p) indices of points, (k, q) of photos and (k, c) of
+        shared unknowns (-1 for none), (k, v) values and (k, r, r) covariance matrices of the r components.
+        Lengths are in the unit of the object space, angles in radians, times in seconds. Values:
+
+        `distance`: length (unknown: instrument); `equal height`: difference; `difference`: three components
+        (NaN if not observed); `control`: three coordinates; `on level`: height above it; `on plane`: distance
+        from it; `on plumb line` and `on line`: none; `position`: three coordinates, the known lever arm and
+        the time (unknowns: lever arm, shift, drift); `attitude`: two matrices row by row, body to object and
+        known body to photo (unknown: boresight); `relative`: translation and matrix; `base`: length (two
+        sensors, -1 for the frame); `prior`: none; `velocity`: three components and the known lever arm
+        (unknown: lever arm); `rate`: three components and the known matrix body to photo (unknowns:
+        boresight, bias); `smoothness`: three components and a factor for each coefficient.
     unknowns
-        Common unknowns: type (see `UNKNOWNS`), position, rotation matrix row by row, standard deviations.
+        Shared unknowns: type (see `UNKNOWNS`), position, rotation matrix row by row, standard deviations.
     mounts
-        Photos on frames: index of the photo, of the photo that stands for the frame, and of the sensor among
-        the common unknowns.
+        Photos on frames: index of the photo, index of the representing photo of the frame, and index of the
+        sensor among the shared unknowns.
     trajectories
-        What is known of each beforehand, what its corrections are made of, and the indices of their
-        coefficients among the common unknowns.
+        Prior table of each, basis of its corrections, and indices of its coefficients among the shared
+        unknowns.
     timed
-        Photos on trajectories: indices of photo and trajectory, the time of the photo there in seconds, and
-        the indices of the rate and of the offset of its times among the common unknowns.
+        Photos on trajectories: indices of photo and trajectory, time of the photo in seconds, and indices of
+        the rate and the offset of its times among the shared unknowns.
     image_times
-        (m,) the number of each image that the rate is multiplied by; empty where all are 0.
+        (m,) factor of the rate in the time of each image; empty if all are 0.
     passages
-        What images pass beside pose, point and camera: kind, indices of common unknowns, indices of points,
-        photos or cameras, and numbers. `figure`: points beside what is given by w_1 e_1 + w_2 e_2; w a
-        `bend`, the numbers (e_1, e_2) of each point.
+        Image transformations in addition to pose, point and camera: type, indices of shared unknowns, indices
+        of points, photos or cameras, and numbers. `figure`: points displaced by w_1 e_1 + w_2 e_2; w is a
+        `bend`, the numbers are (e_1, e_2) of each point.
     records
-        How many photos, the last, are records of trajectories: they have no images, and the last camera.
+        Number of photos at the end that are records of trajectories: without images, with the last camera.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
-        The sense of the angles.
+        Direction of the angles.
     refraction
-        What bends the rays, applied in every iteration; None for image coordinates that are free of it.
+        Refraction model, applied in every iteration; None for image coordinates without refraction.
     criterion, limit
-        `fraction`: no unknown changes by more than `limit` of its standard deviation; `percent`: the sum of
+        `fraction`: no unknown changes by more than `limit` of its standard deviation. `percent`: the sum of
         squares changes by less than `limit` percent.
     max_iterations
-        Iterations at the most.
+        Maximum number of iterations.
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
     loss
-        Robust loss of the image points, `huber` or `cauchy`, and its scale in standard deviations a priori.
+        Robust loss of the image points, `huber` or `cauchy`, and its scale in a-priori standard deviations.
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E), or `redundancy`.
     minimum
-        Photo whose pose is held where nothing else gives a datum, and for the scale a photo and the number of
-        its coordinate; None leaves either to the core.
+        Photo whose pose is fixed if nothing else defines a datum, and for the scale a photo and the index of
+        its coordinate. None: selected by the core.
     memory
-        Bytes that the adjustment, or covariances that are asked for, may take; None for any number.
+        Maximum bytes of the adjustment and of later covariances; None: unlimited.
     points_given
-        Whether points start from their coordinates where these are known, not where their rays meet.
+        Whether points start from their coordinates, if known, instead of the intersection of their rays.
 
     Raises
     ------
     ValueError
-        An argument of another shape, length or choice; the message names it.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class BlockNetwork:
-    """A block with the options of its adjustment.
+    """Block with the options of its adjustment.
 
-    A datum is (`inner`, points, photos, whether scale counts) for inner constraints, (`relative`, [],
-    [photo], False) or (`relative`, points, [], False) for cofactors relative to these. Of all methods:
+    A datum is (`inner`, points, photos, use of scale) for inner constraints, or (`relative`, [], [photo],
+    False) or (`relative`, points, [], False) for relative cofactors. Arguments of all methods:
 
     threads
-        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
-        the calling thread, larger work has all processors.
+        Number of threads, at most four per processor. 0: small work uses the calling thread, larger work all
+        processors.
     progress
-        Called on the calling thread as (phase, points done, points in all, None), or ("iteration", number, 0,
-        row). What it raises stops the work and is passed on. Signals are looked after at the same time,
-        so that Ctrl-C stops it too.
+        Called on the calling thread as (phase, points done, all points, None), or ("iteration", number, 0,
+        row). An exception that it raises stops the work. Signals are checked at the same time, so that Ctrl-C
+        also stops it.
 
-    They raise BlockError for a block that cannot be adjusted, or taken to a datum.
+    Methods raise BlockError for a block that cannot be adjusted or transformed to a datum.
     """
 
     def adjust(
@@ -818,12 +816,12 @@ class BlockNetwork:
         start: BlockState | None = None,
         keep: Sequence[int] | None = None,
     ) -> BlockSolution:
-        """Adjust it; a free one may be taken to the datum of inner constraints.
+        """Adjust the block; a free block may be transformed to inner constraints.
 
-        Or, without such a datum, adjust it from where an adjustment of it has ended, perhaps with other
-        weights: in the order of that, and without the points that had run into a station there.
-        Without either, `keep` has the state keep what tests need (see :meth:`trial`), and the cofactors of
-        these points with each other (:meth:`BlockState.joint`).
+        Without such a datum, the adjustment may continue from a former `start`, also with other weights: in
+        the same order, and without points that converged to a station there. Without both, `keep` stores data
+        for tests in the state (see :meth:`trial`), and the joint cofactors of these points
+        (:meth:`BlockState.joint`).
         """
 
     def in_datum(
@@ -834,7 +832,7 @@ class BlockNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> BlockSolution:
-        """Take an adjusted block to another datum: values, cofactors, redundancy numbers; no iterations."""
+        """Transform an adjusted block to another datum, without iterations."""
 
     def covariances(
         self,
@@ -843,30 +841,30 @@ class BlockNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> BlockCovariances:
-        """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
+        """Factor the normal equations at the adjusted state, in its datum."""
 
     def trial(self, state: BlockState | None, *, threads: int, kept: bool = False) -> NetworkTrial:
-        """Prepare for trials without some observations, from where an adjustment ended, or from the start.
+        """Prepare trials without some observations, from an adjusted state or from the start.
 
-        `kept` says that the state is of this very network: the first time, what its adjustment has kept
-        is taken, and nothing is formed again.
+        `kept` states that the state is of this network. The first trial then uses the data that its
+        adjustment stored, without a new formation.
         """
 
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
-        """Return what keeps the block from moving as a whole: kinds of observations.
+        """Return the observation types that prevent a similarity transformation of the block.
 
-        With each the greatest share of what a motion changes in them that remains when all unknowns move.
+        Each has the greatest part of its change by a transformation that remains if all unknowns change.
         """
 
     def held_for_datum(self, *, threads: int) -> list[tuple[int, int]]:
-        """Return what an adjustment holds where nothing gives a datum; nothing where there is one.
+        """Return unknowns that an adjustment fixes to define the datum; empty if not needed.
 
-        Photos, each with the number (0 to 5) of one of its unknowns.
+        Photos, each with the index (0 to 5) of one of its unknowns.
 
         Raises
         ------
         BlockError
-            As :meth:`adjust`, before its first iteration.
+            As in :meth:`adjust`, before its first iteration.
         """
 
     def parts_in_datum(
@@ -879,42 +877,42 @@ class BlockNetwork:
         values: _Floats,
         threads: int,
     ) -> tuple[_Floats, _Floats, _Floats, float, bool]:
-        """Move a block that was adjusted in parts to the datum of inner constraints (docs/distributed.md).
+        """Transform a partitioned block to inner constraints (docs/distributed.md).
 
         Parameters
         ----------
         datum
             Inner constraints.
         held
-            What :meth:`held_for_datum` gives.
+            Result of :meth:`held_for_datum`.
         middle
-            As all nodes were given it.
+            Origin, as for all nodes.
         names
-            (3 N,) all unknowns of the block, those of several nodes perhaps several times: the rows of
-            :attr:`Node.unknown_names`, but with indices into this block.
+            (3 N,) all unknowns of the block, possibly repeated: the rows of :attr:`Node.unknown_names`, with
+            indices into this block.
         values
-            (N,) where they have been adjusted to.
+            (N,) adjusted values.
         threads
             As in :meth:`adjust`.
 
         Returns
         -------
         values
-            (N,) in the datum.
+            (N,) values in the datum.
         b, t
-            (d N,) the columns B, zero but for what carries the datum, and T = G (B^T G)^-1, one after the
-            other.
+            (d N,) columns B, nonzero only for unknowns that define the datum, and T = G (B^T G)^-1,
+            concatenated.
         condition
-            Of B^T G, its columns scaled.
+            Condition number of B^T G with scaled columns.
         exact
-            Whether there are no more carriers than columns, so that these do not move.
+            Whether the datum is defined by as many unknowns as columns, so that these do not change.
 
         Raises
         ------
         BlockError
-            As of :meth:`adjust` with a datum.
+            As in :meth:`adjust` with a datum.
         BlockInputError
-            Names that are not those of all unknowns.
+            If the names are not the names of all unknowns.
         """
 
     def node(
@@ -926,45 +924,42 @@ class BlockNetwork:
         threads: int,
         held: list[tuple[int, int]] = ...,
     ) -> Node:
-        """Take the block as a node of the elimination tree of a larger one (Helmert blocking).
+        """Create a node of the elimination tree of a larger block (Helmert blocking).
 
-        Blocks of unknowns are named by what they belong to, (`photo`, `camera`, `unknown` or `point`, index
-        into the arrays of this block). A camera has one where several photos of the larger block share it and
-        a parameter of it is unknown, a point where an observation beside images touches it; cameras that are
-        known, and points that only images touch, are never named.
+        Blocks of unknowns are named by their owners, (`photo`, `camera`, `unknown` or `point`, index into the
+        arrays of this block). A camera has a block if it has a free or weighted parameter and several photos
+        of the larger block. A point has one if an additional observation touches it. Fixed cameras, and other
+        points, are never named.
 
         Parameters
         ----------
         outer
-            The blocks that are eliminated above this node, in an order that the node above knows: photos that
-            other parts see too, shared cameras. What was observed of their unknowns themselves belongs to the
-            node where they are eliminated, and is left out here; what is fixed stays fixed. Empty for the
-            root.
+            Blocks that are eliminated above this node, in an order known to the node above: photos of several
+            parts, shared cameras. Observations of their unknowns alone belong to the node of their
+            elimination, and are excluded here; fixed unknowns remain fixed. Empty for the root.
         children
-            For each child, in a fixed order, the blocks that its contribution is over, in the order of its
-            `outer`; all are photos, cameras, unknowns or points of this block, outer ones or not.
+            For each child, in a fixed order, the blocks of its contribution in the order of its `outer`; all
+            are photos, cameras, unknowns or points of this block, outer ones or not.
         middle
-            (3,) median of the positions of all photos of the larger block, component by component:
-            coordinates
-            are counted from it (rounded) in rectangular space, and it says what is up for shifts in
-            geographic
-            space. Every node must be given the same. None: of the photos of this block.
+            (3,) component-wise median of the positions of all photos of the larger block. It is the (rounded)
+            origin of coordinates in rectangular space, and defines the vertical for shifts in geographic
+            space. It must be the same for all nodes. None: of the photos of this block.
         threads
             As in :meth:`adjust`.
         held
-            What :meth:`held_for_datum` of the larger block gives, of the photos of this one, which are
-            outer ones or not.
+            Result of :meth:`held_for_datum` of the larger block, for the photos of this one, outer ones or
+            not.
 
         Raises
         ------
         InputError
-            A name that is not of the block, or is there twice; a loss.
+            If a name is not in the block or repeated, or a loss is specified.
         BlockError
-            As :meth:`adjust`, before its first iteration.
+            As in :meth:`adjust`, before its first iteration.
         """
 
 def give_back() -> None:
-    """Have the allocator give back to the system what was freed; nothing but with the C library of GNU."""
+    """Return freed memory to the system; no effect without the GNU C library."""
 
 def judge_full_step(
     taken: Sequence[tuple[float, float]],
@@ -974,41 +969,40 @@ def judge_full_step(
     unknowns: int,
     tolerance: float,
 ) -> str:
-    """Return what a full step is, by the rules of one process; see `adjustment/options.rs`.
+    """Classify a full step by the rules for one process; see `adjustment/options.rs`.
 
     Parameters
     ----------
     taken
-        Damping and largest change of each step so far.
+        Damping and largest change of each former step.
     change
-        No unknown changes by more than this multiple of its standard deviation.
+        Largest change of any unknown, in standard deviations.
     chord
-        The length of the chord that followed the last step, where one did.
+        Length of the chord after the last step, if any.
     unknowns, tolerance
-        How many unknowns there are; when to stop.
+        Number of unknowns; convergence limit.
 
     Returns
     -------
-    `last`: no further one is needed; `rests`: it is rounding, as those before; `before a chord`: a chord
-    after it pays; `one of many`.
+    `last`: no further step is needed; `rests`: rounding only, as before; `before a chord`: a chord should
+    follow; `one of many`.
     """
 
 def is_chord(chord: float, change: float) -> bool:
-    """Return whether a chord so long is taken after a full step that has changed the unknowns so much."""
+    """Return whether to take a chord of this length after a full step with this change."""
 
 def step_rules() -> dict[str, float]:
-    """Return the constants of the rules of steps of one process, by name; see `adjustment/damped.rs`."""
+    """Return the constants of the step rules for one process, by name; see `adjustment/damped.rs`."""
 
 @final
 class Node:
-    """A node of the elimination tree of a block that is adjusted in parts (Helmert 1880; Wolf 1978).
+    """Node of the elimination tree of a partitioned block (Helmert 1880; Wolf 1978).
 
-    It holds a part of the observations, the photos that they touch, and the order in which the blocks at home
-    here are eliminated, found once; no values. A *state* is a vector of all its unknowns: three of each point
-    that only images touch, then those of photos, shared cameras, common unknowns and other points, blocks
-    here and outer ones, positions counted from the middle; so is a *step*. All methods are functions of their
-    arguments, the same bits for any number of threads; `threads` and `progress` are as in
-    :class:`BlockNetwork`.
+    It contains a part of the observations, the photos that they touch, and the elimination order of its own
+    blocks, but no values. A *state* is a vector of all its unknowns: three of each point with images only,
+    then of photos, shared cameras, shared unknowns and other points, own blocks and outer ones. Positions are
+    relative to the origin. A *step* has the same layout. Results are identical to the last bit for any number
+    of threads. `threads` and `progress` are as in :class:`BlockNetwork`.
     """
 
     @property
@@ -1017,63 +1011,62 @@ class Node:
 
     @property
     def outer(self) -> _Indices:
-        """(S,) where the unknowns of the outer blocks stand in a state, block by block in their order."""
+        """(S,) indices of the outer unknowns in a state, block by block in their order."""
 
     @property
     def children(self) -> list[_Indices]:
-        """For each child (S_c,) where the unknowns that it is over stand in a state, in its own order."""
+        """For each child (S_c,) indices of the unknowns of its contribution in a state, in its order."""
 
     @property
     def unknown_names(self) -> _Indices:
-        """(N, 3) what each unknown of a state belongs to, its index, and the number of the unknown there.
+        """(N, 3) type of the owner of each unknown, index of the owner, and index of the unknown.
 
-        0: a photo, 1: a camera that photos share, 2: a common unknown, 3: a point.
+        Types: 0 photo, 1 shared camera, 2 shared unknown, 3 point.
         """
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Observations, weighted unknowns, unknowns that are not fixed; outer ones are not counted."""
+        """Observations, weighted unknowns, unknowns that are not fixed; without outer unknowns."""
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
-        """Points left out, each with the reason."""
+        """Excluded points, with reasons."""
 
     @property
     def initial(self) -> _Floats:
-        """(N,) the state to begin with: photos as given, points where the rays of their photos here meet.
+        """(N,) initial state: given photos, points at the intersection of their rays here.
 
-        The outer part of it must be set to what the node above has, where points are among the outer blocks.
+        If there are outer points, set the outer part to the values of the node above.
         """
 
     @property
     def ends_slowly(self) -> bool:
-        """Whether photos share cameras that are unknown: a chord pays near the end (docs/adjustment.md)."""
+        """Whether photos share free or weighted cameras, so that a final chord helps (docs/adjustment.md)."""
 
     @property
     def prediction(self) -> dict[str, float]:
-        """What work and memory it takes, from the pattern alone.
+        """Predicted work and memory, from the sparsity pattern.
 
-        `points`, `interior`, `outer`: unknowns of points, of blocks eliminated here, of outer ones (S);
-        `images`, `observations`: image points, equations in all; `reduction`, `factor`, `inverse`:
-        multiply-adds of one formation, one factorisation, one inversion; `node_bytes`: of the node by itself;
-        `factor_bytes`: of a formed node beside, what points have left for the solution counted;
-        `memory_bytes`: at the most, while it is formed, inverted or written, contributions and the node
-        itself counted; `contribution_bytes`: of what it sends up, 8 (S (S + 1) / 2 + 2 S);
-        `cofactor_bytes`: of what it receives for the inversion, 8 S (S + 1) / 2; `step_bytes`: of what it
-        receives in each iteration, 8 S.
+        `points`, `interior`, `outer`: unknowns of points, of own blocks, of outer blocks (S). `images`,
+        `observations`: image points, all equations. `reduction`, `factor`, `inverse`: multiply-adds of one
+        formation, factorisation, inversion. `node_bytes`: the node without a factor. `factor_bytes`:
+        additional bytes of a formed node, with point data for the solution. `memory_bytes`: peak while it is
+        formed, inverted or written, with contributions and node. `contribution_bytes`: sent up, 8 (S (S + 1)
+        / 2 + 2 S). `cofactor_bytes`: received for the inversion, 8 S (S + 1) / 2. `step_bytes`: received per
+        iteration, 8 S.
         """
 
     def advance(self, state: _Floats, step: _Floats) -> _Floats:
-        """Return the state after a step: attitudes step by rotation vectors, all else is added."""
+        """Return the state after a step: attitudes step by rotation vectors, others by addition."""
 
     def relocate(self, state: _Floats, *, threads: int) -> _Floats:
-        """Return the state with the points that only images touch where the rays of their photos meet."""
+        """Return the state with image-only points at the intersections of their rays."""
 
     def objective(self, state: _Floats, *, threads: int) -> tuple[float, float, float, float, float]:
-        """Return weighted sums of squares (camera, ground, plates, observations), and what is minimised.
+        """Return weighted sums of squares (photos, control, images, others), and the objective.
 
-        Those at home here; they add up over all nodes to those of :attr:`BlockSolution.sums_of_squares`. What
-        is minimised is their sum, or that of losses.
+        Own observations only; the sum over all nodes is :attr:`BlockSolution.sums_of_squares`. The objective
+        is their total, or the total of losses.
         """
 
     def form(
@@ -1086,63 +1079,60 @@ class Node:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> FormedNode:
-        """Form the normal equations at a state, and eliminate the points and blocks at home here.
+        """Form the normal equations at a state, and eliminate own points and blocks.
 
         Parameters
         ----------
         state
             (N,) values of all unknowns.
         contributions
-            What the children leave, :attr:`FormedNode.contribution` of each in their order. They are added in
-            this order.
+            :attr:`FormedNode.contribution` of each child in order. They are added in this order.
         damping
-            Added to the diagonal of the normal equations as a fraction of it; 0 for a full step. The same in
-            all nodes.
+            Fraction of the diagonal of the normal equations that is added to it; 0 for a full step. It must
+            be equal in all nodes.
         curved
-            Whether the second-order term of a loss is taken in. The same in all nodes.
+            Whether to include the second-order term of a loss. It must be equal in all nodes.
         """
 
     def solution(self, state: _Floats, before: _Floats, *, threads: int) -> BlockSolution:
-        """Return what is adjusted at a state, without cofactors.
+        """Return the solution at a state, without cofactors.
 
-        `before` is the state before the last step. Arrays are those of the block of the node, outer photos
-        among them; sums, counts and degrees of freedom are of what is at home here, and add up.
+        `before` is the state before the last step. Arrays are of the block of the node, with outer photos.
+        Sums, counts and degrees of freedom are of own observations and unknowns, and can be added.
         """
 
 @final
 class FormedNode:
-    """A node at a state, its points and blocks eliminated.
+    """Node at a state after elimination of its own points and blocks.
 
-    It holds the factor, and copies of state and contributions no longer; it is not pickled, but formed again.
+    It contains the factor, but no copies of state and contributions. It cannot be pickled; form it again
+    instead.
     """
 
     @property
     def contribution(self) -> ContributionRow:
-        """What it leaves to the node above, over the S unknowns of the outer blocks; of the root it is empty.
+        """Contribution to the node above, over the S outer unknowns; empty for the root.
 
         `U = A_SS - A_SI A_II^-1 A_IS` (S (S + 1) / 2,), lower triangle, column by column: row i of column j
-        stands at `j S - j (j - 1) / 2 + i - j`; `u = b_S - A_SI A_II^-1 b_I` (S,); the diagonal of A_SS
-        before
-        any elimination, those of the children included (S,): what small pivots are compared with. It is
-        handed
-        out once.
+        is at `j S - j (j - 1) / 2 + i - j`. `u = b_S - A_SI A_II^-1 b_I` (S,). The diagonal of A_SS before
+        any elimination, also by children (S,), is the reference for small pivots. Available once.
         """
 
     @property
     def sum_of_squares(self) -> float:
-        """Weighted sum of squares of what is at home here at this state; they add up over all nodes."""
+        """Weighted sum of squares of own observations at this state; the total is over all nodes."""
 
     @property
     def decrease(self) -> float:
-        """By how much a full step lowers it, as far as it is known here.
+        """Decrease of the sum of squares by a full step, as far as known here.
 
-        The sum over all nodes is that of the block; its root bounds what any unknown moves by, in standard
-        deviations (the largest change of an iteration).
+        The sum over all nodes applies to the block. Its root is an upper bound of the change of any unknown,
+        in standard deviations (the largest change of an iteration).
         """
 
     @property
     def undetermined(self) -> FailureRow | None:
-        """What the observations leave undetermined here, as in :class:`BlockError`; or None."""
+        """Undetermined unknowns of the node, as in :class:`BlockError`; or None."""
 
     def solve(
         self,
@@ -1151,11 +1141,11 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
-        """Return the step (N,) of all unknowns, given that of the outer ones (S,)."""
+        """Return the step (N,) of all unknowns from the step of the outer ones (S,)."""
 
     @property
     def has_chord(self) -> bool:
-        """Whether the right-hand side of a chord was reduced, and is not solved for."""
+        """Whether the right-hand side of a chord was reduced but not yet solved."""
 
     def reduce_chord(
         self,
@@ -1165,19 +1155,20 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[_Floats, float] | None:
-        """Reduce the right-hand side that the equations have at a state: a second step with one factor.
+        """Reduce the right-hand side at a state: a second step with the same factor.
 
         Parameters
         ----------
         state
-            (N,) after a step.
+            (N,) state after a step.
         left
-            (S,) of each child what it has left.
+            (S,) remaining right-hand side of each child.
 
         Returns
         -------
-        (S,) what is left for the outer unknowns, and by how much the chord lowers the sum of squares, as far
-        as known here; None where what that takes is not kept, for want of memory.
+        (S,) the remaining right-hand side of the outer unknowns, and the decrease of the sum of squares by
+        the chord, as far as known here. None if the required data were not stored because of insufficient
+        memory.
         """
 
     def solve_chord(
@@ -1187,7 +1178,7 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
-        """Return the chord (N,) where its right-hand side was reduced, given that of the outer ones (S,)."""
+        """Return the chord (N,) from the chord of the outer unknowns (S,), after its reduction."""
 
     def reduce(
         self,
@@ -1196,19 +1187,19 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[_Floats, _Floats]:
-        """Reduce right-hand sides: y = L^-1 r of what is eliminated here.
+        """Reduce right-hand sides: y = L^-1 r of the unknowns eliminated here.
 
         Parameters
         ----------
         rights
-            (d, N) of all unknowns: own ones of what is at home here, with what the children have left.
+            (d, N) for all unknowns: own ones, with remainders of the children.
 
         Returns
         -------
         left
-            (d S,) what is left for the outer unknowns.
+            (d S,) remainders for the outer unknowns.
         products
-            (d d,) y^T y, which adds up over all nodes to r^T Q r.
+            (d d,) y^T y; the sum over all nodes is r^T Q r.
         """
 
     def complete(
@@ -1218,7 +1209,7 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
-        """Return solutions (d N,) where right-hand sides were reduced, given the outer ones (d, S); once."""
+        """Return solutions (d N,) of reduced right-hand sides from the outer ones (d, S); once."""
 
     def invert(
         self,
@@ -1229,82 +1220,80 @@ class FormedNode:
         datum: tuple[_Floats, _Floats, _Floats, _Floats, float, list[int]] | None = None,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[BlockSolution, list[_Floats]]:
-        """Return what is adjusted, with its cofactors, and what the children need for theirs.
+        """Return the solution with cofactors, and the cofactors for the children.
 
-        The factor is used up.
+        The factor is deleted.
 
         Parameters
         ----------
         outer
-            (S (S + 1) / 2,) cofactors of the outer unknowns, a lower triangle packed like the contribution.
+            (S (S + 1) / 2,) cofactors of the outer unknowns, a lower triangle packed as the contribution.
         state
-            (N,) the state that is reached: after the step, where that was the last one, else the same.
+            (N,) final state: after the step if it was the last one, otherwise unchanged.
         datum
-            What takes cofactors to a datum of the whole, but for those of the children: T and W = Q B (d, N),
-            B^T W of the whole (d, d), the last step (N,) before it was moved there, the condition of B^T G,
-            and the unknowns that do not move in the datum, ascending.
+            Transformation of cofactors to a datum of the whole, except for the children: T and W = Q B (d,
+            N), B^T W of the whole (d, d), the last step (N,) before the transformation, the condition of B^T
+            G, and the unknowns that do not change, ascending.
 
         Returns
         -------
         BlockSolution
             As :meth:`Node.solution`, with cofactors, redundancy numbers and test values. Outer photos have
-            cofactors, but not the redundancy numbers of their own weights.
+            cofactors, but no redundancy numbers of their own weights.
         list
             For each child its (S_c (S_c + 1) / 2,) cofactors.
         """
 
 @final
 class NetworkSuspects:
-    """The G groups of observations that may hold a gross error together, in the order of all tests.
+    """G groups of observations that may share a gross error, in the order of all tests.
 
-    Images in their order, then the control of points, positions and attitudes of photos, observations beside
-    images, and what was observed of cameras and common unknowns. Each has rows, M in all, which stand one
-    group after the other.
+    Images in order, then control points, positions and attitudes of photos, additional observations, and
+    observed values of cameras and shared unknowns. Each group has rows, M in total, stored group by group.
     """
 
     @property
     def subjects(self) -> tuple[NDArray[np.uint8], _Indices]:
-        """(G,) kinds, and which image, point, photo, observation, camera or common unknown.
+        """(G,) types, and indices of image, point, photo, observation, camera or shared unknown.
 
-        Kinds are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 common unknown.
+        Types are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 shared unknown.
         """
 
     @property
     def row_starts(self) -> _Indices:
-        """(G + 1,) where the rows of each suspect start."""
+        """(G + 1,) first row of each group."""
 
     @property
     def components(self) -> _Indices:
-        """(M,) the component that each row is."""
+        """(M,) component of each row."""
 
     @property
     def deviations(self) -> _Floats:
-        """(M,) standard deviations a priori, in the units of the observations."""
+        """(M,) a-priori standard deviations, in the units of the observations."""
 
 @final
 class NetworkTrial:
-    """A network tried without some of its observations; the symbolic analysis is done once.
+    """Repeated adjustment of a network without some observations, with one symbolic analysis.
 
-    Rows and square blocks of its suspects stand one suspect after the other. What is out has weight zero.
-
-    Of all methods, errors are those of the adjustment: BlockError or CollectionError, of the kind
-    `undetermined points` or `undetermined photos` where what is out takes their last support.
+    Rows and square blocks are stored group by group. Removed observations have zero weight. Methods raise the
+    errors of the adjustment, BlockError or CollectionError. The kind is `undetermined points` or
+    `undetermined photos` if the removals leave these without support.
     """
 
     @property
     def suspects(self) -> NetworkSuspects:
-        """What may be out."""
+        """Groups of observations that can be removed."""
 
     @property
     def photos(self) -> list[list[float]]:
-        """The values of each photo where the last trial has ended: as they are given, pose first."""
+        """Values of each photo after the last trial, in the input format, pose first."""
 
     @property
     def points(self) -> _Floats:
-        """(n, 3) coordinates of the points where the last trial has ended; NaN for those that are out."""
+        """(n, 3) point coordinates after the last trial; NaN for removed points."""
 
     def stand(self) -> tuple[str, int, float, int, list[int]]:
-        """Take the network as its adjustment has ended, with everything in it; return what `adjust` does."""
+        """Restore the adjusted state with all observations; return the same as `adjust`."""
 
     def adjust(
         self,
@@ -1315,21 +1304,21 @@ class NetworkTrial:
         tolerance: float | None,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> tuple[str, int, float, int, list[int]]:
-        """Adjust without what is out, from where the last trial has ended.
+        """Adjust without removed observations, from the state of the last trial.
 
         Parameters
         ----------
         rows
-            (M,) which rows are out.
+            (M,) whether each row is removed.
         points, photos
-            Those that are out with all that was observed of them: they stay where they are.
+            Points and photos removed with all their observations; their values do not change.
         tolerance
-            When to stop: for a block when no unknown would change by more than this multiple of its standard
-            deviation in the next iteration, for a collection as its options count it; theirs when None.
+            Convergence limit. For a block, the largest expected change in the next iteration, in standard
+            deviations; for a collection, as in its options. None: the limit of the options.
 
         Returns
         -------
-        Status, iterations, weighted sum of squares, degrees of freedom, points that ran into a station.
+        Status, iterations, weighted sum of squares, degrees of freedom, points that converged to a station.
         """
 
     def resist(
@@ -1340,23 +1329,24 @@ class NetworkTrial:
         iterations: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats | None:
-        """Adjust with a robust loss from where the last trial has ended, and stay there.
+        """Adjust with a robust loss from the state of the last trial, and store the new state.
 
         Returns
         -------
-        (G,) factors by which it has changed weights; None where it diverges: then nothing has changed.
+        (G,) factors of the weights; None if it diverges, and the state is then unchanged.
         """
 
     def tests(self) -> dict[str, NDArray[Any]]:
-        """Test every suspect that takes part.
+        """Test every active group.
 
         Returns
         -------
-        `active` (G,) whether any row of it takes part; `rank` (G,) directions in which an error shows;
-        `statistic` (G,) T, by which the sum of squares falls without it; `least` (G,) the smallest redundancy
-        of a direction that shows; `shared` (G,) h of the bound of correlations with others; `residual` (M,)
-        of unit weight; `cofactors` the square blocks of R; `error`, `error_sd` (M,) the estimated error and
-        its standard deviation (a priori unit weight), in the units of the observations. NaN for what is out.
+        `active` (G,): any row is in use. `rank` (G,): number of detectable directions of an error.
+        `statistic` (G,): T, the decrease of the sum of squares without the group. `least` (G,): smallest
+        redundancy of a detectable direction. `shared` (G,): h of the bound of correlations with others.
+        `residual` (M,): normalised residual. `cofactors`: square blocks of R. `error`, `error_sd` (M,):
+        estimated error and its standard deviation (a-priori unit weight), in the units of the observations.
+        NaN for removed groups.
         """
 
     def hypotheses(
@@ -1413,70 +1403,70 @@ class NetworkTrial:
     def predictions(
         self, suspects: list[int]
     ) -> list[tuple[float, list[int], list[float], list[float]] | None]:
-        """Test what is out of some suspects against what the rest predicts.
+        """Test removed observations of some groups against their prediction from the rest.
 
         Returns
         -------
-        For each: the statistic, chi-square with as many degrees of freedom as rows are out; these rows;
-        observed minus predicted of each, and its standard deviation. None where nothing is out, or its point
-        or photo is.
+        For each: the chi-square statistic with one degree of freedom per removed row; these rows; observed
+        minus predicted of each row, and its standard deviation. None if nothing is removed, or its point or
+        photo is.
         """
 
     def on_points(self, points: list[int], *, gone: bool = False) -> list[tuple[list[int], _Floats, _Floats]]:
-        """Return all observations of points together: suspects, residuals of unit weight, and R.
+        """Return all observations of points together: groups, normalised residuals, and R.
 
-        Nothing for points that observations beside images touch. `gone`: of points that are out with all that
-        was observed of them, as if they took part, each by itself against the photos as the others determine
-        them; nothing then also where the rays do not determine the point.
+        Empty for points with additional observations. `gone`: for points that are removed with all
+        observations, as if they were in use, each separately against the photos as determined by others. Then
+        also empty if the rays do not determine the point.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:
-        """Return what an error of one standard deviation in each row of some suspects moves.
+        """Return the effects of an error of one standard deviation in each row of some groups.
 
         Returns
         -------
-        (., 9): the three coordinates of the own point, the six numbers of the own photo; NaN where there is
-        none.
+        (., 9): the three coordinates of the point of the row, the six numbers of its photo; NaN if it has
+        neither.
         """
 
     def responses(self, suspects: list[int]) -> _Floats:
-        """Return the columns of R that belong to the rows of some suspects: (., M)."""
+        """Return the columns of R of the rows of some groups: (., M)."""
 
     def most_moved(self, suspects: list[int]) -> list[tuple[str, int, int, float, float]]:
-        """Return, for each row of some suspects, the unknown that an error in it moves most.
+        """Return, for each row of some groups, the unknown with the largest effect of an error.
 
         Returns
         -------
-        Kind (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; by how much an error
-        of one standard deviation moves it, in its unit and in its standard deviations (a priori unit weight).
+        Type (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; its change by an
+        error of one standard deviation, in its unit and in its standard deviations (a-priori unit weight).
         """
 
     def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return pairs of suspects of one point whose tests are correlated by more than `limit`."""
+        """Return pairs of groups of one point whose tests are correlated by more than `limit`."""
 
 @final
 class BlockState:
-    """Where the adjustment of a block has ended, and the datum that it was taken to.
+    """Final state of the adjustment of a block, and its datum.
 
     Parameters
     ----------
     unknowns
-        Adjusted, in the order of the core.
+        Adjusted values, in the order of the core.
     held, collapsed, loose
-        Unknowns held for a datum; points left out because they ran into a station or their rays do not
-        determine them; photos left out because their images do not.
+        Unknowns fixed for a datum; points excluded because they converged to a station or their rays do not
+        determine them; photos excluded because their images do not determine them.
     ordering
-        The name of the ordering in force.
+        Name of the ordering in use.
     datum
-        Its name, points, photos, whether scale counts, photos whose attitudes count, and what makes turns
-        comparable with shifts; None for that of what was held.
+        Name, points, photos, use of scale, photos whose attitudes count, and the factor that makes rotations
+        comparable with translations. None for a datum of fixed unknowns.
     released
-        Whether control that was exactly minimal was given up for it.
+        Whether minimal control was released for the datum.
 
     Raises
     ------
     ValueError
-        An ordering or a datum that there is not.
+        If the ordering or datum does not exist.
     """
 
     def __new__(
@@ -1493,18 +1483,18 @@ class BlockState:
         self,
     ) -> tuple[list[float], list[int], list[int], list[int], str, _DatumRow | None, bool]: ...
     def joint(self, points: Sequence[int]) -> NDArray[np.float64] | None:
-        """Return the (3k, 3k) cofactors of points with each other, where the adjustment has kept just these.
+        """Return the stored joint cofactors (3k, 3k) of exactly these points.
 
-        None of copies and of what was read.
+        None for copies of a state and for states read from files.
         """
 
 @final
 class BlockCovariances:
-    """Cofactors (a priori unit weight) of anything in an adjusted block or collection, from one factor.
+    """Cofactors (a-priori unit weight) of any quantities of an adjusted network, from one factor.
 
-    What has cofactors is told by its kind and index: `photo` (its pose), `step` (position and rotation about
-    the photo's axes), `point`, `camera` (of a collection: that of the photo), `unknown`. Arguments as of
-    :class:`BlockNetwork`. Its methods raise BlockError or CollectionError.
+    Quantities are identified by type and index: `photo` (its pose), `step` (position and rotation about the
+    photo's axes), `point`, `camera` (of a photo in a collection), `unknown`. Arguments as in
+    :class:`BlockNetwork`. Methods raise BlockError or CollectionError.
     """
 
     def cofactors(
@@ -1515,7 +1505,7 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats:
-        """Return the cofactors of every two unknowns of `rows`, or of those with what `columns` names."""
+        """Return the cofactors of all unknowns of `rows`, or of `rows` with `columns`."""
 
     def propagate(
         self,
@@ -1525,16 +1515,16 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats:
-        """Return J Q J^T, for (m, k) partials J of m functions of the k unknowns of what is named."""
+        """Return J Q J^T for (m, k) partial derivatives J of m functions of k unknowns."""
 
     def suspects(self) -> NetworkSuspects:
         """Return the groups of observations of the network."""
 
     def influences(self, partials: _Floats, of: list[tuple[str, int]]) -> _Floats:
-        """Return what errors of one standard deviation in every row do to functions of the unknowns: (m, M).
+        """Return the effects of one-sigma errors in all rows on functions of the unknowns: (m, M).
 
-        Rows are those of all suspects; `partials`, `of` are those of :meth:`propagate`; the datum is that of
-        what was held.
+        Rows are in the order of all groups; `partials` and `of` as in :meth:`propagate`. The datum is defined
+        by fixed unknowns.
         """
 
     def group_squares(
@@ -1548,31 +1538,31 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> tuple[list[int], _Floats, list[bool]]:
-        """Return sums of R_ij^2 over groups, R taking errors of observations to residuals, both in their sd.
+        """Return sums of R_ij^2 over groups; R maps errors to residuals, both in standard deviations.
 
         Parameters
         ----------
         groups
-            Number g of groups; then the group of each observation, -1 for none: (m, 2) of x and y of images,
-            (n, 3) of components of points, (P, 6) of unknowns of poses, of every camera, common unknown, and
-            other observation.
+            Number g of groups; then the group of each observation, -1 for none: (m, 2) x and y of images, (n,
+            3) components of points, (P, 6) unknowns of poses, of every camera, shared unknown, and other
+            observation.
         classes
-            None: all of them. A number: only those within each group, whose columns groups share that leave
-            the same rest by it; what is between such groups is added.
+            None: all sums. A number: sums within each group only. Groups with the same index modulo this
+            number share columns, and the sums between such groups are included.
         exact, vectors, seed
-            Groups of so many observations at the most, and all that have no more than there are vectors, are
-            taken column by column; others with so many vectors of random signs (Hutchinson 1990). Same seed,
-            same bits, for any number of threads.
+            Groups with at most `exact` observations, and groups with at most `vectors`, are computed column
+            by column. Others use `vectors` random sign vectors (Hutchinson 1990). Results are identical to
+            the last bit for the same seed and any number of threads.
 
         Returns
         -------
         equations
             (g + 1,) observations of each group and of none; empty with classes.
         squares
-            (g + 1) * g sums, row by row, of i in the group of the row (the last row: in none) and j in that
-            of the column; with classes (g,) sums of i and j in each group.
+            (g + 1) * g sums, row by row, of i in the row's group (last row: no group) and j in the column's
+            group; with classes (g,) sums of i and j in each group.
         exact
-            (g,) which columns were taken column by column; empty with classes.
+            (g,) whether columns were computed column by column; empty with classes.
         """
 
     def project_images(
@@ -1582,17 +1572,16 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats:
-        """Return (k, m, 2) what k columns of errors of all images leave as their residuals, both in their sd.
+        """Return (k, m, 2) residuals from k columns of errors of all images, both in standard deviations.
 
-        That is R z for each column z; images that took no part have neither.
+        The result is R z for each column z; unused images have neither errors nor residuals.
         """
 
 class _NetworkSolution:
-    """What adjusted blocks and collections have alike, in the order of photos (P), points (n), images (m).
+    """Common attributes of adjusted blocks and collections, for P photos, n points, m images.
 
-    A photo has k unknowns: of a block its position and attitude, of a collection also its camera. Values are
-    in the units in which they were given. Points and images that were left out are NaN. Cofactors hold for a
-    priori unit weight.
+    A photo of a block has k unknowns of position and attitude, in a collection also of its camera. Values are
+    in the input units. Excluded points and images are NaN. Cofactors refer to a-priori unit weight.
     """
 
     @property
@@ -1601,32 +1590,31 @@ class _NetworkSolution:
 
     @property
     def weak_points(self) -> list[tuple[int, float, float]]:
-        """Points on nearly parallel rays, or at a station's own place.
+        """Points with nearly parallel rays, or at the position of a station.
 
-        For each its index, the largest of its standard deviations over the smallest (in any directions;
-        infinite where rounding has taken the smallest, NaN without cofactors) and its distance from the
-        nearest station that sees it, in the median of these distances.
+        For each its index, the ratio of its largest to its smallest standard deviation (in any directions;
+        infinite if the smallest is lost by rounding, NaN without cofactors), and its distance from the
+        nearest station that observes it, relative to the median of these distances.
         """
 
     @property
     def weak(self) -> list[tuple[int, int]]:
-        """Photos and their unknowns that a combination moves which no step could follow.
+        """Photos and their unknowns in a combination that no step could follow.
 
-        The sum of squares stood still all the same, or the iterations ran out. Empty where the adjustment
-        ended otherwise.
+        The sum of squares was nevertheless stationary, or the iterations were exhausted. Empty otherwise.
         """
 
     @property
     def state(self) -> BlockState:
-        """Where the adjustment has ended."""
+        """Final state of the adjustment."""
 
     @property
     def initial_sum_of_squares(self) -> float:
-        """Weighted sum of squares, of losses with a loss, at the initial values."""
+        """Weighted sum of squares, or of losses, at the initial values."""
 
     @property
     def iterations(self) -> list[IterationRow]:
-        """Every iteration."""
+        """All iterations."""
 
     @property
     def photo_cofactors(self) -> _Floats:
@@ -1634,7 +1622,7 @@ class _NetworkSolution:
 
     @property
     def photo_redundancy(self) -> _Floats:
-        """(P, k) redundancy numbers of the unknowns as observations; 0 unless weighted."""
+        """(P, k) redundancy numbers of the observed unknowns; 0 unless weighted."""
 
     @property
     def point_positions(self) -> _Floats:
@@ -1642,19 +1630,19 @@ class _NetworkSolution:
 
     @property
     def point_cofactors(self) -> _Floats:
-        """(n, 3, 3)."""
+        """(n, 3, 3) cofactors of the points."""
 
     @property
     def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of the coordinates as observations; 0 unless weighted."""
+        """(n, 3) redundancy numbers of the observed coordinates; 0 unless weighted."""
 
     @property
     def point_rays(self) -> _Indices:
-        """(n,) number of images; 0 for points left out."""
+        """(n,) number of images; 0 for excluded points."""
 
     @property
     def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed, in the unit of the image."""
+        """(m, 2) observed minus computed, in the image unit."""
 
     @property
     def redundancy(self) -> _Floats:
@@ -1662,49 +1650,49 @@ class _NetworkSolution:
 
     @property
     def standardized(self) -> _Floats:
-        """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight.
+        """(m, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight.
 
         NaN without redundancy.
         """
 
     @property
     def image_weights(self) -> _Floats:
-        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
+        """(m,) factor of the weight by a loss; 1 without a loss."""
 
     @property
     def undetermined(self) -> FailureRow | None:
-        """Why there are no cofactors although they were asked for, as in :class:`BlockError`."""
+        """Reason for missing cofactors, as in :class:`BlockError`."""
 
     @property
     def redundancy_excess(self) -> float | None:
-        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+        """Sum of all redundancy numbers minus the degrees of freedom: rounding errors.
 
         None without cofactors, and with a loss.
         """
 
     @property
     def variance_of_unit_weight(self) -> float | None:
-        """None without degrees of freedom."""
+        """Variance of unit weight; None without degrees of freedom."""
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Observations, weighted unknowns, unknowns that are neither fixed nor held."""
+        """Observations, weighted unknowns, unknowns that are not fixed."""
 
     @property
     def ordering(self) -> str:
-        """The ordering in force."""
+        """Name of the ordering in use."""
 
     @property
     def predictions(self) -> dict[str, float]:
-        """Predicted multiply-adds of one factorisation in each ordering that was tried; NaN if it failed."""
+        """Predicted multiply-adds of one factorisation in each tested ordering; NaN if it failed."""
 
     @property
     def operations(self) -> dict[str, float]:
-        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
+        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, per execution."""
 
     @property
     def formations(self) -> int:
-        """How often the normal equations were formed."""
+        """Number of formations of the normal equations."""
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -1712,7 +1700,7 @@ class _NetworkSolution:
 
 @final
 class BlockSolution(_NetworkSolution):
-    """An adjusted block; k is 6."""
+    """Adjusted block; k is 6."""
 
     @property
     def photo_corrections(self) -> _Floats:
@@ -1732,91 +1720,90 @@ class BlockSolution(_NetworkSolution):
 
     @property
     def images_behind(self) -> _Indices:
-        """Indices of the images whose point stands behind the camera, ascending."""
+        """Indices of the images with a point behind the camera, ascending."""
 
     @property
     def images_folded(self) -> _Indices:
-        """Indices of the images beyond where the lens of their camera is one-to-one, ascending."""
+        """Indices of the images outside the one-to-one range of the lens, ascending."""
 
     @property
     def loose_photos(self) -> list[int]:
-        """Indices of the photos that stay as they are because their images do not determine them."""
+        """Indices of the photos that were not adjusted because their images do not determine them."""
 
     @property
     def datum(self) -> list[tuple[int, int]]:
-        """Photos and their unknowns (0 to 5) held to give a datum.
+        """Photos and their unknowns (0 to 5) that are fixed to define a datum.
 
-        Empty where observations and weights give one.
+        Empty if observations and weights define one.
         """
 
     @property
     def datum_unknowns(self) -> list[tuple[int, int]]:
-        """Coefficients of trajectories held to give a datum: common unknowns and their components."""
+        """Coefficients of trajectories fixed to define a datum: shared unknowns and components."""
 
     @property
     def relative_error(self) -> float:
-        """Relative error, by rounding, of the variances in the datum that it was taken to, about."""
+        """Approximate relative error of the variances in the new datum, by rounding."""
 
     @property
     def minimal_control(self) -> bool:
-        """Whether control and weights of poses are exactly what a datum takes."""
+        """Whether control and weights of poses are exactly minimal for a datum."""
 
     @property
     def weak_unknowns(self) -> list[tuple[int, int]]:
-        """The same for common unknowns: unknowns and their components."""
+        """Shared unknowns and their components, as in `weak`."""
 
     @property
     def adjusted_unknowns(
         self,
     ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], list[float], int]]:
-        """The adjusted common unknowns, in the order in which they were given.
+        """Adjusted shared unknowns, in the input order.
 
-        Change from what was given, position (3), rotation matrix row by row (9), cofactors row by row for
-        rotations about the adjusted axes, the same with the unknowns of the one before in its block (none of
-        the first), redundancy numbers, and the number of observations and images.
+        Change, position (3), rotation matrix row by row (9); cofactors row by row for rotations about the
+        adjusted axes. Then cofactors with the unknowns of the previous one in its block (empty for the
+        first), redundancy numbers, and the number of observations and images.
         """
 
     @property
     def weak_cameras(self) -> list[tuple[int, int]]:
-        """The same for cameras that several photos share: cameras and their parameters."""
+        """Shared cameras and their parameters, as in `weak`."""
 
     @property
     def cameras(self) -> list[CameraRow]:
-        """The adjusted cameras, in the order in which they were given."""
+        """Adjusted cameras, in the input order."""
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
-        """Points left out, each with the reason."""
+        """Excluded points, with reasons."""
 
     @property
     def sums_of_squares(self) -> tuple[float, float, float, float]:
-        """Weighted sums of squares: camera, ground, plates, observations beside images."""
+        """Weighted sums of squares: photos, control, image coordinates, additional observations."""
 
     @property
     def redundancies(self) -> tuple[float, float, float, float] | None:
-        """Sums of the redundancy numbers of the same; None without covariances."""
+        """Sums of the redundancy numbers of the same types; None without covariances."""
 
     @property
     def adjusted_observations(
         self,
     ) -> list[tuple[list[float], list[float], list[float], float, float] | None]:
-        """What has become of each observation, in the order of the groups.
+        """Results of each observation, in the order of the groups.
 
-        Residuals, redundancy numbers and standardized residuals of its components, in the units of its kind;
-        its weighted square; the factor by which a loss has changed its weight. None for observations of
-        points that were left out.
+        Residuals, redundancy numbers and standardized residuals of its components, in the units of its type;
+        its weighted square; the factor of its weight by a loss. None for observations of excluded points.
         """
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Of the chosen unit variance."""
+        """Degrees of freedom for the selected unit variance."""
 
     @property
     def photo_order(self) -> _Indices:
-        """(P,) indices of the photos in the order of their elimination."""
+        """(P,) indices of the photos in elimination order."""
 
 class ResectionError(Exception):
-    """A photo that cannot be resected.
+    """Photo that cannot be resected.
 
     `args` is (kind, message): kind is `too few points`, `collinear`, `danger cylinder`, `undetermined`, `no
     placement`, `not finite` or `input`.
@@ -1840,7 +1827,7 @@ def resect(
     max_iterations: int,
     covariance: bool,
 ) -> ResectionSolution:
-    """Resect one photo by least squares, on the calling thread; Ctrl-C is looked after between iterations.
+    """Resect one photo by least squares on the calling thread; Ctrl-C is checked in iterations.
 
     Parameters
     ----------
@@ -1852,36 +1839,36 @@ def resect(
     principal_distance
         Millimetres, signed.
     known, known_sd
-        (6,) position and attitude as they are known beforehand (NaN where unknown), and their standard
-        deviations: infinite free, 0 fixed.
+        (6,) known position and attitude (NaN if unknown), and their standard deviations: infinite is free, 0
+        is fixed.
     start
-        (6,) initial values; None to find some from triples of points.
+        (6,) initial values; None to compute them from triples of points.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
-        The sense of the angles.
+        Direction of the angles.
     at_measured
-        Form the partials at the measured image positions, as program W5344 does (USGS Computer Contribution
-        2, 1969, equations 4 and 5), instead of the computed ones.
+        Whether to form the partial derivatives at the measured image positions, as program W5344 does (USGS
+        Computer Contribution 2, 1969, equations 4 and 5), instead of the computed ones.
     criterion, limit
-        `fraction`: no unknown changes by more than `limit` of its standard deviation; `position`: the
+        `fraction`: no unknown changes by more than `limit` of its standard deviation. `position`: the
         correction of the position is shorter than `limit`, full steps without damping (program W5344).
     max_iterations
-        Iterations at the most, from each start.
+        Maximum number of iterations from each initial pose.
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
 
     Raises
     ------
     ResectionError
-        A photo that cannot be resected.
+        If the photo cannot be resected.
     ValueError
-        An argument of another shape, length or choice; the message names it.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class ResectionSolution:
-    """A resected photo with n points. Cofactors hold for a priori unit weight."""
+    """Resected photo with n points. Cofactors refer to a-priori unit weight."""
 
     @property
     def status(self) -> str:
@@ -1889,7 +1876,7 @@ class ResectionSolution:
 
     @property
     def iterations(self) -> list[IterationRow]:
-        """Every iteration."""
+        """All iterations."""
 
     @property
     def history(self) -> _Floats:
@@ -1897,7 +1884,7 @@ class ResectionSolution:
 
     @property
     def start(self) -> _Floats:
-        """(6,) the pose from which the adjustment started."""
+        """(6,) initial pose of the adjustment."""
 
     @property
     def pose(self) -> _Floats:
@@ -1909,7 +1896,7 @@ class ResectionSolution:
 
     @property
     def pose_redundancy(self) -> _Floats:
-        """(6,) redundancy numbers of position and attitude as observations; 0 unless weighted."""
+        """(6,) redundancy numbers of observed position and attitude; 0 unless weighted."""
 
     @property
     def point_positions(self) -> _Floats:
@@ -1933,15 +1920,15 @@ class ResectionSolution:
 
     @property
     def standardized(self) -> _Floats:
-        """(n, 2) residual / (standard deviation x root of redundancy number), a priori unit weight."""
+        """(n, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight."""
 
     @property
     def partials(self) -> _Floats:
-        """(n, 2, 6) partials of x and y with respect to position and attitude, at the solution."""
+        """(n, 2, 6) partial derivatives of x and y by position and attitude, at the solution."""
 
     @property
     def points_behind(self) -> _Indices:
-        """Indices of the points that stand behind the camera, ascending."""
+        """Indices of the points behind the camera, ascending."""
 
     @property
     def sum_of_squares(self) -> float:
@@ -1949,26 +1936,26 @@ class ResectionSolution:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Observations and weighted unknowns less unknowns."""
+        """Observations and weighted unknowns minus unknowns."""
 
     @property
     def alternatives(self) -> list[tuple[list[float], float]]:
-        """Other poses (6 values) that fit about as well, with their sums of squares."""
+        """Other poses (6 values) with a similar fit, with their sums of squares."""
 
     @property
     def undetermined(self) -> str | None:
-        """Why a further pose that fits is not determined, a kind as in `ResectionError`; None without one."""
+        """Reason why another fitting pose is undetermined, a kind as in `ResectionError`; or None."""
 
     @property
     def outside_danger_cylinder(self) -> float | None:
         """Distance of the projection centre from the danger cylinder, negative inside, or None."""
 
 class ComparatorError(Exception):
-    """The calibration cannot be adjusted: (message, cases, points), both by their indices."""
+    """Calibration that cannot be adjusted: (message, cases, points), both as indices."""
 
 @final
 class ComparatorSolution:
-    """An adjusted calibration of a comparator. Cofactors are for a priori unit weight."""
+    """Adjusted calibration of a comparator. Cofactors refer to a-priori unit weight."""
 
     @property
     def converged(self) -> bool:
@@ -1984,7 +1971,7 @@ class ComparatorSolution:
 
     @property
     def comparator_cofactors(self) -> _Floats:
-        """(k, k) of all of them together."""
+        """(k, k) joint cofactors of these parameters."""
 
     @property
     def case_placements(self) -> _Floats:
@@ -1992,7 +1979,7 @@ class ComparatorSolution:
 
     @property
     def case_cofactors(self) -> _Floats:
-        """(q, 3, 3) of each case."""
+        """(q, 3, 3) cofactors of each case."""
 
     @property
     def grid_xy(self) -> _Floats:
@@ -2000,7 +1987,7 @@ class ComparatorSolution:
 
     @property
     def grid_cofactors(self) -> _Floats:
-        """(l, 2, 2) of each grid point."""
+        """(l, 2, 2) cofactors of each grid point."""
 
     @property
     def grid_redundancy(self) -> _Floats:
@@ -2020,7 +2007,7 @@ class ComparatorSolution:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Readings and weighted grid coordinates less unknowns."""
+        """Readings and weighted grid coordinates minus unknowns."""
 
 def adjust_comparator(
     grid_xy: _Floats,
@@ -2040,58 +2027,58 @@ def adjust_comparator(
     limit: float,
     max_iterations: int,
 ) -> ComparatorSolution:
-    """Adjust a comparator, its polynomials, the placements of the plates and their grids together.
+    """Adjust a comparator, its polynomials, plate placements and grids together.
 
-    grid = M (x' + P(x') - centre) + t with x' = N S x: scales, lack of orthogonality, then polynomials, then
-    rotation. Polynomials are made of u^d, v^d, ... u^2, v^2; u and v are x' and y' less `centre` over
+    grid = M (x' + P(x') - centre) + t with x' = N S x: scales, non-orthogonality, then polynomials, then
+    rotation. Polynomials consist of u^d, v^d, ... u^2, v^2; u and v are x' and y' minus `centre`, divided by
     `half_range`.
 
     Parameters
     ----------
     grid_xy, grid_sd
         (l, 2) coordinates of the grid points in the axes of their plate, and their standard deviations:
-        infinite free, zero fixed.
+        infinite is free, zero is fixed.
     case_placements
         (q, 3) initial rotation (rad) and grid coordinates of `centre`.
     case_left_handed
-        (q) whether X and Y of the grid are exchanged.
+        (q) whether X and Y of the grid are swapped.
     measured_cases, measured_points
         (m,) indices of the case and the grid point of each reading.
     measured_xy, measured_sd
         (m, 2) readings and their standard deviations, in the unit of the grid.
     coefficients, coefficient_sd
         Initial coefficients in x and in y, in the unit of the grid, and their standard deviations: infinite
-        free, zero fixed.
+        is free, zero is fixed.
     degree, centre, half_range
-        Of the polynomials.
+        Degree, centre and half range of the polynomials.
     limit, max_iterations
-        Convergence: largest change in standard deviations.
+        Convergence limit, largest change in standard deviations; maximum number of iterations.
 
     Raises
     ------
     ComparatorError
-        The readings leave unknowns undetermined, or indices and lengths contradict each other.
+        If the readings leave unknowns undetermined, or indices and lengths are inconsistent.
     ValueError
-        An argument of another shape; the message names it and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 _Vector = tuple[float, float, float] | list[float]
 _Matrix = list[list[float]]
 
 CentredRow = tuple[float, _Matrix, _Vector, _Vector, _Vector]
-"""Scale s, rotation A (3 x 3), shift t, centre of the control c_X, centre of the model c_x of the similarity
-x - c_x = s A (X - c_X) + t."""
+"""Scale s, rotation A (3 x 3), translation t, centre of the control c_X, centre of the model c_x of the
+similarity x - c_x = s A (X - c_X) + t."""
 
 ParametersRow = tuple[float, _Matrix, _Vector]
 """Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
 
 TraceRow = tuple[_Matrix, tuple[list[tuple[int, int]], _Floats], _Floats, _Floats, list[float], list[float]]
-"""One cycle of the bulletin: rotation A as it began; (station, component) and (m, 8) P-values of equations;
+"""One cycle of the bulletin: initial rotation A; (station, component) and (m, 8) P-values of equations;
 normal equations C (7, 8); auxiliary table D (7, 8); seven results; corrected omega, phi, kappa, s, b1, b2,
 b3."""
 
 class SimilarityError(Exception):
-    """A model that cannot be oriented.
+    """Model that cannot be oriented.
 
     `args` is (kind, message, stations): kind is `insufficient`, `undetermined`, `first stations`, `scale`,
     `not finite` or `input`; stations is a list of the indices concerned.
@@ -2112,44 +2099,43 @@ def orient_model(
     trace: bool,
     scale: float | None = None,
 ) -> SimilaritySolution:
-    """Find the similarity x = s A X + B between control X and model x (C&GS Technical Bulletin 19).
+    """Compute the similarity x = s A X + B from control X and model x (C&GS Technical Bulletin 19).
 
     Parameters
     ----------
     control, control_sd
-        (n, 3) ground units: coordinates, NaN where unknown, and standard deviations, zero for an exact one,
-        infinite for one that takes no part.
+        (n, 3) ground units: coordinates, NaN if unknown, and standard deviations; zero for an exact one,
+        infinite for an unused one.
     model, model_sd
-        (n, 3) model units: coordinates and their standard deviations; zero where those of the control are
-        positive.
+        (n, 3) model units: coordinates and their standard deviations; zero if those for control are positive.
     method
         `rigorous`, `report` or `fill-in`.
     start
-        `auto`, `report` or `closed-form`; of no account with `former`.
+        `auto`, `report` or `closed-form`; ignored with `former`.
     former
-        A former result to start from, or None.
+        Former result to start from, or None.
     max_iterations
-        Iterations at the most.
+        Maximum number of iterations.
     tolerance
-        Fraction of its standard deviation by which no unknown changes any more (rigorous method).
+        Convergence limit: fraction of the standard deviation of any unknown (rigorous method).
     threads
-        Number of threads; 0 leaves it to the core (see `BlockNetwork`).
+        Number of threads; 0: selected by the core (see `BlockNetwork`).
     trace
-        Whether the report's methods keep what each cycle computed on its way.
+        Whether the methods of the report store intermediate results of each cycle.
     scale
-        s that is held, so that six unknowns are left; None: it is found.
+        Fixed scale s, which leaves six unknowns; None: free.
 
     Raises
     ------
     SimilarityError
-        A model that cannot be oriented.
+        If the model cannot be oriented.
     ValueError
-        An argument of another shape, length or choice; the message names it.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class SimilaritySolution:
-    """An oriented model, in the order of its n stations. Cofactors hold for a priori unit weight."""
+    """Oriented model, in the order of its n stations. Cofactors refer to a-priori unit weight."""
 
     @property
     def status(self) -> str:
@@ -2157,23 +2143,23 @@ class SimilaritySolution:
 
     @property
     def started(self) -> str:
-        """Where the initial values are from: `restart`, `report` or `closed-form`."""
+        """Source of the initial values: `restart`, `report` or `closed-form`."""
 
     @property
     def similarity(self) -> CentredRow:
-        """The similarity."""
+        """Adjusted similarity."""
 
     @property
     def initial(self) -> CentredRow:
-        """Where the iteration started."""
+        """Initial similarity of the iteration."""
 
     @property
     def alternatives(self) -> list[CentredRow]:
-        """Other orientations that fit as well."""
+        """Other orientations with the same fit."""
 
     @property
     def iterations(self) -> list[IterationRow]:
-        """Iterations of the rigorous method; none with the report's."""
+        """Iterations of the rigorous method; empty for the methods of the report."""
 
     @property
     def cycles(self) -> list[float] | None:
@@ -2181,11 +2167,11 @@ class SimilaritySolution:
 
     @property
     def traces(self) -> list[TraceRow]:
-        """What each of these cycles computed on its way, where it was asked for."""
+        """Intermediate results of these cycles, if requested."""
 
     @property
     def tangent_cofactors(self) -> _Floats:
-        """(7, 7) of three small rotations about the model axes (rad), s, t."""
+        """(7, 7) cofactors of three small rotations about the model axes (rad), s, t."""
 
     @property
     def condition(self) -> float:
@@ -2193,18 +2179,18 @@ class SimilaritySolution:
 
     @property
     def weakness(self) -> tuple[str, list[int]] | None:
-        """What makes the control weak, and the stations concerned.
+        """Reason for weak control, and the stations concerned.
 
         `coincident` (horizontal stations in plan), `elevations in line` (in plan) or `stations in line`.
         """
 
     @property
     def sum_of_squares(self) -> float:
-        """Weighted sum of squares, both systems."""
+        """Weighted sum of squares in both systems."""
 
     @property
     def misclosures(self) -> _Floats:
-        """(n, 3) s X - A^T (x - B): control axes, model units; NaN where unknown."""
+        """(n, 3) s X - A^T (x - B): control axes, model units; NaN if unknown."""
 
     @property
     def model_residuals(self) -> _Floats:
@@ -2212,33 +2198,33 @@ class SimilaritySolution:
 
     @property
     def adjusted_control(self) -> _Floats:
-        """(n, 3) adjusted control coordinates, ground units; unknown ones as the model gives them."""
+        """(n, 3) adjusted control coordinates, ground units; unknown ones from the model."""
 
     @property
     def control_cofactors(self) -> _Floats:
-        """(n, 3, 3) of the adjusted control coordinates."""
+        """(n, 3, 3) cofactors of the adjusted control coordinates."""
 
     @property
     def redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of the misclosures; NaN where unknown."""
+        """(n, 3) redundancy numbers of the misclosures; NaN if unknown."""
 
     @property
     def standardized(self) -> _Floats:
-        """(n, 3) misclosure / its standard deviation, a priori; NaN where unknown or unchecked."""
+        """(n, 3) misclosure / a-priori standard deviation; NaN if unknown or unchecked."""
 
 def transform_points(
     similarity: CentredRow, tangent_covariance: _Floats, points: _Floats, points_sd: _Floats
 ) -> tuple[_Floats, _Floats]:
-    """Control coordinates of model points, with their covariances.
+    """Compute control coordinates of model points, with covariances.
 
     Parameters
     ----------
     similarity
-        The similarity.
+        Similarity.
     tangent_covariance
         (7, 7) of three small rotations about the model axes (rad), s, t.
     points, points_sd
-        (n, 3) model coordinates and their own standard deviations, model units.
+        (n, 3) model coordinates and their standard deviations, model units.
 
     Returns
     -------
@@ -2247,14 +2233,14 @@ def transform_points(
     Raises
     ------
     ValueError
-        An argument of another shape; the message names it and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def similarity_partials(similarity: CentredRow) -> _Floats:
-    """(7, 7) partials of omega, phi, kappa, s, b1, b2, b3 by three small rotations (model axes), s, t."""
+    """Return (7, 7) partials of omega, phi, kappa, s, b1, b2, b3 by small rotations, s, t."""
 
 def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
-    """Gauss-Crout scheme of TB 19, section 4, for seven normal equations.
+    """Solve seven normal equations by the Gauss-Crout scheme of TB 19, section 4.
 
     Parameters
     ----------
@@ -2263,45 +2249,43 @@ def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
 
     Returns
     -------
-    (7, 8) auxiliary matrix D and (7,) solution E; None when a pivot vanishes.
+    (7, 8) auxiliary matrix D and (7,) solution E; None if a pivot vanishes.
 
     Raises
     ------
     ValueError
-        An argument of another shape; the message names it and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 _Station = tuple[float, float, float, float]
 """Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury)."""
 _CameraKind = tuple[float | None, bool, bool] | tuple[str, bool]
-"""Of plates: principal distance of the distorted image (None: scale first), Brown's decentering, common
-scale.
-
-Of another model (`camera_models`): its name, and whether fx is the principal distance of both axes.
+"""For plates: principal distance of the distorted image (None: scale first), Brown's decentering, common
+scale. For another model (`camera_models`): its name, and whether fx is the principal distance of both axes.
 """
 
 class StellarError(Exception):
-    """The camera cannot be calibrated.
+    """Camera that cannot be calibrated.
 
     `args` are the kind (`undetermined stars`, `undetermined`, `weight`, `not finite`, `input`), a message,
-    and the indices of the stars concerned, of the parameters where these are `undetermined`.
+    and the indices of the stars concerned, or of the parameters if these are `undetermined`.
     """
 
 def refraction(
     zenith_distances: _Floats, temperature: float, pressure: float, tau: _Floats, observed: bool
 ) -> _Floats:
-    """Refraction of (n,) zenith distances, observed or true, radians (NOAA TR NOS 55, equations 7 to 11).
+    """Compute the refraction of (n,) zenith distances (NOAA TR NOS 55, equations 7 to 11).
 
     Parameters
     ----------
     zenith_distances
-        (n,) radians.
+        (n,) zenith distances, observed or true, radians.
     temperature, pressure
         Kelvin, millimetres of mercury.
     tau
         (4,) coefficients in seconds of arc.
     observed
-        Whether the zenith distances are observed.
+        Whether the zenith distances are observed ones.
 
     Returns
     -------
@@ -2311,7 +2295,7 @@ def refraction(
 def measured_feature(
     kind: str, points: _Floats, covariance: _Floats
 ) -> tuple[list[tuple[str, bool]], _Floats, _Floats, _Floats, tuple[float, int] | None]:
-    """Fit a feature to points, with all that follows from their covariance (docs/features.md).
+    """Fit a feature to points, with covariance and test (docs/features.md).
 
     Parameters
     ----------
@@ -2320,41 +2304,41 @@ def measured_feature(
     points
         (n, 3), any unit of length.
     covariance
-        (3n, 3n) of all coordinates, those of a point together.
+        (3n, 3n) covariance of all coordinates, point by point.
 
     Returns
     -------
-    Names of q quantities, and whether each is a length (else a component of a unit vector); (q,) values;
-    (q, q) their covariance; (n, 4) deviations of points, radial (of a plane along its normal) and axial, each
-    with its standard deviation; statistic and degrees of freedom of their test, None where there is none.
+    Names of q quantities, and whether each is a length (else a component of a unit vector); (q,) values; (q,
+    q) covariance; (n, 4) deviations of points, radial (for a plane along its normal) and axial, each with its
+    standard deviation; statistic and degrees of freedom of the test, None without a test.
 
     Raises
     ------
     InputError
-        Too few points, points that do not determine the feature, or several as well, what is not finite,
-        arrays of other shapes.
+        If there are too few points, the feature is not uniquely determined, a value is not finite, or shapes
+        are wrong.
     ValueError
-        Another kind.
+        If the kind does not exist.
     """
 
 def nearest_points(points: _Floats, others: _Floats, limit: float, but: _Indices | None = None) -> _Indices:
-    """Return the nearest of the others for each point of a plane, (n,); -1 where none is near enough.
+    """Return the index (n,) of the nearest of the others for each point; -1 if beyond the limit.
 
     Parameters
     ----------
     points
-        (n, 2).
+        (n, 2) points in a plane.
     others
-        (m, 2), sorted into cells as wide as the limit.
+        (m, 2), sorted into cells with the width of the limit.
     limit
-        Largest distance, of one unit with the points.
+        Maximum distance, in the unit of the points.
     but
-        (n,) one of the others for each point that does not count; -1 for none.
+        (n,) one of the others to ignore for each point; -1 for none.
 
     Raises
     ------
     InputError
-        Arrays of other shapes.
+        If shapes are wrong.
     """
 
 def star_similarities(
@@ -2370,60 +2354,61 @@ def star_similarities(
     limit: float,
     wanted: int,
 ) -> tuple[int, _Floats]:
-    """Find similarities between images and stars: pairs of candidates make them, all images vote.
+    """Find similarities between images and stars: candidate pairs define them, all images vote.
 
     Parameters
     ----------
     images
-        (m, 2), the brightest first; every one votes.
+        (m, 2), the brightest first; all images vote.
     stars
         (n, 2) predicted images.
     candidates
-        (c, 2) an image, of the first `makers`, and a star that it may show.
+        (c, 2) an image, one of the first `makers`, and a star that it may show.
     makers
-        Images that make similarities.
+        Number of images that define similarities.
     tolerance, stretch
-        By how much the separations of two images and of their stars may differ, and the share of that of the
-        images that is added.
+        Maximum difference of the separations of two images and of their stars: a constant, and a part of the
+        image separation that is added.
     least
-        Separation that two images have more than.
+        Minimum separation of two images.
     axis
-        x, y of the point about which the camera may be turned, and how far it may move; None for any turn.
+        x, y of the centre of possible rotation of the camera, and its maximum shift; None for any rotation.
     limit
-        Distance from a star within which an image votes, in cells half as wide.
+        Maximum distance from a star for an image to vote; cells have half this width.
     wanted
-        Similarities that are returned at most.
+        Maximum number of returned similarities.
 
     Returns
     -------
-    How many pairs agree, and (k, 4) those with the most votes, the best first: an image z, as a complex
-    number, goes to (a + b i) z + (c + d i). All images vote for the 4,096 that the makers choose.
+    Number of pairs that agree, and (k, 4) similarities with the most votes, the best first. An image z, as a
+    complex number, is mapped to (a + b i) z + (c + d i). All images vote on the 4,096 similarities selected
+    by the makers.
 
     Raises
     ------
     InputError
-        Arrays of other shapes.
+        If shapes are wrong.
     ValueError
-        A candidate is no image and star.
+        If a candidate is not an image and a star.
     """
 
 def standard_coordinates(places: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:
-    """Refracted standard coordinates xi (north), eta (east), (n, 2), of (n, 2) apparent places.
+    """Compute refracted standard coordinates xi (north), eta (east), (n, 2), of apparent places.
 
-    NaN at and below the horizon.
+    `places` are (n, 2). The result is NaN at and below the horizon.
     """
 
 def star_places(standard: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:
-    """Apparent right ascension and declination, (n, 2), of refracted standard coordinates."""
+    """Compute apparent right ascension and declination, (n, 2), of refracted coordinates."""
 
 def pointing_matrix(angles: _Floats) -> _Floats:
-    """Matrix (3, 3) of alpha, omega, kappa (3,): north, east, zenith to x, y, axis (equation 19)."""
+    """Return the matrix (3, 3) of alpha, omega, kappa: north, east, zenith to x, y, axis (equation 19)."""
 
 def pointing_of_matrix(matrix: _Floats) -> _Floats:
-    """Angles alpha, omega, kappa (3,) of a matrix (3, 3)."""
+    """Return the angles alpha, omega, kappa (3,) of a matrix (3, 3)."""
 
 def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: _CameraKind) -> _Floats:
-    """Plate coordinates (n, 2) of standard coordinates (n, 2); NaN behind the camera.
+    """Compute plate coordinates (n, 2) of standard coordinates (n, 2); NaN behind the camera.
 
     Parameters
     ----------
@@ -2432,49 +2417,48 @@ def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: 
     angles
         (3,) alpha, omega, kappa.
     interior
-        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; of another model
-        its own parameters, then zeros: x counts right, y down.
+        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3. For another model
+        its own parameters, then zeros: x to the right, y down.
     camera
-        Its kind.
+        Kind of the camera.
     """
 
 def plate_directions(
     xy: _Floats, angles: _Floats, interior: _Floats, camera: _CameraKind, *, tolerance: float, passes: int
 ) -> _Floats:
-    """Directions of plate coordinates, the inverse of `plate_images`.
+    """Compute directions of plate coordinates, the inverse of `plate_images`.
 
     Returns
     -------
-    (n, 5) xi, eta, undistorted x, y, and 1 where the distortion settled within `tolerance` in `passes`
-    passes.
+    (n, 5) xi, eta, undistorted x, y, and 1 if the distortion converged within `tolerance` in `passes` passes.
     """
 
 @final
 class StellarProblem:
-    """A calibration as it is known beforehand: S stars, G attitudes, m images.
+    """Calibration problem with prior values: S stars, G attitudes, m images.
 
     Parameters
     ----------
     station, camera
-        Where, and the kind of the camera.
+        Station, and kind of the camera.
     pointings, common
         (G, 3) attitudes; (17,) 13 interior parameters and 4 coefficients of refraction (arcsec).
     fixed
-        3 G + 17 flags: which parameters are held.
+        3 G + 17 flags of fixed parameters.
     weighted, weighted_values, weight_root
-        (k,) which parameters have weight, their given values, and R (k, k) of their weight matrix R^T R.
+        (k,) indices of weighted parameters, their given values, and R (k, k) of their weight matrix R^T R.
     star_places, star_catalogue, star_weights, star_fixed
         (S, 2) initial and catalogue places; (S, 2, 2) weights, zero for unknown directions; S flags.
     image_stars, image_pointings, image_xy, image_weights, image_times, image_shifts
         (m,) indices of star and attitude; (m, 2) measured; (m, 2, 2); (m,) sidereal time; (m, 2) place of the
-        star at the time of the image minus the place that is adjusted.
+        star at the time of the image minus the adjusted place.
     axis
         Attitude, standard coordinates, plate coordinates and weight of the axis, if it is known.
 
     Raises
     ------
     ValueError
-        An argument of another shape.
+        If a shape is wrong.
     """
 
     def __new__(
@@ -2511,46 +2495,45 @@ class StellarProblem:
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         whole: bool = False,
     ) -> dict[str, Any]:
-        """Adjust by least squares with exact partials.
+        """Adjust by least squares with exact partial derivatives.
 
         Parameters
         ----------
         unit
-            Mean error of unit weight that is expected: `fraction` and the history count in it.
+            Expected mean error of unit weight, the unit of `fraction` and of the history.
         fraction
-            Converged when no unknown changes by more than this fraction of its standard deviation.
+            Convergence limit: largest change of an unknown as a fraction of its standard deviation.
         max_iterations, covariance, threads, progress
-            As for `block_network`.
+            As in `block_network`.
         whole
-            Whether to compute the cofactors of every two parameters, where there are cofactors.
+            Whether to compute the cofactors of all pairs of parameters, if there are cofactors.
 
         Returns
         -------
-        `status`, `iterations`, `initial_sum_of_squares` (in units of `unit` squared), `parameters`
-        (3 G + 17,); `places` (S, 2), `place_cofactors` (S, 2, 2), `place_inverses` (S, 2, 2): what of these
-        would be left if the parameters were known; `residuals` (m, 2) measured minus computed,
-        `axis_residual`, `sums_of_squares` (images, stars, parameters, axis), and `redundancy` and
-        `standardized` of `image`, `place`, `axis`: of decorrelated components where weights are correlated.
-        Where there are cofactors, all for unit weight: `pointing_cofactors` (G, 3, 3), `cross_cofactors`
-        (G, 3, 17) of attitudes and common parameters, `common_cofactors` (17, 17); where the whole is asked
-        for, `cofactors` (3 G + 17, 3 G + 17) and `log_determinant`: natural logarithm of the determinant of
-        the normal equations reduced to the parameters.
+        `status`, `iterations`, `initial_sum_of_squares` (in units of `unit` squared), `parameters` (3 G +
+        17,). `places` (S, 2), `place_cofactors` (S, 2, 2), and `place_inverses` (S, 2, 2), the cofactors for
+        known parameters. `residuals` (m, 2) measured minus computed, `axis_residual`, `sums_of_squares`
+        (images, stars, parameters, axis). `redundancy` and `standardized` of `image`, `place`, `axis`; for
+        correlated weights of decorrelated components. With cofactors, all for unit weight:
+        `pointing_cofactors` (G, 3, 3), `cross_cofactors` (G, 3, 17) of attitudes and common parameters,
+        `common_cofactors` (17, 17). With `whole`: `cofactors` (3 G + 17, 3 G + 17) and `log_determinant`, the
+        natural logarithm of the determinant of the reduced normal equations.
 
         Raises
         ------
         StellarError
-            Stars or parameters that are not determined, or that have no image at the initial values.
+            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def without_effect(self) -> list[int]:
-        """Find the parameters, by index, that no image, no weight and not the axis touches.
+        """Return the indices of parameters that no image, weight or axis touches.
 
-        Parameters that are held are not among them.
+        Fixed parameters are excluded.
 
         Raises
         ------
         StellarError
-            Stars that have no image at the initial values.
+            If a star has an undefined image at the initial values.
         """
 
     def correction(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
@@ -2559,46 +2542,45 @@ class StellarProblem:
         Parameters
         ----------
         refraction, distortion, passes
-            As for `published`.
+            As in `published`.
 
         Returns
         -------
-        `parameters` (3 G + 17,): corrections; `cofactors` of every two and `log_determinant`, both for unit
-        weight; `without_effect`: indices of the parameters that nothing touches yet, which are not
-        corrected.
+        `parameters` (3 G + 17,): corrections; `cofactors` of all pairs and `log_determinant`, both for unit
+        weight; `without_effect`: indices of the parameters that nothing touches, which are not corrected.
 
         Raises
         ------
         StellarError
-            Stars or parameters that are not determined, or that have no image at the initial values.
+            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def residual_cycle(
         self, cofactors: _Floats, *, refraction: float, distortion: float, passes: int
     ) -> dict[str, Any]:
-        """Correct the stars with the parameters as they are; residuals and their tests (equations 64 to 71).
+        """Correct the stars with fixed parameters; return residuals and tests (equations 64 to 71).
 
         Parameters
         ----------
         cofactors
             (3 G + 17, 3 G + 17) of the parameters, for unit weight.
         refraction, distortion, passes
-            As for `published`.
+            As in `published`.
 
         Returns
         -------
-        As `adjust` has them, but of the plate coordinates themselves: `places`, `place_cofactors`,
-        `place_inverses`, `residuals`, `axis_residual`, `sums_of_squares`, and `redundancy` and
-        `standardized` of `image` and `place`.
+        As in `adjust`, with plate coordinates instead of angles: `places`, `place_cofactors`,
+        `place_inverses`, `residuals`, `axis_residual`, `sums_of_squares`, and `redundancy` and `standardized`
+        of `image` and `place`.
 
         Raises
         ------
         StellarError
-            Stars that are not determined, or that have no image.
+            If stars or their images are undetermined.
         """
 
     def equations(self) -> dict[str, _Floats]:
-        """Equations of the images at the initial values with exact partials, not weighted.
+        """Return unweighted image equations at the initial values with exact partial derivatives.
 
         Returns
         -------
@@ -2607,10 +2589,10 @@ class StellarProblem:
         """
 
     def axis_equations(self) -> dict[str, _Floats]:
-        """Equations of the axis as `equations` has them, with one row or none."""
+        """Return the equations of the axis as in `equations`, with one row or none."""
 
     def published(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
-        """Equations of the images as the report's program formed them (equations 48 to 62, 73, 74).
+        """Return image equations as in the report's program (equations 48 to 62, 73, 74).
 
         Parameters
         ----------
@@ -2623,16 +2605,16 @@ class StellarProblem:
         """
 
     def directions(self) -> _Floats:
-        """Right ascension and declination (m, 2) of every image at the initial values."""
+        """Return right ascension and declination (m, 2) of every image at the initial values."""
 
 class CollectionError(Exception):
-    """A collection cannot be adjusted: (kind, message, combinations, points).
+    """Collection that cannot be adjusted: (kind, message, combinations, points).
 
-    The kinds are those of :class:`BlockError`, without `no intersection`.
+    The kinds are the same as in :class:`BlockError`, without `no intersection`.
     """
 
 def read_numbers(text: bytes) -> tuple[_Floats, bool]:
-    """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.
+    """Read numbers separated by white space, up to the first word that is not a finite number.
 
     Returns
     -------
@@ -2641,51 +2623,50 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
 
 @final
 class TableReader:
-    """Columns of a table of text whose lines are all regular.
+    """Reader of the columns of a text table with regular lines.
 
-    A regular line has as many cells as columns, or an empty one more. The cells of columns of numbers are
-    empty or numbers with one decimal mark throughout. Names have no control characters. A cell can be in
-    quotation marks if no quotation mark is inside. Comments, and blank lines above others, are irregular.
+    A regular line has as many cells as columns, or an empty one more. Cells of number columns are empty or
+    numbers with the same decimal mark. Names are without control characters. A cell can be in quotation marks
+    if no quotation mark is inside. Comments, and blank lines above others, are irregular.
 
     Parameters
     ----------
     delimiter
-        The code of the character between cells (ASCII).
+        Code of the character between cells (ASCII).
     numeric
         For each column, whether its cells are numbers.
     """
 
     def __new__(cls, delimiter: int, numeric: Sequence[bool]) -> TableReader: ...
     def add(self, lines: bytes) -> bool:
-        """Append whole lines. Return False if a line is irregular; the reader then has no columns."""
+        """Append whole lines. Return False if a line is irregular; the reader is then empty."""
 
     def columns(self) -> list[_Floats | tuple[bytes, _Indices, bool]]:
         """Return the columns and empty the reader.
 
         Returns
         -------
-        Numbers, NaN for empty cells. Of names: each name once in the order of the rows, with a line feed
-        behind it; the number of the name of each row; whether it is known that no name is empty or NaN, and
-        that all differ by more than blanks and case.
+        For numbers, an array with NaN for empty cells. For names: the unique names in order of appearance,
+        each followed by a line feed; the index of the name of each row; whether it is known that no name is
+        empty or NaN, and that all differ by more than blanks and case.
         """
 
 def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]) -> bytes:
-    """Return the rows of a table as text of commas (UTF-8), a line each.
+    """Return the rows of a table as comma-separated text (UTF-8), one line each.
 
-    Numbers have the shortest digits that read back to the last bit, NaN and None are empty cells, truth
-    values are `true` and `false`; texts stand in quotation marks where commas, semicolons, bars, tabs,
-    hashes, quotation marks, line ends or blanks about them would be taken for something else. Line ends
-    become blanks.
+    Numbers have the shortest digits that are read back exactly. NaN and None are empty cells, Booleans are
+    `true` and `false`. Texts with commas, semicolons, bars, tabs, hashes, quotation marks, line ends or
+    surrounding blanks are in quotation marks if necessary. Line ends become blanks.
 
     Parameters
     ----------
     columns
-        Of one length.
+        Columns of equal length.
 
     Raises
     ------
     ValueError
-        Columns that differ in length.
+        If columns differ in length.
     """
 
 _ControlColumns = dict[str, Any]
@@ -2698,28 +2679,27 @@ def control_header(
     Parameters
     ----------
     data
-        The file.
+        Content of the file.
     start, stop
-        Where the header stands in it.
+        Position of the header in the content.
     file
-        Its name, for errors.
+        File name, for errors.
 
     Returns
     -------
-    Network, target, created, modified, description and user, None where they are not said; the number of
-    points, if said; version 2: the lengths of the points' messages; radii in metres; fields that nobody
-    knows, byte for byte.
+    Network, target, created, modified, description and user, None if unspecified; the number of points, if
+    specified; version 2: the lengths of the point messages; radii in metres; unknown fields, unchanged bytes.
 
     Raises
     ------
     InputError
-        The header is damaged.
+        If the header is damaged.
     """
 
 def control_header_message(
     texts: Sequence[str | None], points: int, radii: Sequence[float], rest: bytes
 ) -> bytes:
-    """Write the header of a binary control network of version 5: what :func:`control_header` returns."""
+    """Write the header of a binary control network of version 5, from :func:`control_header`."""
 
 def control_points(
     data: bytes, start: int, stop: int, lengths: Sequence[int] | None, file: Path | None
@@ -2729,25 +2709,25 @@ def control_points(
     Parameters
     ----------
     data
-        The file.
+        Content of the file.
     start, stop
-        Where the points stand in it.
+        Position of the points in the content.
     lengths
-        The lengths of their messages; None where each stands before its message.
+        Lengths of the messages; None if each precedes its message.
     file
-        Its name, for errors.
+        File name, for errors.
 
     Returns
     -------
-    Columns of points, columns of measures, the first measure of each point and the number of all (n + 1).
-    Columns are arrays by their names, `ids` a list of texts, `serial` indices and the texts that they mean; a
-    column in which nothing stands is left out. `rest` holds what has no column: fields of messages, byte for
-    byte, and where those of each row begin.
+    Columns of points, columns of measures, the first measure of each point and the number of measures (n +
+    1). Columns are arrays by name, `ids` a list of texts, `serial` indices and texts. Empty columns are
+    omitted. `rest` contains fields without a column: unchanged bytes of messages, and the first byte of each
+    row.
 
     Raises
     ------
     InputError
-        The points are damaged; it has the number of the point, from 1, as its record.
+        If the points are damaged; the record is the number of the point, from 1.
     """
 
 def control_points_of_text(
@@ -2757,61 +2737,61 @@ def control_points_of_text(
 
     Returns
     -------
-    What :func:`control_points` returns, and the text without its points, on the same lines.
+    The result of :func:`control_points`, and the text without its points, with unchanged line numbers.
 
     Raises
     ------
     InputError
-        The text is no control network; it has the number of the line, from 1, as its record.
+        If the text is not a control network; the record is the number of the line, from 1.
     """
 
 def control_point_messages(points: _ControlColumns, measures: _ControlColumns, firsts: _Indices) -> bytes:
-    """Write points as messages of version 5, each behind its length: what :func:`control_points` returns.
+    """Write points of :func:`control_points` as messages of version 5 with lengths.
 
     Raises
     ------
     InputError
-        Columns that do not agree, or something kept that only text can hold.
+        If columns are inconsistent, or contain data that only text can represent.
     """
 
 def control_point_text(points: _ControlColumns, measures: _ControlColumns, firsts: _Indices) -> bytes:
-    """Write points as text, as it stands in the object of their network: what :func:`control_points` returns.
+    """Write points of :func:`control_points` as text, as in the object of their network.
 
     Raises
     ------
     InputError
-        Columns that do not agree, or something kept that only messages can hold.
+        If columns are inconsistent, or contain data that only messages can represent.
     """
 
 UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]
-"""Types of common unknowns: name, and for each unknown its name and whether it is a `length`, a `speed`, an
+"""Types of shared unknowns: name, and for each unknown its name and whether it is a `length`, a `speed`, an
 `angle` or a `ratio`."""
 
 CAMERAS: list[str]
-"""What the models of cameras are called."""
+"""Names of the camera models."""
 
 def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -> _Floats:
-    """Image coordinates of points, row by row: point i on the photo of row i.
+    """Project points into photos row by row: point i into photo i.
 
     Parameters
     ----------
     camera
-        The model, one of `CAMERAS`; `docs/cameras.md` has their formulas.
+        Camera model, one of `CAMERAS`; `docs/cameras.md` contains the formulas.
     photo_parameters
         (n, 6 + k) angle-axis vector w (rad) and t, so that P = R(w) X + t in the photo's axes (x right, y up,
         looking along -z), then the k parameters of the camera.
     points
-        (n, 3) X.
+        (n, 3) object points X.
 
     Returns
     -------
-    (n, 2) in the unit of the camera; not finite in the plane of the projection centre. A point behind the
-    camera has the image that the formula gives.
+    (n, 2) in the unit of the camera; not finite in the plane of the projection centre. The formula also
+    applies to points behind the camera.
 
     Raises
     ------
     ValueError
-        An argument of another shape, length or choice; the message names it.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 def collection_network(
@@ -2832,46 +2812,46 @@ def collection_network(
     ordering: str,
     memory: int | None,
 ) -> CollectionNetwork:
-    """Return a collection of photos as it is adjusted by Levenberg-Marquardt steps.
+    """Create a collection for adjustment by Levenberg-Marquardt steps.
 
     Parameters
     ----------
     camera
-        The model of the cameras, one of `CAMERAS`.
+        Camera model, one of `CAMERAS`.
     photo_parameters, photo_sd
-        (P, 6 + k) initial (and, where weighted, observed) parameters and their standard deviations, infinite
-        for free ones, zero for fixed ones; see :func:`collection_images`.
+        (P, 6 + k) initial (and, if weighted, observed) parameters and their standard deviations: infinite for
+        free ones, zero for fixed ones; see :func:`collection_images`.
     point_positions, point_sd
-        (n, 3) likewise.
+        (n, 3) initial positions and standard deviations, in the same way.
     image_photos, image_points
         (m,) indices.
     image_xy, image_sd
         (m, 2) pixels.
     decrease
-        Until a step lowers the weighted sum of squares by less than this fraction of it.
+        Convergence limit: relative decrease of the weighted sum of squares by a step.
     max_iterations
-        Iterations at the most.
+        Maximum number of iterations.
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
     loss
-        Robust loss of the image points, `huber` or `cauchy`, and its scale in standard deviations a priori.
+        Robust loss of the image points, `huber` or `cauchy`, and its scale in a-priori standard deviations.
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     memory
-        Bytes that the adjustment may take; None for any number.
+        Maximum bytes of the adjustment; None: unlimited.
 
     Raises
     ------
     ValueError
-        An argument of another shape, length or choice; the message names it.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class CollectionNetwork:
-    """A collection with the options of its adjustment; arguments as of :class:`BlockNetwork`.
+    """Collection with the options of its adjustment; arguments as in :class:`BlockNetwork`.
 
-    Its methods raise CollectionError for a collection that cannot be adjusted, and ValueError for images that
-    name photos or points that are not there.
+    Methods raise CollectionError for a collection that cannot be adjusted, and ValueError for images with
+    invalid photo or point indices.
     """
 
     def adjust(
@@ -2881,7 +2861,7 @@ class CollectionNetwork:
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         start: BlockState | None = None,
     ) -> CollectionSolution:
-        """Adjust it, perhaps from where an adjustment of it with other weights has ended."""
+        """Adjust the collection, optionally from a former state with other weights."""
 
     def covariances(
         self,
@@ -2890,47 +2870,47 @@ class CollectionNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> BlockCovariances:
-        """Factor the normal equations where the adjustment has ended."""
+        """Factor the normal equations at the adjusted state."""
 
     def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
+        """Prepare trials without some observations, from an adjusted state or from the start."""
 
 @final
 class CollectionSolution(_NetworkSolution):
-    """An adjusted collection; k is 6 plus the number of parameters of a camera."""
+    """Adjusted collection; k is 6 plus the number of parameters of a camera."""
 
     @property
     def photo_parameters(self) -> _Floats:
-        """(P, k) as they were given, adjusted."""
+        """(P, k) adjusted parameters, as in the input."""
 
     @property
     def photo_images(self) -> _Indices:
-        """(P,) number of images that took part."""
+        """(P,) number of used images."""
 
     @property
     def point_rays_behind(self) -> _Indices:
-        """(n,) number of images that have the point behind the camera."""
+        """(n,) number of images with the point behind the camera."""
 
     @property
     def collapsed(self) -> list[int]:
-        """Indices of the points that ran into a station and were left out."""
+        """Indices of the points that converged to a station and were excluded."""
 
     @property
     def beside_stations(self) -> list[int]:
-        """Indices of the points that are held beside a station and were left out."""
+        """Indices of the points that are fixed close to a station and were excluded."""
 
     @property
     def not_determined(self) -> list[int]:
-        """Indices of the points that were left out because their rays do not determine them."""
+        """Indices of the points that were excluded because their rays do not determine them."""
 
     @property
     def sum_of_squares(self) -> float:
-        """Weighted sum of squares, weights as the loss has changed them."""
+        """Weighted sum of squares, with weights modified by the loss."""
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Observations and weighted unknowns less unknowns."""
+        """Observations and weighted unknowns minus unknowns."""
 
     @property
     def datum(self) -> list[tuple[int, int]]:
-        """Photos and parameters held to give a datum; empty where observations and weights give one."""
+        """Photos and parameters fixed to define a datum; empty if observations and weights define one."""
