@@ -1,8 +1,8 @@
 """Whether a green verdict means checked: python benches/verdicts.py [--blocks N] [--seed N] [--clean].
 
 Blocks with one practical mistake each are adjusted, and the verdict is compared with the truth: a result is
-wrong if the mistake has moved two other points by more than 5 standard deviations. No block may be accepted without
-reserve then. The blocks come from the generator below, which uses numpy only and not the simulator of the
+wrong if the mistake has moved two other points by more than 5 standard deviations. No block may be accepted
+without reserve then. The blocks come from the generator below, which uses numpy only and not the simulator of the
 package; the same noise is adjusted with and without the mistake, so that the difference is the mistake's.
 """
 

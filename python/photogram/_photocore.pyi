@@ -1,7 +1,7 @@
-"""The numerical core, compiled. Private: use it through the modules of `photogram`.
+"""Compiled numerical core. Private: use it through the modules of `photogram`.
 
-Arrays are float64. Angles are radians, image coordinates millimetres, lengths the linear unit of the object
-space. All functions release the GIL.
+Arrays are float64. Unless specified otherwise, angles are in radians, image coordinates in millimetres and
+lengths in the linear unit of the object space. All functions release the GIL.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,25 +29,25 @@ IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
 CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], list[str]]
-"""Photos; cameras shared by several of them; common unknowns; cameras with notable parameters; notable
-components of poses: positions `along` and `across` the view, `tilt`, `swing` about the view."""
+"""Photos; shared cameras; shared unknowns; cameras with significant parameters; significant components of
+poses: positions `along` and `across` the view, `tilt`, `swing` about the view."""
 
 FailureRow = tuple[str, str, list[CombinationRow], list[int], list[float]]
-"""The reason why a network cannot be adjusted, as in :class:`BlockError`."""
+"""Why a network cannot be adjusted, as in :class:`BlockError`."""
 
 CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
-"""Adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the
-normal equations (k), photos, image observations."""
+"""Adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the normal
+equations (k), number of photos, number of images."""
 
 ContributionRow = tuple[_Floats, _Floats, _Floats]
-"""Contribution of a node to the one above: matrix, right-hand side, diagonal; see :class:`FormedNode`."""
+"""Contribution of a node to its parent: matrix, right-hand side, diagonal; see :class:`FormedNode`."""
 
 _DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
-"""Datum: name, points, photos, whether scale counts, photos whose attitudes count, radius."""
+"""Datum: its name, points, photos, use of scale, photos whose attitudes count, radius."""
 
 RefractionRow = tuple[str | None, str | None, float, float, float]
 """Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
-(linear unit), refractive index of the water, metres in the linear unit."""
+(linear unit), refractive index of the water, metres per linear unit."""
 
 FlownRow = tuple[
     _Floats, _Floats, _Floats, _Floats, list[tuple[int, list[float]]], list[tuple[int, list[float]]]
@@ -55,7 +55,7 @@ FlownRow = tuple[
 """Result of `flown`."""
 
 class TrajectoryRow(TypedDict):
-    """A trajectory for the core; coefficients are indices among the common unknowns."""
+    """Trajectory in the format of the core; coefficients are indices of shared unknowns."""
 
     times: list[float]
     positions: _Floats
@@ -73,16 +73,16 @@ class TrajectoryRow(TypedDict):
 __version__: str
 
 def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
-    """Return the probability that a chi-square variable exceeds `x`, or is less than `x`.
+    """Return the probability that a chi-square variable exceeds `x`, or is less than it.
 
     Parameters
     ----------
     x
-        Not negative.
+        Value of the variable, not negative.
     dof
         Degrees of freedom, positive, not necessarily whole.
     upper
-        True for the probability of larger values, False for smaller ones.
+        Whether to return the probability of larger values, or else of smaller ones.
 
     Returns
     -------
@@ -90,16 +90,16 @@ def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
     """
 
 def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -> float:
-    """Return the value that a chi-square variable exceeds (`upper`), or not, with a probability.
+    """Return the value that a chi-square variable exceeds (`upper`) with a probability.
 
     Parameters
     ----------
     probability
-        Between 0 and 1; accurate for small values on both sides.
+        Between 0 and 1; small values on either side retain their precision.
     dof
         Degrees of freedom, positive, not necessarily whole.
     upper
-        True for the upper tail, False for the lower tail.
+        Whether it is the probability of larger values.
 
     Returns
     -------
@@ -107,10 +107,10 @@ def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -
     """
 
 def normal(z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (n,) probabilities that a normal variable is below values."""
+    """Return (n,) the probabilities that a normal variable is less than each value."""
 
 def student(t: float, dof: float) -> float:
-    """Return the probability that the absolute value of Student's variable exceeds `abs(t)`.
+    """Return the probability that the absolute value of Student's variable exceeds `t`.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def student_limit(probability: float, dof: float) -> float:
     """
 
 def fisher(x: float, first: float, second: float) -> float:
-    """Return the probability that Fisher's variable of `first` and `second` degrees of freedom exceeds `x`.
+    """Return the probability that an F variable of two degrees of freedom exceeds `x`.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def fisher(x: float, first: float, second: float) -> float:
     """
 
 def fisher_limit(probability: float, first: float, second: float) -> float:
-    """Return the value that Fisher's variable of two degrees of freedom exceeds with a probability.
+    """Return the value that an F variable of two degrees of freedom exceeds with a probability.
 
     Returns
     -------
@@ -142,33 +142,35 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     """
 
 def log_chi_square(x: _Floats, dof: _Floats) -> _Floats:
-    """Return logarithms of the probabilities that chi-square variables exceed values.
+    """Return the logarithms of the probabilities that chi-square variables exceed values.
 
     Parameters
     ----------
     x
-        (n,) not negative.
+        (n,) values, not negative.
     dof
         (n,) degrees of freedom, positive.
 
     Returns
     -------
-    (n,) natural logarithms, also if the probability underflows; NaN for arguments outside these ranges.
+    (n,) natural logarithms, also for probabilities below the smallest number; NaN for arguments outside these
+    ranges.
     """
 
 def log_fisher(x: _Floats, first: _Floats, second: _Floats) -> _Floats:
-    """Return logarithms of the probabilities that Fisher's variables exceed values.
+    """Return the logarithms of the probabilities that F variables exceed values.
 
     Parameters
     ----------
     x
-        (n,) not negative.
+        (n,) values, not negative.
     first, second
         (n,) degrees of freedom, positive.
 
     Returns
     -------
-    (n,) natural logarithms, also if the probability underflows; NaN for arguments outside these ranges.
+    (n,) natural logarithms, also for probabilities below the smallest number; NaN for arguments outside these
+    ranges.
     """
 
 def noncentral_chi_square(x: float, dof: float, noncentrality: float) -> float:
@@ -177,18 +179,18 @@ def noncentral_chi_square(x: float, dof: float, noncentrality: float) -> float:
 def noncentral_fisher(x: float, first: float, second: float, noncentrality: float) -> float:
     """Return the probability that a noncentral F variable exceeds `x`; NaN if invalid.
 
-    If `second` is infinite, this is the noncentral chi-square variable over `first`.
+    If `second` is infinite, the variable is noncentral chi-square divided by `first`.
     """
 
 def detectable_noncentrality(level: float, power: float, first: float, second: float) -> float:
-    """Return the noncentrality (Baarda's lambda0) at which a test is significant with a given probability.
+    """Return the noncentrality (Baarda's lambda0) at which a test has a given power.
 
     Parameters
     ----------
     level
-        Significance level of the test.
+        Significance level: probability of rejection if nothing is wrong.
     power
-        Probability of detecting the error; more than the level.
+        Probability of rejection if something is wrong; more than the level.
     first, second
         Degrees of freedom of the F test; of the chi-square test if `second` is infinite.
 
@@ -198,50 +200,50 @@ def detectable_noncentrality(level: float, power: float, first: float, second: f
     """
 
 def level_of_equal_power(noncentrality: float, power: float, dof: float) -> tuple[float, float]:
-    """Return level and critical value of the chi-square test with a given power for a noncentrality.
+    """Return level and critical value of the chi-square test with a given power.
 
-    With the same noncentrality for all tests, this is Baarda's B-method. NaN if invalid.
+    With the same noncentrality for all tests, this is the B-method of Baarda. NaN for invalid arguments.
     """
 
 def film_readings(
     numbers: _Floats, vectors: _Floats, places: _Floats
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return readings of positions in a camera's frame, and their partials.
+    """Return the readings of positions in the camera frame, with partial derivatives.
 
     Parameters
     ----------
     numbers
-        Fixed values of a film: mirrored, rows down, pitch, o1, o2, hx, hy; 0, 1 or 2 for nothing, h or g;
-        roll and curves; number and constants of its pattern.
+        Fixed properties of a film: mirrored, rows down, pitch, o1, o2, hx, hy; 0 (none), 1 (h) or 2 (g);
+        whether it has a roll and curves; number and numbers of its pattern.
     vectors
-        (k, 3) the numbers of its unknowns: placement, size, h or g, roll, scanner, curves, weights.
+        (k, 3) values of its unknowns: placement, size, h or g, roll, scanner, curves, weights.
     places
-        (n, 2) mm.
+        (n, 2) positions in mm.
 
     Returns
     -------
-    (n, 2) readings, and (n, 2, 10) partials by x, y, t1, t2, theta, m, b1, b2 and both of h or g; NaN without
-    reading of the scanner.
+    (n, 2) readings, and (n, 2, 10) partial derivatives by x, y, t1, t2, theta, m, b1, b2 and both of h or g.
+    NaN outside the range of the scanner.
     """
 
 def film_places(numbers: _Floats, vectors: _Floats, readings: _Floats) -> NDArray[np.float64]:
-    """Return (n, 2) positions in a camera's frame of readings (n, 2); NaN if undefined.
+    """Return (n, 2) positions in the camera frame of readings (n, 2); NaN if undefined.
 
-    `numbers` and `vectors` are the same as in :func:`film_readings`.
+    `numbers` and `vectors` as in :func:`film_readings`.
     """
 
 def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
-    """Return the models of cameras, `CAMERAS`, by their names.
+    """Return the properties of the camera models, `CAMERAS`, by name.
 
     Returns
     -------
-    For each model its formula, its parameters with the power of their image unit (0 for plain numbers), the
-    number of constants at their end, and its direction. Lens terms are functions of ideal coordinates
-    (`forward`) or of measured ones (`backward`).
+    For each model: its formula, its parameters with the power of the image unit (0 for dimensionless
+    numbers), the number of constants, which are the last parameters and always fixed, and its direction. Lens
+    terms are functions of ideal coordinates (`forward`) or of measured ones (`backward`).
     """
 
 def camera_images(model: str, parameters: _Floats, u: _Floats, knots: _Floats | None = None) -> _Floats:
-    """Return image coordinates of directions.
+    """Project directions into the image.
 
     Parameters
     ----------
@@ -252,7 +254,7 @@ def camera_images(model: str, parameters: _Floats, u: _Floats, knots: _Floats | 
     u
         (n, 3) in the axes of the photo: x right, y up, z back towards the viewer; the camera looks along -z.
     knots
-        Values dx, dy at the knots of a splined model, row by row, of any shape; None for zeros.
+        For a splined model: dx, dy of each knot, row by row, in any shape; None for zeros.
 
     Returns
     -------
@@ -261,73 +263,74 @@ def camera_images(model: str, parameters: _Floats, u: _Floats, knots: _Floats | 
     Raises
     ------
     ValueError
-        If the model is unknown, or a shape or the number of parameters differs.
+        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_rays(model: str, parameters: _Floats, xy: _Floats, knots: _Floats | None = None) -> _Floats:
-    """Return directions of image positions; arguments as in :func:`camera_images`.
+    """Compute the directions of image positions; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, 3) unit vectors in the axes of the photo, in front of it; NaN if undefined.
+    (n, 3) unit vectors in the axes of the photo, in front of it; NaN if no direction has the image.
 
     Raises
     ------
     ValueError
-        If the model is unknown, or a shape or the number of parameters differs.
+        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
-    """Return corrected image positions of a backward camera; arguments as in :func:`camera_images`.
+    """Correct image positions by a backward camera; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, 2) g, compared with c (u1, u2) / u3.
+    (n, 2) g, to compare with c (u1, u2) / u3.
 
     Raises
     ------
     ValueError
-        If the model is unknown or forward, or a shape or the number of parameters differs.
+        If the model does not exist or is forward, or a shape or number of parameters is wrong.
     """
 
 def camera_partials(
     model: str, parameters: _Floats, u: _Floats, knots: _Floats | None = None
 ) -> tuple[_Floats, _Floats, _Floats]:
-    """Return image coordinates of directions with partials; arguments as in :func:`camera_images`.
+    """Project directions with partial derivatives; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, 2) image coordinates, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for constants of a
-    lens; not finite if undefined. Values of a backward camera refer to the measured position corresponding to
-    u.
+    (n, 2) images, (n, 2, 3) partial derivatives by u, (n, 2, k) by the parameters, 0 for constants of a lens;
+    not finite if undefined. For a backward camera, derivatives refer to the measured position that
+    corresponds to u.
 
     Raises
     ------
     ValueError
-        If the model is unknown, or a shape or the number of parameters differs.
+        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_patches(model: str, parameters: _Floats, u: _Floats) -> tuple[_Indices, _Floats]:
-    """Return the knots that affect image coordinates; arguments as in :func:`camera_images`.
+    """Return the knots that affect images; arguments as in :func:`camera_images`.
 
     Returns
     -------
-    (n, s) numbers of knots, row by row, and (n, s) their weights, s = 16 of order 3, 9 of order 2: partials
-    of the image by a knot are diag(fx, fy) times its weight.
+    (n, s) numbers of knots, row by row, and (n, s) weights; s = 16 for order 3, 9 for order 2. The derivative
+    of an image by a knot is diag(fx, fy) times its weight.
 
     Raises
     ------
     ValueError
-        If the model lacks knots, constants are invalid, or a shape or the number of parameters differs.
+        If the model does not support knots, constants of the spline are invalid, or a shape or number of
+        parameters is wrong.
     """
 
 def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
-    """Return the radius up to which the radial part of a lens is one-to-one, and its image.
+    """Return the radius up to which a lens is radially one-to-one, and its image there.
 
-    For a forward camera the radius is the tangent of the angle from the axis, for a fisheye the angle (rad).
-    Its image is multiplied by the focal length; `brown_forward` has lengths in the image. For a backward
-    camera they are the distances of the measured and the corrected position from the principal point.
-    Infinite if only the image format is a limit.
+    For a forward camera, the radius is the tangent of the angle from the axis, for a fisheye the angle (rad).
+    It is mapped to the value that is multiplied by the focal length; `brown_forward` has lengths in the
+    image. For a backward camera, both are distances from the principal point: of the measured and of the
+    corrected position. Infinite if only the image ends.
 
     Returns
     -------
@@ -336,13 +339,13 @@ def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None
     Raises
     ------
     ValueError
-        If the model is unknown, or the number of parameters differs.
+        If the model does not exist, or the number of parameters is wrong.
     """
 
 def attitudes_from_numbers(
     representation: str, numbers: _Floats, boresight: _Floats
 ) -> tuple[_Floats, _Floats]:
-    """Return attitudes from numbers (`docs/conventions.md`).
+    """Convert numbers to attitudes (`docs/conventions.md`).
 
     Parameters
     ----------
@@ -351,25 +354,25 @@ def attitudes_from_numbers(
         "yaw_pitch_roll", "rotation_vector", "rotation_vector_to_photo", "rotation_vector_to_vision",
         "quaternion" or "quaternion_to_vision".
     numbers
-        (n, 3), angles in radians; of quaternions (n, 4), w, x, y, z of any length but zero.
+        (n, 3), angles in radians; quaternions (n, 4), w, x, y, z of any length except zero.
     boresight
-        (3, 3), photo axes from body axes; of yaw, pitch, roll.
+        (3, 3), photo axes from body axes; for yaw, pitch, roll.
 
     Returns
     -------
-    (n, 3, 3) matrices A, photo to object; and K, (n, 3, k), the partials of the rotation step rho by the
-    numbers: A steps by Exp(rho), about the photo's own axes.
+    (n, 3, 3) matrices A, photo to object; and K, (n, 3, k), the partial derivatives of the rotation step rho
+    by the numbers. A step multiplies A by Exp(rho), about the photo's own axes.
 
     Raises
     ------
     ValueError
-        If a shape or the representation is invalid; the message names the argument.
+        If a shape or the representation is wrong; the message names the argument.
     """
 
 def numbers_of_attitudes(
     representation: str, attitudes: _Floats, boresight: _Floats
 ) -> tuple[_Floats, _Floats]:
-    """Return numbers of attitudes, the inverse of `attitudes_from_numbers`.
+    """Convert attitudes to numbers, the inverse of `attitudes_from_numbers`.
 
     Parameters
     ----------
@@ -380,26 +383,26 @@ def numbers_of_attitudes(
 
     Returns
     -------
-    (n, k) numbers, and their partials by the rotation step, (n, k, 3); NaN if two angles rotate about the
-    same axis, with one of them set to zero.
+    (n, k) numbers, and their partial derivatives by the rotation step, (n, k, 3). If two rotation axes
+    coincide, derivatives are NaN and one of the angles is zero.
 
     Raises
     ------
     ValueError
-        If a shape or the representation is invalid; the message names the argument.
+        If a shape or the representation is wrong; the message names the argument.
     """
 
 def nadir_boresight(quarters: int) -> _Floats:
-    """Return photo axes from body axes, (3, 3), of a camera that looks at the nadir.
+    """Return photo axes from body axes, (3, 3), of a nadir camera.
 
     Parameters
     ----------
     quarters
-        Quarter turns of the top of the image from forward to the right wing: 0 to 3.
+        Direction of the top of the image, in quarter circles from forward to the right wing: 0 to 3.
     """
 
 def rotation_matrix(angles: _Floats) -> _Floats:
-    """Return rotation matrices M = M_kappa M_phi M_omega.
+    """Compute rotation matrices M = M_kappa M_phi M_omega.
 
     Parameters
     ----------
@@ -413,11 +416,11 @@ def rotation_matrix(angles: _Floats) -> _Floats:
     Raises
     ------
     ValueError
-        If a shape differs; the message names the argument and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def rotation_angles(matrices: _Floats) -> _Floats:
-    """Return angles omega, phi, kappa of rotation matrices, the inverse of `rotation_matrix`.
+    """Compute omega, phi, kappa of rotation matrices, the inverse of `rotation_matrix`.
 
     Parameters
     ----------
@@ -426,17 +429,17 @@ def rotation_angles(matrices: _Floats) -> _Floats:
 
     Returns
     -------
-    (n, 3) omega and kappa in [-pi, pi], phi in [-pi/2, pi/2], radians. If phi is +-pi/2 only omega + kappa or
-    omega - kappa is determined; the returned angles are one solution.
+    (n, 3) omega and kappa in [-pi, pi], phi in [-pi/2, pi/2], radians. If phi is +-pi/2, only omega + kappa
+    or omega - kappa is determined; the returned angles reproduce the matrix.
 
     Raises
     ------
     ValueError
-        If a shape differs; the message names the argument and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def vector_rotations(vectors: _Floats) -> _Floats:
-    """Return rotation matrices of (n, 3) rotation vectors: axis times angle, radians (Rodrigues).
+    """Convert (n, 3) rotation vectors to matrices: axis times angle, radians (Rodrigues).
 
     Returns
     -------
@@ -445,11 +448,11 @@ def vector_rotations(vectors: _Floats) -> _Floats:
     Raises
     ------
     ValueError
-        If a shape differs; the message names the argument and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def rotation_vectors(matrices: _Floats) -> _Floats:
-    """Return rotation vectors of (n, 3, 3) rotation matrices, the inverse of `vector_rotations`.
+    """Convert (n, 3, 3) rotation matrices to vectors, the inverse of `vector_rotations`.
 
     Returns
     -------
@@ -458,11 +461,11 @@ def rotation_vectors(matrices: _Floats) -> _Floats:
     Raises
     ------
     ValueError
-        If a shape differs; the message names the argument and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
-    """Return geocentric X, Y, Z of geographic positions.
+    """Convert geographic positions to geocentric X, Y, Z.
 
     Parameters
     ----------
@@ -479,11 +482,11 @@ def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
     Raises
     ------
     ValueError
-        If a shape differs (the message names the argument and its shape), or the semi-axes are invalid.
+        If a shape is wrong (the message names the argument) or the axes are invalid.
     """
 
 def geocentric_to_geographic(xyz: _Floats, a: float, b: float) -> _Floats:
-    """Return geographic positions of geocentric X, Y, Z, the inverse of `geographic_to_geocentric`.
+    """Convert geocentric X, Y, Z to geographic positions.
 
     Parameters
     ----------
@@ -495,12 +498,12 @@ def geocentric_to_geographic(xyz: _Floats, a: float, b: float) -> _Floats:
     Returns
     -------
     (n, 3) longitude (rad, in [-pi, pi], 0 on the axis), latitude (rad), height (linear unit of the axes),
-    accurate to rounding.
+    accurate to the rounding of the coordinates.
 
     Raises
     ------
     ValueError
-        If a shape differs (the message names the argument and its shape), or the semi-axes are invalid.
+        If a shape is wrong (the message names the argument) or the axes are invalid.
     """
 
 def project(
@@ -513,18 +516,18 @@ def project(
     photo_to_ground: bool,
     refraction: RefractionRow | None,
 ) -> _Floats:
-    """Return image coordinates of points, row by row: point i on the photo of row i.
+    """Project points into photos row by row: point i into photo i.
 
-    x = c u1/u3, y = c u2/u3 with u = M d (ground-to-photo) or M^T d (photo-to-ground); d is the vector from
-    the projection centre to the point. It is in object space axes if rectangular, in the local vertical frame
-    of the station (east, north, up) if geographic.
+    x = c u1/u3, y = c u2/u3 with u = M d (ground-to-photo) or M^T d (photo-to-ground). d is the vector from
+    the projection centre to the point: in object space axes if rectangular, in the local vertical frame of
+    the station (east, north, up) if geographic.
 
     Parameters
     ----------
     points
         (n, 3) X, Y, Z, or longitude (rad), latitude (rad), height.
     positions
-        (n, 3) projection centres, likewise.
+        (n, 3) projection centres, in the same system.
     attitudes
         (n, 3) omega, phi, kappa in radians.
     principal_distances
@@ -532,7 +535,7 @@ def project(
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
-        The sense of the angles.
+        Direction of the angles.
     refraction
         Refraction model; None for straight rays.
 
@@ -543,8 +546,7 @@ def project(
     Raises
     ------
     ValueError
-        If a shape or length differs (the message names the argument and its shape), or the semi-axes or the
-        refraction are invalid.
+        If a shape or length is wrong (the message names the argument), or axes or refraction are invalid.
     """
 
 def refraction_shift(
@@ -554,7 +556,7 @@ def refraction_shift(
     spheroid: tuple[float, float] | None,
     refraction: RefractionRow,
 ) -> _Floats:
-    """Return vectors from points to their apparent positions, row by row.
+    """Compute the refraction displacement of points as seen by cameras, row by row.
 
     Parameters
     ----------
@@ -572,19 +574,18 @@ def refraction_shift(
     Raises
     ------
     ValueError
-        If a shape or length differs (the message names the argument and its shape), or the semi-axes or the
-        refraction are invalid.
+        If a shape or length is wrong (the message names the argument), or axes or refraction are invalid.
     """
 
 class BlockError(Exception):
-    """A block that cannot be adjusted.
+    """Block that cannot be adjusted.
 
-    `args` is (kind, message, combinations, points, seconds). Kind is `undetermined points`, `undetermined
-    photos`, `no intersection`, `coarse` (too large for double precision), `outside` (a time outside a
-    trajectory), `not finite`, `memory`, `empty` or `input`. Combinations contain the unknowns of undetermined
-    combinations; for `coarse` and `outside`, one with the affected photos. Points is a list of point indices;
-    for `outside` the point of the observation, empty for the photo itself. Seconds are, for `outside`, the
-    time and the first and last time of the trajectory, in its own scale.
+    `args` is (kind, message, combinations, points, seconds). kind is `undetermined points`, `undetermined
+    photos`, `no intersection`, `coarse` (too large for double precision), `outside` (a time beyond the reach
+    of a trajectory), `not finite`, `memory`, `empty` or `input`. combinations are undetermined combinations
+    of unknowns; for `coarse` and `outside`, the photos concerned, in one. points is a list of point indices;
+    for `outside` the point of the image, empty for the photo itself. seconds, for `outside`: the time and the
+    reach of the trajectory, relative to its origin.
     """
 
 def find_first_values(
@@ -601,64 +602,64 @@ def find_first_values(
     *,
     threads: int,
 ) -> FoundRow:
-    """Compute initial poses of photos in cartesian object space (`docs/first-values.md`).
+    """Compute poses of photos from known data, in cartesian object space (`docs/first-values.md`).
 
     Parameters
     ----------
     photo_positions, photo_attitudes
         (P, 3) and (P, 3, 3), photo to object: given poses; NaN if unknown.
     observed_positions, observed_attitudes
-        Observed poses; NaN if not observed.
+        (P, 3) and (P, 3, 3) observed poses; NaN if not observed.
     point_positions, point_sd
-        (n, 3) control in the linear unit, and its standard deviations; infinite for free components.
+        (n, 3) control in the linear unit, and its standard deviations; infinite for free coordinates.
     image_photos, image_points
         (m,) indices into photos and points.
     directions, direction_sd
         (m, 3) unit directions in the axes of the photos, not finite if undefined, and (m,) their standard
         deviations in radians.
     threads
-        As for `block_network`.
+        As in `block_network`.
 
     Returns
     -------
-    (P, 3) positions and (P, 3, 3) attitudes, NaN if not computed; for each photo (`given`, `resected`,
-    `observed` or `oriented`, 0, 0), or the reason of failure: (`points`, known points, 0), (`misfit`, known
-    points, 0) or (`apart`, common points of its model, photos of the model); (n, 3) positions of points; (m,)
-    rejected observations; (n,) control points whose observations agree with each other but not with its
-    coordinates; the photo that defines the datum, if nothing else does; the median angle between observed and
-    computed directions, radians.
+    (P, 3) positions and (P, 3, 3) attitudes, NaN if not found. For each photo (`given`, `resected`,
+    `observed` or `oriented`, 0, 0), or the reason: (`points`, known points, 0), (`misfit`, known points, 0)
+    or (`apart`, objects that its model shares with known data, photos of the model). (n, 3) positions of
+    points. (m,) whether an image was rejected. (n,) whether the images of a control point agree with each
+    other but not with its coordinates. The photo that defines the datum, if nothing else does. The median
+    angle between observed and computed directions, radians.
 
     Raises
     ------
     ValueError
-        If a shape or length differs, or an index is out of range; the message names the argument.
+        If a shape, length or index is wrong; the message names the argument.
     """
 
 def trajectory_span(trajectory: TrajectoryRow) -> tuple[float, float]:
-    """Return the first and the last valid time of a trajectory, in its own scale."""
+    """Return the first and the last defined time of a trajectory, relative to its origin."""
 
 def flown(trajectory: TrajectoryRow, position: _Floats, rotation: _Floats, times: list[float]) -> FlownRow:
-    """Return a trajectory at n times (docs/moving.md).
+    """Evaluate a trajectory at n times (docs/moving.md).
 
     Parameters
     ----------
     trajectory
-        As in :func:`block_network`; the indices of its coefficients are not used.
+        As in :func:`block_network`; indices of coefficients are ignored.
     position, rotation
         (K, 3) coefficients of positions, and of rotations in radians.
     times
-        Seconds, in the time scale of the trajectory.
+        Seconds, relative to the origin of the trajectory.
 
     Returns
     -------
-    (n, 3) positions; (n, 9) attitudes, axes of the coefficients of positions, and right Jacobians of the
-    corrections r, row by row; for each time the number of the first nonzero function of positions and the
-    values from this one, and the same for rotations.
+    (n, 3) positions; (n, 9) attitudes, axes of the position coefficients, and right Jacobians of the
+    corrections r, row by row. For each time, the index of the first nonzero basis function of positions and
+    the values from there on; the same for rotations.
 
     Raises
     ------
     InputError
-        If times do not increase, or the numbers of coefficients and functions differ.
+        If times do not increase, or the number of coefficients is wrong.
     """
 
 def block_network(
@@ -699,7 +700,7 @@ def block_network(
     memory: int | None,
     points_given: bool,
 ) -> BlockNetwork:
-    """Return a block for adjustment by least squares (GIANT guide, sections 4 to 9).
+    """Create a block for adjustment by least squares (GIANT guide, sections 4 to 9).
 
     Standard deviations are infinite for free unknowns, zero for fixed ones. Positions are X, Y, Z, or
     longitude (rad), latitude (rad), height if a spheroid is given.
@@ -709,103 +710,101 @@ def block_network(
     photo_positions, photo_attitudes
         (P, 3) initial values, which fixed components retain; omega, phi, kappa in radians.
     photo_positions_observed, photo_attitudes_observed
-        (P, 3) observed values of weighted components; angles may differ from initial ones by multiples of 2
-        pi.
+        (P, 3) observed values of weighted components; angles may differ from initial ones by full circles.
     photo_position_sd, photo_attitude_sd
         (P, 3) standard deviations of the observed values.
     photo_cameras
-        (P,) indices into the cameras; photos with the same one share its unknowns.
+        (P,) camera indices; photos of one camera share its unknowns.
     cameras
-        Model, parameters in its order, standard deviations, covariance matrix of the weighted ones row by
-        row, None if uncorrelated; knots, or None.
+        Model, parameters in the order of the model and their standard deviations; covariance matrix of the
+        weighted parameters row by row, None if uncorrelated; knots, None if absent.
     point_positions, point_sd
-        (n, 3) coordinates, NaN if unknown, and standard deviations, finite for weighted or fixed components.
+        (n, 3) coordinates, NaN if unknown, and standard deviations, finite for control.
     image_photos, image_points
         (m,) indices.
     image_xy, image_sd
         (m, 2) millimetres.
     observation_groups
-        Additional observations, each type with its name, (k, p) indices of points, (k, q) of photos and (k,
-        c) of common unknowns (-1 for none), (k, v) values and (k, r, r) covariance matrices of its r
-        components. Values: `distance` the length (unknown: instrument), `equal height` the difference,
-        `difference` three components (NaN if not observed), `control` three coordinates, `on level` the
-        height above it, `on plane` the distance from it, `on plumb line` and `on line` none, `position` three
-        coordinates, the known lever arm and the time (unknowns: lever arm, shift, drift), `attitude` two
-        matrices row by row (body to object; body to photo if known; unknown: boresight), `relative` a
-        translation and a matrix, `base` the length (two sensors, -1 for the frame), `prior` none, `velocity`
-        three components and the known lever arm (unknown: lever arm), `rate` three components and the matrix
-        body to photo if known (unknowns: boresight, bias), `smoothness` three components and a factor for
-        each coefficient. Lengths in the unit of the object space, angles in radians, times in seconds.
+        Additional observations, by type: name, (k, p) indices of points, (k, q) of photos and (k, c) of
+        shared unknowns (-1 for none), (k, v) values and (k, r, r) covariance matrices of the r components.
+        Lengths are in the unit of the object space, angles in radians, times in seconds. Values:
+
+        `distance`: length (unknown: instrument); `equal height`: difference; `difference`: three components
+        (NaN if not observed); `control`: three coordinates; `on level`: height above it; `on plane`: distance
+        from it; `on plumb line` and `on line`: none; `position`: three coordinates, the known lever arm and
+        the time (unknowns: lever arm, shift, drift); `attitude`: two matrices row by row, body to object and
+        known body to photo (unknown: boresight); `relative`: translation and matrix; `base`: length (two
+        sensors, -1 for the frame); `prior`: none; `velocity`: three components and the known lever arm
+        (unknown: lever arm); `rate`: three components and the known matrix body to photo (unknowns:
+        boresight, bias); `smoothness`: three components and a factor for each coefficient.
     unknowns
-        Common unknowns: type (see `UNKNOWNS`), position, rotation matrix row by row, standard deviations.
+        Shared unknowns: type (see `UNKNOWNS`), position, rotation matrix row by row, standard deviations.
     mounts
-        Photos on frames: index of the photo, of the photo that represents the frame, and of the sensor among
-        the common unknowns.
+        Photos on frames: index of the photo, index of the representing photo of the frame, and index of the
+        sensor among the shared unknowns.
     trajectories
-        Prior trajectory, basis functions of its corrections, and the indices of their coefficients among the
-        common unknowns.
+        Prior table of each, basis of its corrections, and indices of its coefficients among the shared
+        unknowns.
     timed
-        Photos on trajectories: indices of photo and trajectory, the time of the photo there in seconds, and
-        the indices of the rate and of the offset of its times among the common unknowns.
+        Photos on trajectories: indices of photo and trajectory, time of the photo in seconds, and indices of
+        the rate and the offset of its times among the shared unknowns.
     image_times
-        (m,) factor of the rate for each observation; empty if all are 0.
+        (m,) factor of the rate in the time of each image; empty if all are 0.
     passages
-        Additional transforms of observations: kind, indices of common unknowns, indices of points, photos or
-        cameras, and numbers. `figure`: points displaced by w_1 e_1 + w_2 e_2; w is a `bend`, the numbers are
-        (e_1, e_2) of each point.
+        Image transformations in addition to pose, point and camera: type, indices of shared unknowns, indices
+        of points, photos or cameras, and numbers. `figure`: points displaced by w_1 e_1 + w_2 e_2; w is a
+        `bend`, the numbers are (e_1, e_2) of each point.
     records
-        Number of photos at the end that are records of trajectories, without observations, with the last
-        camera.
+        Number of photos at the end that are records of trajectories: without images, with the last camera.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
-        The sense of the angles.
+        Direction of the angles.
     refraction
-        Refraction model, applied in every iteration; None for corrected image coordinates.
+        Refraction model, applied in every iteration; None for image coordinates without refraction.
     criterion, limit
-        `fraction`: no unknown changes by more than `limit` of its standard deviation; `percent`: the sum of
+        `fraction`: no unknown changes by more than `limit` of its standard deviation. `percent`: the sum of
         squares changes by less than `limit` percent.
     max_iterations
         Maximum number of iterations.
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
     loss
-        Robust loss of the image points, `huber` or `cauchy`, and its scale in standard deviations a priori.
+        Robust loss of the image points, `huber` or `cauchy`, and its scale in a-priori standard deviations.
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E), or `redundancy`.
     minimum
-        Photo whose pose is fixed if nothing else defines the datum, and for the scale a photo and the number
-        of its coordinate; None: chosen by the core.
+        Photo whose pose is fixed if nothing else defines a datum, and for the scale a photo and the index of
+        its coordinate. None: selected by the core.
     memory
-        Limit of memory of the adjustment and of covariances, bytes; None for no limit.
+        Maximum bytes of the adjustment and of later covariances; None: unlimited.
     points_given
-        True to use known coordinates of points as initial values instead of intersections.
+        Whether points start from their coordinates, if known, instead of the intersection of their rays.
 
     Raises
     ------
     ValueError
-        If a shape, length or choice is invalid; the message names the argument.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class BlockNetwork:
-    """A block with the options of its adjustment.
+    """Block with the options of its adjustment.
 
-    A datum is (`inner`, points, photos, whether scale counts) for inner constraints. It is (`relative`, [],
-    [photo], False) or (`relative`, points, [], False) for cofactors relative to these. Parameters of all
-    methods:
+    A datum is (`inner`, points, photos, use of scale) for inner constraints, or (`relative`, [], [photo],
+    False) or (`relative`, points, [], False) for relative cofactors. Arguments of all methods:
 
     threads
-        Number of threads, at most four for each processor; 0: chosen by the core. Small work is done on the
-        calling thread, larger work on all processors.
+        Number of threads, at most four per processor. 0: small work uses the calling thread, larger work all
+        processors.
     progress
-        Called on the calling thread as (phase, points done, points in all, None), or ("iteration", number, 0,
-        row). Its exceptions stop the work and are propagated. Signals are processed at the same time, so that
-        Ctrl-C stops it as well.
+        Called on the calling thread as (phase, points done, all points, None), or ("iteration", number, 0,
+        row). An exception that it raises stops the work. Signals are checked at the same time, so that Ctrl-C
+        also stops it.
 
-    They raise BlockError if a block cannot be adjusted or transformed to a datum.
+    Methods raise BlockError for a block that cannot be adjusted or transformed to a datum.
     """
 
     def adjust(
@@ -817,12 +816,12 @@ class BlockNetwork:
         start: BlockState | None = None,
         keep: Sequence[int] | None = None,
     ) -> BlockSolution:
-        """Adjust the block; a free one may be transformed to the datum of inner constraints.
+        """Adjust the block; a free block may be transformed to inner constraints.
 
-        Without such a datum, it can be continued from the end of an adjustment, possibly with other weights.
-        Then the ordering of that adjustment is used, without the points that had collapsed to a station.
-        Without either, `keep` stores the data that tests need (see :meth:`trial`), and the joint cofactors of
-        these points (:meth:`BlockState.joint`).
+        Without such a datum, the adjustment may continue from a former `start`, also with other weights: in
+        the same order, and without points that converged to a station there. Without both, `keep` stores data
+        for tests in the state (see :meth:`trial`), and the joint cofactors of these points
+        (:meth:`BlockState.joint`).
         """
 
     def in_datum(
@@ -833,7 +832,7 @@ class BlockNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> BlockSolution:
-        """Transform an adjusted block to another datum: values, cofactors, redundancy; no iterations."""
+        """Transform an adjusted block to another datum, without iterations."""
 
     def covariances(
         self,
@@ -842,30 +841,30 @@ class BlockNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> BlockCovariances:
-        """Factor the normal equations at the end of the adjustment, in its datum."""
+        """Factor the normal equations at the adjusted state, in its datum."""
 
     def trial(self, state: BlockState | None, *, threads: int, kept: bool = False) -> NetworkTrial:
-        """Prepare trials without some observations, from the end of an adjustment or from the start.
+        """Prepare trials without some observations, from an adjusted state or from the start.
 
-        `kept` indicates that the state is of this network. At the first call, the stored data of its
-        adjustment are used without forming them again.
+        `kept` states that the state is of this network. The first trial then uses the data that its
+        adjustment stored, without a new formation.
         """
 
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
-        """Return the observation types that prevent a motion of the whole block.
+        """Return the observation types that prevent a similarity transformation of the block.
 
-        With each type, the largest part of the effect of a motion that remains if all unknowns adapt.
+        Each has the greatest part of its change by a transformation that remains if all unknowns change.
         """
 
     def held_for_datum(self, *, threads: int) -> list[tuple[int, int]]:
-        """Return the unknowns that an adjustment fixes if the datum is undefined; otherwise an empty list.
+        """Return unknowns that an adjustment fixes to define the datum; empty if not needed.
 
-        Photos, each with the number (0 to 5) of one of its unknowns.
+        Photos, each with the index (0 to 5) of one of its unknowns.
 
         Raises
         ------
         BlockError
-            As :meth:`adjust`, before its first iteration.
+            As in :meth:`adjust`, before its first iteration.
         """
 
     def parts_in_datum(
@@ -878,7 +877,7 @@ class BlockNetwork:
         values: _Floats,
         threads: int,
     ) -> tuple[_Floats, _Floats, _Floats, float, bool]:
-        """Transform a partitioned block to the datum of inner constraints (docs/distributed.md).
+        """Transform a partitioned block to inner constraints (docs/distributed.md).
 
         Parameters
         ----------
@@ -887,33 +886,33 @@ class BlockNetwork:
         held
             Result of :meth:`held_for_datum`.
         middle
-            The same as for all nodes.
+            Origin, as for all nodes.
         names
-            (3 N,) all unknowns of the block, possibly repeated if in several nodes. Rows are as in
-            :attr:`Node.unknown_names`, with indices into this block.
+            (3 N,) all unknowns of the block, possibly repeated: the rows of :attr:`Node.unknown_names`, with
+            indices into this block.
         values
-            (N,) their adjusted values.
+            (N,) adjusted values.
         threads
             As in :meth:`adjust`.
 
         Returns
         -------
         values
-            (N,) in the datum.
+            (N,) values in the datum.
         b, t
-            (d N,) the columns B, nonzero only for unknowns that define the datum, and T = G (B^T G)^-1.
+            (d N,) columns B, nonzero only for unknowns that define the datum, and T = G (B^T G)^-1,
+            concatenated.
         condition
             Condition number of B^T G with scaled columns.
         exact
-            Whether the number of datum unknowns does not exceed the number of columns, so that they do not
-            change.
+            Whether the datum is defined by as many unknowns as columns, so that these do not change.
 
         Raises
         ------
         BlockError
-            As :meth:`adjust` with a datum.
+            As in :meth:`adjust` with a datum.
         BlockInputError
-            If names do not contain all unknowns.
+            If the names are not the names of all unknowns.
         """
 
     def node(
@@ -925,26 +924,26 @@ class BlockNetwork:
         threads: int,
         held: list[tuple[int, int]] = ...,
     ) -> Node:
-        """Return the block as a node of the elimination tree of a larger one (Helmert blocking).
+        """Create a node of the elimination tree of a larger block (Helmert blocking).
 
-        The name of a block of unknowns is (`photo`, `camera`, `unknown` or `point`, index into the arrays of
-        this block). A camera is named if several photos of the larger block share it and it has free
-        parameters. A point is named if it has additional observations. Known cameras, and points with image
-        observations only, are never named.
+        Blocks of unknowns are named by their owners, (`photo`, `camera`, `unknown` or `point`, index into the
+        arrays of this block). A camera has a block if it has a free or weighted parameter and several photos
+        of the larger block. A point has one if an additional observation touches it. Fixed cameras, and other
+        points, are never named.
 
         Parameters
         ----------
         outer
-            The blocks that are eliminated above this node, in an order known to the node above: photos shared
-            with other partitions, shared cameras. Observations of their unknowns themselves belong to the
-            node of their elimination, and are excluded here. Fixed unknowns remain fixed. Empty for the root.
+            Blocks that are eliminated above this node, in an order known to the node above: photos of several
+            parts, shared cameras. Observations of their unknowns alone belong to the node of their
+            elimination, and are excluded here; fixed unknowns remain fixed. Empty for the root.
         children
-            For each child, in a fixed order, the blocks of its contribution, in the order of its `outer`. All
+            For each child, in a fixed order, the blocks of its contribution in the order of its `outer`; all
             are photos, cameras, unknowns or points of this block, outer ones or not.
         middle
-            (3,) median of the positions of all photos of the larger block, component by component:
-            coordinates are relative to it (rounded) in rectangular space, and it defines the vertical of
-            shifts in geographic space. It must be the same for all nodes. None: of the photos of this block.
+            (3,) component-wise median of the positions of all photos of the larger block. It is the (rounded)
+            origin of coordinates in rectangular space, and defines the vertical for shifts in geographic
+            space. It must be the same for all nodes. None: of the photos of this block.
         threads
             As in :meth:`adjust`.
         held
@@ -954,13 +953,13 @@ class BlockNetwork:
         Raises
         ------
         InputError
-            If a name is not in the block or occurs twice, or a loss is set.
+            If a name is not in the block or repeated, or a loss is specified.
         BlockError
-            As :meth:`adjust`, before its first iteration.
+            As in :meth:`adjust`, before its first iteration.
         """
 
 def give_back() -> None:
-    """Return freed memory to the system; only effective with the GNU C library."""
+    """Return freed memory to the system; no effect without the GNU C library."""
 
 def judge_full_step(
     taken: Sequence[tuple[float, float]],
@@ -970,41 +969,40 @@ def judge_full_step(
     unknowns: int,
     tolerance: float,
 ) -> str:
-    """Return the type of a full step, by the rules of one process; see `adjustment/options.rs`.
+    """Classify a full step by the rules for one process; see `adjustment/options.rs`.
 
     Parameters
     ----------
     taken
-        Damping and largest change of each step so far.
+        Damping and largest change of each former step.
     change
-        No unknown changes by more than this multiple of its standard deviation.
+        Largest change of any unknown, in standard deviations.
     chord
-        The length of the chord after the last step, or None.
+        Length of the chord after the last step, if any.
     unknowns, tolerance
         Number of unknowns; convergence limit.
 
     Returns
     -------
-    `last`: no further one is needed; `rests`: rounding only, as before; `before a chord`: a chord after it is
-    efficient; `one of many`.
+    `last`: no further step is needed; `rests`: rounding only, as before; `before a chord`: a chord should
+    follow; `one of many`.
     """
 
 def is_chord(chord: float, change: float) -> bool:
-    """Return whether a chord of this length is accepted after a full step with this change."""
+    """Return whether to take a chord of this length after a full step with this change."""
 
 def step_rules() -> dict[str, float]:
-    """Return the constants of the step rules of one process, by name; see `adjustment/damped.rs`."""
+    """Return the constants of the step rules for one process, by name; see `adjustment/damped.rs`."""
 
 @final
 class Node:
-    """A node of the elimination tree of a partitioned block (Helmert 1880; Wolf 1978).
+    """Node of the elimination tree of a partitioned block (Helmert 1880; Wolf 1978).
 
-    It contains a part of the observations, their photos, and the elimination order of its own blocks, but no
-    values. A *state* is a vector of all its unknowns: three of each point with image observations only, then
-    of photos, shared cameras, common unknowns and other points, own blocks and outer ones. Positions are
-    relative to the centre. A *step* is a vector of the same form. All methods are functions of their
-    arguments, with identical bits for any number of threads; `threads` and `progress` are as in
-    :class:`BlockNetwork`.
+    It contains a part of the observations, the photos that they touch, and the elimination order of its own
+    blocks, but no values. A *state* is a vector of all its unknowns: three of each point with images only,
+    then of photos, shared cameras, shared unknowns and other points, own blocks and outer ones. Positions are
+    relative to the origin. A *step* has the same layout. Results are identical to the last bit for any number
+    of threads. `threads` and `progress` are as in :class:`BlockNetwork`.
     """
 
     @property
@@ -1013,62 +1011,62 @@ class Node:
 
     @property
     def outer(self) -> _Indices:
-        """(S,) indices of the unknowns of the outer blocks in a state, block by block in their order."""
+        """(S,) indices of the outer unknowns in a state, block by block in their order."""
 
     @property
     def children(self) -> list[_Indices]:
-        """For each child (S_c,) indices of the unknowns of its contribution in a state, in its own order."""
+        """For each child (S_c,) indices of the unknowns of its contribution in a state, in its order."""
 
     @property
     def unknown_names(self) -> _Indices:
-        """(N, 3) for each unknown of a state the type of its owner, its index, and the number of the unknown.
+        """(N, 3) type of the owner of each unknown, index of the owner, and index of the unknown.
 
-        0: a photo, 1: a camera that photos share, 2: a common unknown, 3: a point.
+        Types: 0 photo, 1 shared camera, 2 shared unknown, 3 point.
         """
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Observations, weighted unknowns, unknowns that are not fixed; outer ones are not counted."""
+        """Observations, weighted unknowns, unknowns that are not fixed; without outer unknowns."""
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
-        """Excluded points, each with the reason."""
+        """Excluded points, with reasons."""
 
     @property
     def initial(self) -> _Floats:
-        """(N,) the initial state: photos as given, points intersected from the photos of this node.
+        """(N,) initial state: given photos, points at the intersection of their rays here.
 
-        Its outer part must be set to the state of the node above, if points are among the outer blocks.
+        If there are outer points, set the outer part to the values of the node above.
         """
 
     @property
     def ends_slowly(self) -> bool:
-        """Whether photos share free cameras: a chord is efficient near the end (docs/adjustment.md)."""
+        """Whether photos share free or weighted cameras, so that a final chord helps (docs/adjustment.md)."""
 
     @property
     def prediction(self) -> dict[str, float]:
-        """Predicted work and memory, from the pattern alone.
+        """Predicted work and memory, from the sparsity pattern.
 
-        `points`, `interior`, `outer`: unknowns of points, of blocks eliminated here, of outer ones (S);
-        `images`, `observations`: image points, equations in all; `reduction`, `factor`, `inverse`:
-        multiply-adds of one formation, one factorisation, one inversion; `node_bytes`: of the node alone;
-        `factor_bytes`: additionally of a formed node, including the data of points for the solution;
-        `memory_bytes`: the maximum while it is formed, inverted or written, including contributions and the
-        node; `contribution_bytes`: data sent upwards, 8 (S (S + 1) / 2 + 2 S); `cofactor_bytes`: data
-        received for the inversion, 8 S (S + 1) / 2; `step_bytes`: data received in each iteration, 8 S.
+        `points`, `interior`, `outer`: unknowns of points, of own blocks, of outer blocks (S). `images`,
+        `observations`: image points, all equations. `reduction`, `factor`, `inverse`: multiply-adds of one
+        formation, factorisation, inversion. `node_bytes`: the node without a factor. `factor_bytes`:
+        additional bytes of a formed node, with point data for the solution. `memory_bytes`: peak while it is
+        formed, inverted or written, with contributions and node. `contribution_bytes`: sent up, 8 (S (S + 1)
+        / 2 + 2 S). `cofactor_bytes`: received for the inversion, 8 S (S + 1) / 2. `step_bytes`: received per
+        iteration, 8 S.
         """
 
     def advance(self, state: _Floats, step: _Floats) -> _Floats:
-        """Return the state after a step: attitudes change by rotation vectors, the rest is added."""
+        """Return the state after a step: attitudes step by rotation vectors, others by addition."""
 
     def relocate(self, state: _Floats, *, threads: int) -> _Floats:
-        """Return the state with intersected positions of the points with image observations only."""
+        """Return the state with image-only points at the intersections of their rays."""
 
     def objective(self, state: _Floats, *, threads: int) -> tuple[float, float, float, float, float]:
-        """Return weighted sums of squares (camera, ground, plates, observations), and the objective.
+        """Return weighted sums of squares (photos, control, images, others), and the objective.
 
-        The sums of this node; over all nodes they add up to :attr:`BlockSolution.sums_of_squares`. The
-        objective is their sum, or the sum of losses.
+        Own observations only; the sum over all nodes is :attr:`BlockSolution.sums_of_squares`. The objective
+        is their total, or the total of losses.
         """
 
     def form(
@@ -1081,60 +1079,60 @@ class Node:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> FormedNode:
-        """Form the normal equations at a state, and eliminate the points and blocks of this node.
+        """Form the normal equations at a state, and eliminate own points and blocks.
 
         Parameters
         ----------
         state
             (N,) values of all unknowns.
         contributions
-            :attr:`FormedNode.contribution` of each child, added in their order.
+            :attr:`FormedNode.contribution` of each child in order. They are added in this order.
         damping
-            Added to the diagonal of the normal equations as a fraction of it; 0 for a full step. The same in
-            all nodes.
+            Fraction of the diagonal of the normal equations that is added to it; 0 for a full step. It must
+            be equal in all nodes.
         curved
-            True to include the second-order term of a loss. The same in all nodes.
+            Whether to include the second-order term of a loss. It must be equal in all nodes.
         """
 
     def solution(self, state: _Floats, before: _Floats, *, threads: int) -> BlockSolution:
-        """Return the adjusted values at a state, without cofactors.
+        """Return the solution at a state, without cofactors.
 
-        `before` is the state before the last step. Arrays are the arrays of the block of the node, including
-        outer photos. Sums, counts and degrees of freedom are of this node, and add up.
+        `before` is the state before the last step. Arrays are of the block of the node, with outer photos.
+        Sums, counts and degrees of freedom are of own observations and unknowns, and can be added.
         """
 
 @final
 class FormedNode:
-    """A node at a state with eliminated points and blocks.
+    """Node at a state after elimination of its own points and blocks.
 
-    It stores the factor, and copies of state and contributions temporarily. It cannot be pickled, but formed
-    again.
+    It contains the factor, but no copies of state and contributions. It cannot be pickled; form it again
+    instead.
     """
 
     @property
     def contribution(self) -> ContributionRow:
-        """Contribution to the node above, over the S unknowns of the outer blocks; empty for the root.
+        """Contribution to the node above, over the S outer unknowns; empty for the root.
 
         `U = A_SS - A_SI A_II^-1 A_IS` (S (S + 1) / 2,), lower triangle, column by column: row i of column j
         is at `j S - j (j - 1) / 2 + i - j`. `u = b_S - A_SI A_II^-1 b_I` (S,). The diagonal of A_SS before
-        any elimination, including the children (S,), is the reference for small pivots. It can be read once.
+        any elimination, also by children (S,), is the reference for small pivots. Available once.
         """
 
     @property
     def sum_of_squares(self) -> float:
-        """Weighted sum of squares of this node at this state; they add up over all nodes."""
+        """Weighted sum of squares of own observations at this state; the total is over all nodes."""
 
     @property
     def decrease(self) -> float:
-        """Decrease of the sum of squares by a full step, as far as known in this node.
+        """Decrease of the sum of squares by a full step, as far as known here.
 
-        The sum over all nodes is the decrease of the block. Its root bounds the change of any unknown in
-        standard deviations (the largest change of an iteration).
+        The sum over all nodes applies to the block. Its root is an upper bound of the change of any unknown,
+        in standard deviations (the largest change of an iteration).
         """
 
     @property
     def undetermined(self) -> FailureRow | None:
-        """Undetermined unknowns of this node, as in :class:`BlockError`; or None."""
+        """Undetermined unknowns of the node, as in :class:`BlockError`; or None."""
 
     def solve(
         self,
@@ -1143,11 +1141,11 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
-        """Return the step (N,) of all unknowns, given the step of the outer ones (S,)."""
+        """Return the step (N,) of all unknowns from the step of the outer ones (S,)."""
 
     @property
     def has_chord(self) -> bool:
-        """Whether the right-hand side of a chord was reduced but not solved."""
+        """Whether the right-hand side of a chord was reduced but not yet solved."""
 
     def reduce_chord(
         self,
@@ -1157,19 +1155,20 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[_Floats, float] | None:
-        """Reduce the right-hand side of the equations at a state: a second step with the same factor.
+        """Reduce the right-hand side at a state: a second step with the same factor.
 
         Parameters
         ----------
         state
-            (N,) after a step.
+            (N,) state after a step.
         left
-            (S,) remainder of each child.
+            (S,) remaining right-hand side of each child.
 
         Returns
         -------
-        (S,) remainder for the outer unknowns, and the decrease of the sum of squares by the chord, as far as
-        known in this node; None if the required data were not stored, for lack of memory.
+        (S,) the remaining right-hand side of the outer unknowns, and the decrease of the sum of squares by
+        the chord, as far as known here. None if the required data were not stored because of insufficient
+        memory.
         """
 
     def solve_chord(
@@ -1179,7 +1178,7 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
-        """Return the chord (N,) for the reduced right-hand side, given the outer unknowns (S,)."""
+        """Return the chord (N,) from the chord of the outer unknowns (S,), after its reduction."""
 
     def reduce(
         self,
@@ -1188,19 +1187,19 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[_Floats, _Floats]:
-        """Reduce right-hand sides: y = L^-1 r of the unknowns eliminated in this node.
+        """Reduce right-hand sides: y = L^-1 r of the unknowns eliminated here.
 
         Parameters
         ----------
         rights
-            (d, N) of all unknowns: own ones of this node plus the remainders of the children.
+            (d, N) for all unknowns: own ones, with remainders of the children.
 
         Returns
         -------
         left
-            (d S,) remainder for the outer unknowns.
+            (d S,) remainders for the outer unknowns.
         products
-            (d d,) y^T y, which adds up over all nodes to r^T Q r.
+            (d d,) y^T y; the sum over all nodes is r^T Q r.
         """
 
     def complete(
@@ -1210,7 +1209,7 @@ class FormedNode:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
-        """Return solutions (d N,) for reduced right-hand sides, given the outer ones (d, S); once only."""
+        """Return solutions (d N,) of reduced right-hand sides from the outer ones (d, S); once."""
 
     def invert(
         self,
@@ -1221,81 +1220,80 @@ class FormedNode:
         datum: tuple[_Floats, _Floats, _Floats, _Floats, float, list[int]] | None = None,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[BlockSolution, list[_Floats]]:
-        """Return adjusted values with cofactors, and the cofactors that the children need.
+        """Return the solution with cofactors, and the cofactors for the children.
 
-        The factor is consumed.
+        The factor is deleted.
 
         Parameters
         ----------
         outer
-            (S (S + 1) / 2,) cofactors of the outer unknowns, a lower triangle packed like the contribution.
+            (S (S + 1) / 2,) cofactors of the outer unknowns, a lower triangle packed as the contribution.
         state
-            (N,) the final state: after the step if it was the last one, otherwise the same.
+            (N,) final state: after the step if it was the last one, otherwise unchanged.
         datum
-            Transformation of cofactors (except of the children) to a datum of the whole: T and W = Q B (d,
-            N), B^T W of the whole (d, d), the last step (N,) before the transformation, the condition number
-            of B^T G, and the unknowns that do not change in the datum, ascending.
+            Transformation of cofactors to a datum of the whole, except for the children: T and W = Q B (d,
+            N), B^T W of the whole (d, d), the last step (N,) before the transformation, the condition of B^T
+            G, and the unknowns that do not change, ascending.
 
         Returns
         -------
         BlockSolution
             As :meth:`Node.solution`, with cofactors, redundancy numbers and test values. Outer photos have
-            cofactors, but not the redundancy numbers of their own weights.
+            cofactors, but no redundancy numbers of their own weights.
         list
             For each child its (S_c (S_c + 1) / 2,) cofactors.
         """
 
 @final
 class NetworkSuspects:
-    """The G groups of observations that may contain a joint gross error, in the order of all tests.
+    """G groups of observations that may share a gross error, in the order of all tests.
 
-    The order is: image observations, control of points, positions and attitudes of photos, additional
-    observations, and observations of cameras and common unknowns. Each has rows, M in all, stored group after
-    group.
+    Images in order, then control points, positions and attitudes of photos, additional observations, and
+    observed values of cameras and shared unknowns. Each group has rows, M in total, stored group by group.
     """
 
     @property
     def subjects(self) -> tuple[NDArray[np.uint8], _Indices]:
-        """(G,) types, and index of the image, point, photo, observation, camera or common unknown.
+        """(G,) types, and indices of image, point, photo, observation, camera or shared unknown.
 
-        Types are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 common unknown.
+        Types are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 shared unknown.
         """
 
     @property
     def row_starts(self) -> _Indices:
-        """(G + 1,) first row of each suspect."""
+        """(G + 1,) first row of each group."""
 
     @property
     def components(self) -> _Indices:
-        """(M,) the component of each row."""
+        """(M,) component of each row."""
 
     @property
     def deviations(self) -> _Floats:
-        """(M,) standard deviations a priori, in the units of the observations."""
+        """(M,) a-priori standard deviations, in the units of the observations."""
 
 @final
 class NetworkTrial:
-    """A network for trials without some of its observations; the symbolic analysis is done once.
+    """Repeated adjustment of a network without some observations, with one symbolic analysis.
 
-    Rows and square blocks of its suspects are stored suspect after suspect. Excluded rows have weight zero.
-    All methods raise errors of the adjustment: BlockError or CollectionError, of the kind `undetermined
-    points` or `undetermined photos` if an exclusion removes their last support.
+    Rows and square blocks are stored group by group. Removed observations have zero weight. Methods raise the
+    errors of the adjustment, BlockError or CollectionError. The kind is `undetermined points` or
+    `undetermined photos` if the removals leave these without support.
     """
 
     @property
     def suspects(self) -> NetworkSuspects:
-        """Groups that may be excluded."""
+        """Groups of observations that can be removed."""
 
     @property
     def photos(self) -> list[list[float]]:
-        """The values of each photo at the end of the last trial: as given, pose first."""
+        """Values of each photo after the last trial, in the input format, pose first."""
 
     @property
     def points(self) -> _Floats:
-        """(n, 3) coordinates of the points at the end of the last trial; NaN if excluded."""
+        """(n, 3) point coordinates after the last trial; NaN for removed points."""
 
     def stand(self) -> tuple[str, int, float, int, list[int]]:
-        """Use the network at the end of its adjustment, with all observations; see `adjust`."""
+        """Restore the adjusted state with all observations; return the same as `adjust`."""
 
     def adjust(
         self,
@@ -1306,22 +1304,21 @@ class NetworkTrial:
         tolerance: float | None,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> tuple[str, int, float, int, list[int]]:
-        """Adjust without the excluded observations, from the end of the last trial.
+        """Adjust without removed observations, from the state of the last trial.
 
         Parameters
         ----------
         rows
-            (M,) excluded rows.
+            (M,) whether each row is removed.
         points, photos
-            Points and photos excluded with all their observations; their values do not change.
+            Points and photos removed with all their observations; their values do not change.
         tolerance
-            Convergence limit. A block has converged if no unknown would change by more than this multiple of
-            its standard deviation in the next iteration; a collection as in its options. Default: the limit
-            of the options.
+            Convergence limit. For a block, the largest expected change in the next iteration, in standard
+            deviations; for a collection, as in its options. None: the limit of the options.
 
         Returns
         -------
-        Status, iterations, weighted sum of squares, degrees of freedom, points that collapsed to a station.
+        Status, iterations, weighted sum of squares, degrees of freedom, points that converged to a station.
         """
 
     def resist(
@@ -1332,24 +1329,24 @@ class NetworkTrial:
         iterations: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats | None:
-        """Adjust with a robust loss from the end of the last trial, and store the result.
+        """Adjust with a robust loss from the state of the last trial, and store the new state.
 
         Returns
         -------
-        (G,) factors of the weights; None if it diverges, with the state unchanged.
+        (G,) factors of the weights; None if it diverges, and the state is then unchanged.
         """
 
     def tests(self) -> dict[str, NDArray[Any]]:
-        """Test every included suspect.
+        """Test every active group.
 
         Returns
         -------
-        `active` (G,) whether any row is included; `rank` (G,) directions in which an error is visible;
-        `statistic` (G,) T, the decrease of the sum of squares without it; `least` (G,) the smallest
-        redundancy of a visible direction; `shared` (G,) h of the bound of correlations with others;
-        `residual` (M,) of unit weight; `cofactors` the square blocks of R; `error`, `error_sd` (M,) the
-        estimated error and its standard deviation (a priori unit weight), in the units of the observations.
-        NaN if excluded.
+        `active` (G,): any row is in use. `rank` (G,): number of detectable directions of an error.
+        `statistic` (G,): T, the decrease of the sum of squares without the group. `least` (G,): smallest
+        redundancy of a detectable direction. `shared` (G,): h of the bound of correlations with others.
+        `residual` (M,): normalised residual. `cofactors`: square blocks of R. `error`, `error_sd` (M,):
+        estimated error and its standard deviation (a-priori unit weight), in the units of the observations.
+        NaN for removed groups.
         """
 
     def hypotheses(
@@ -1389,7 +1386,7 @@ class NetworkTrial:
         detection
             Significance level and power of the minimal detectable bias (MDB).
         limit
-            Standard deviations above which points are counted.
+            Standard deviations from which on points are counted.
         effects
             Number of groups whose effects are computed: those of the largest bias-to-noise ratios.
 
@@ -1406,46 +1403,46 @@ class NetworkTrial:
     def predictions(
         self, suspects: list[int]
     ) -> list[tuple[float, list[int], list[float], list[float]] | None]:
-        """Test the excluded rows of some suspects against the prediction from the rest.
+        """Test removed observations of some groups against their prediction from the rest.
 
         Returns
         -------
-        For each: the statistic, chi-square with as many degrees of freedom as excluded rows; these rows;
-        observed minus predicted of each, and its standard deviation. None if no row is excluded, or its point
-        or photo is.
+        For each: the chi-square statistic with one degree of freedom per removed row; these rows; observed
+        minus predicted of each row, and its standard deviation. None if nothing is removed, or its point or
+        photo is.
         """
 
     def on_points(self, points: list[int], *, gone: bool = False) -> list[tuple[list[int], _Floats, _Floats]]:
-        """Return all observations of points together: suspects, residuals of unit weight, and R.
+        """Return all observations of points together: groups, normalised residuals, and R.
 
-        Nothing for points with additional observations. `gone`: for excluded points, as if they were
-        included, each separately against the photos as determined by the others. Nothing also if the rays do
-        not determine the point.
+        Empty for points with additional observations. `gone`: for points that are removed with all
+        observations, as if they were in use, each separately against the photos as determined by others. Then
+        also empty if the rays do not determine the point.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:
-        """Return the effect of an error of one standard deviation in each row of some suspects.
+        """Return the effects of an error of one standard deviation in each row of some groups.
 
         Returns
         -------
-        (., 9): the three coordinates of the own point, the six numbers of the own photo; NaN if not
-        applicable.
+        (., 9): the three coordinates of the point of the row, the six numbers of its photo; NaN if it has
+        neither.
         """
 
     def responses(self, suspects: list[int]) -> _Floats:
-        """Return the columns of R that belong to the rows of some suspects: (., M)."""
+        """Return the columns of R of the rows of some groups: (., M)."""
 
     def most_moved(self, suspects: list[int]) -> list[tuple[str, int, int, float, float]]:
-        """Return, for each row of some suspects, the unknown that an error affects most.
+        """Return, for each row of some groups, the unknown with the largest effect of an error.
 
         Returns
         -------
-        Kind (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; its change by an
-        error of one standard deviation, in its unit and in its standard deviations (a priori unit weight).
+        Type (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; its change by an
+        error of one standard deviation, in its unit and in its standard deviations (a-priori unit weight).
         """
 
     def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return pairs of suspects of one point whose tests are correlated by more than `limit`."""
+        """Return pairs of groups of one point whose tests are correlated by more than `limit`."""
 
 @final
 class BlockState:
@@ -1454,22 +1451,22 @@ class BlockState:
     Parameters
     ----------
     unknowns
-        Adjusted unknowns, in the order of the core.
+        Adjusted values, in the order of the core.
     held, collapsed, loose
-        Unknowns fixed for a datum; points excluded because they collapsed to a station or are undetermined;
-        photos excluded because they are undetermined.
+        Unknowns fixed for a datum; points excluded because they converged to a station or their rays do not
+        determine them; photos excluded because their images do not determine them.
     ordering
-        The name of the ordering.
+        Name of the ordering in use.
     datum
-        Its name, points, photos, whether scale counts, photos whose attitudes count, and the factor between
-        rotations and shifts; None for the datum of the fixed unknowns.
+        Name, points, photos, use of scale, photos whose attitudes count, and the factor that makes rotations
+        comparable with translations. None for a datum of fixed unknowns.
     released
-        Whether minimal control was freed for it.
+        Whether minimal control was released for the datum.
 
     Raises
     ------
     ValueError
-        If the ordering or the datum is unknown.
+        If the ordering or datum does not exist.
     """
 
     def __new__(
@@ -1486,18 +1483,18 @@ class BlockState:
         self,
     ) -> tuple[list[float], list[int], list[int], list[int], str, _DatumRow | None, bool]: ...
     def joint(self, points: Sequence[int]) -> NDArray[np.float64] | None:
-        """Return the (3k, 3k) joint cofactors of points, if the adjustment stored exactly these.
+        """Return the stored joint cofactors (3k, 3k) of exactly these points.
 
-        None for copies and for states read from files.
+        None for copies of a state and for states read from files.
         """
 
 @final
 class BlockCovariances:
-    """Cofactors (a priori unit weight) of any unknowns of an adjusted network, from one factor.
+    """Cofactors (a-priori unit weight) of any quantities of an adjusted network, from one factor.
 
-    Unknowns are named by kind and index: `photo` (its pose), `step` (position and rotation about the photo's
-    axes), `point`, `camera` (in a collection, the camera of the photo), `unknown`. Arguments are the same as
-    in :class:`BlockNetwork`. The methods raise BlockError or CollectionError.
+    Quantities are identified by type and index: `photo` (its pose), `step` (position and rotation about the
+    photo's axes), `point`, `camera` (of a photo in a collection), `unknown`. Arguments as in
+    :class:`BlockNetwork`. Methods raise BlockError or CollectionError.
     """
 
     def cofactors(
@@ -1508,7 +1505,7 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats:
-        """Return the joint cofactors of `rows`, or of `rows` with `columns`."""
+        """Return the cofactors of all unknowns of `rows`, or of `rows` with `columns`."""
 
     def propagate(
         self,
@@ -1518,16 +1515,16 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats:
-        """Return J Q J^T, for (m, k) partials J of m functions of the k named unknowns."""
+        """Return J Q J^T for (m, k) partial derivatives J of m functions of k unknowns."""
 
     def suspects(self) -> NetworkSuspects:
         """Return the groups of observations of the network."""
 
     def influences(self, partials: _Floats, of: list[tuple[str, int]]) -> _Floats:
-        """Return (m, M) effects of errors of one standard deviation in all rows on functions.
+        """Return the effects of one-sigma errors in all rows on functions of the unknowns: (m, M).
 
-        Rows are the rows of all suspects; `partials` and `of` are as in :meth:`propagate`. The datum is the
-        one of the fixed unknowns.
+        Rows are in the order of all groups; `partials` and `of` as in :meth:`propagate`. The datum is defined
+        by fixed unknowns.
         """
 
     def group_squares(
@@ -1541,31 +1538,31 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> tuple[list[int], _Floats, list[bool]]:
-        """Return sums of R_ij^2 over groups; R maps errors of observations to residuals, both in their sd.
+        """Return sums of R_ij^2 over groups; R maps errors to residuals, both in standard deviations.
 
         Parameters
         ----------
         groups
-            Number g of groups; then the group of each observation, -1 for none: (m, 2) of x and y of images,
-            (n, 3) of components of points, (P, 6) of unknowns of poses, of every camera, common unknown, and
-            other observation.
+            Number g of groups; then the group of each observation, -1 for none: (m, 2) x and y of images, (n,
+            3) components of points, (P, 6) unknowns of poses, of every camera, shared unknown, and other
+            observation.
         classes
-            None: all sums. A number: only sums within each group. Groups with the same remainder of division
-            by it share columns, and sums between such groups are included.
+            None: all sums. A number: sums within each group only. Groups with the same index modulo this
+            number share columns, and the sums between such groups are included.
         exact, vectors, seed
-            Groups of at most `exact` or `vectors` observations are computed column by column, others with
-            `vectors` vectors of random signs (Hutchinson 1990). The same seed gives the same bits for any
-            number of threads.
+            Groups with at most `exact` observations, and groups with at most `vectors`, are computed column
+            by column. Others use `vectors` random sign vectors (Hutchinson 1990). Results are identical to
+            the last bit for the same seed and any number of threads.
 
         Returns
         -------
         equations
             (g + 1,) observations of each group and of none; empty with classes.
         squares
-            (g + 1) * g sums, row by row, of i in the group of the row (the last row: in no group) and j in
-            the group of the column; with classes (g,) sums of i and j in each group.
+            (g + 1) * g sums, row by row, of i in the row's group (last row: no group) and j in the column's
+            group; with classes (g,) sums of i and j in each group.
         exact
-            (g,) True for groups computed column by column; empty with classes.
+            (g,) whether columns were computed column by column; empty with classes.
         """
 
     def project_images(
@@ -1575,17 +1572,16 @@ class BlockCovariances:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats:
-        """Return (k, m, 2) residuals of k columns of errors of all image observations, both in sd.
+        """Return (k, m, 2) residuals from k columns of errors of all images, both in standard deviations.
 
-        This is R z for each column z; unused observations have neither.
+        The result is R z for each column z; unused images have neither errors nor residuals.
         """
 
 class _NetworkSolution:
-    """Common part of adjusted blocks and collections; photos (P), points (n), observations (m) in order.
+    """Common attributes of adjusted blocks and collections, for P photos, n points, m images.
 
-    A photo has k unknowns: position and attitude in a block, and its camera in a collection. Values are in
-    the units in which they were given. Excluded points and observations are NaN. Cofactors refer to a priori
-    unit weight.
+    A photo of a block has k unknowns of position and attitude, in a collection also of its camera. Values are
+    in the input units. Excluded points and images are NaN. Cofactors refer to a-priori unit weight.
     """
 
     @property
@@ -1594,19 +1590,18 @@ class _NetworkSolution:
 
     @property
     def weak_points(self) -> list[tuple[int, float, float]]:
-        """Points on nearly parallel rays, or at a station.
+        """Points with nearly parallel rays, or at the position of a station.
 
-        For each its index, the ratio of its largest and smallest standard deviation (in any directions;
+        For each its index, the ratio of its largest to its smallest standard deviation (in any directions;
         infinite if the smallest is lost by rounding, NaN without cofactors), and its distance from the
-        nearest observing station, relative to the median of these distances.
+        nearest station that observes it, relative to the median of these distances.
         """
 
     @property
     def weak(self) -> list[tuple[int, int]]:
-        """Photos and unknowns of a combination that no step could determine.
+        """Photos and their unknowns in a combination that no step could follow.
 
-        The sum of squares stopped decreasing, or the iterations were exhausted. Empty for another end of the
-        adjustment.
+        The sum of squares was nevertheless stationary, or the iterations were exhausted. Empty otherwise.
         """
 
     @property
@@ -1615,11 +1610,11 @@ class _NetworkSolution:
 
     @property
     def initial_sum_of_squares(self) -> float:
-        """Weighted sum of squares, of losses with a loss, at the initial values."""
+        """Weighted sum of squares, or of losses, at the initial values."""
 
     @property
     def iterations(self) -> list[IterationRow]:
-        """Every iteration."""
+        """All iterations."""
 
     @property
     def photo_cofactors(self) -> _Floats:
@@ -1627,7 +1622,7 @@ class _NetworkSolution:
 
     @property
     def photo_redundancy(self) -> _Floats:
-        """(P, k) redundancy numbers of the unknowns as observations; 0 unless weighted."""
+        """(P, k) redundancy numbers of the observed unknowns; 0 unless weighted."""
 
     @property
     def point_positions(self) -> _Floats:
@@ -1635,19 +1630,19 @@ class _NetworkSolution:
 
     @property
     def point_cofactors(self) -> _Floats:
-        """(n, 3, 3) cofactors."""
+        """(n, 3, 3) cofactors of the points."""
 
     @property
     def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of the coordinates as observations; 0 unless weighted."""
+        """(n, 3) redundancy numbers of the observed coordinates; 0 unless weighted."""
 
     @property
     def point_rays(self) -> _Indices:
-        """(n,) number of observations; 0 for excluded points."""
+        """(n,) number of images; 0 for excluded points."""
 
     @property
     def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed, in the unit of the image."""
+        """(m, 2) observed minus computed, in the image unit."""
 
     @property
     def redundancy(self) -> _Floats:
@@ -1655,29 +1650,29 @@ class _NetworkSolution:
 
     @property
     def standardized(self) -> _Floats:
-        """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight.
+        """(m, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight.
 
         NaN without redundancy.
         """
 
     @property
     def image_weights(self) -> _Floats:
-        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
+        """(m,) factor of the weight by a loss; 1 without a loss."""
 
     @property
     def undetermined(self) -> FailureRow | None:
-        """Reason for missing cofactors, as in :class:`BlockError`, if requested."""
+        """Reason for missing cofactors, as in :class:`BlockError`."""
 
     @property
     def redundancy_excess(self) -> float | None:
-        """Sum of all redundancy numbers minus the degrees of freedom: the rounding error of zero.
+        """Sum of all redundancy numbers minus the degrees of freedom: rounding errors.
 
         None without cofactors, and with a loss.
         """
 
     @property
     def variance_of_unit_weight(self) -> float | None:
-        """None without degrees of freedom."""
+        """Variance of unit weight; None without degrees of freedom."""
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -1685,11 +1680,11 @@ class _NetworkSolution:
 
     @property
     def ordering(self) -> str:
-        """The ordering."""
+        """Name of the ordering in use."""
 
     @property
     def predictions(self) -> dict[str, float]:
-        """Predicted multiply-adds of one factorisation in each ordering that was tried; NaN if it failed."""
+        """Predicted multiply-adds of one factorisation in each tested ordering; NaN if it failed."""
 
     @property
     def operations(self) -> dict[str, float]:
@@ -1705,7 +1700,7 @@ class _NetworkSolution:
 
 @final
 class BlockSolution(_NetworkSolution):
-    """An adjusted block; k is 6."""
+    """Adjusted block; k is 6."""
 
     @property
     def photo_corrections(self) -> _Floats:
@@ -1725,75 +1720,75 @@ class BlockSolution(_NetworkSolution):
 
     @property
     def images_behind(self) -> _Indices:
-        """Indices of observations whose point is behind the camera, ascending."""
+        """Indices of the images with a point behind the camera, ascending."""
 
     @property
     def images_folded(self) -> _Indices:
-        """Indices of observations outside the one-to-one domain of the lens, ascending."""
+        """Indices of the images outside the one-to-one range of the lens, ascending."""
 
     @property
     def loose_photos(self) -> list[int]:
-        """Indices of photos with unchanged poses, because their observations do not determine them."""
+        """Indices of the photos that were not adjusted because their images do not determine them."""
 
     @property
     def datum(self) -> list[tuple[int, int]]:
-        """Photos and their unknowns (0 to 5) fixed to define the datum.
+        """Photos and their unknowns (0 to 5) that are fixed to define a datum.
 
-        Empty if observations and weights define it.
+        Empty if observations and weights define one.
         """
 
     @property
     def datum_unknowns(self) -> list[tuple[int, int]]:
-        """Coefficients of trajectories fixed to define the datum: common unknowns and components."""
+        """Coefficients of trajectories fixed to define a datum: shared unknowns and components."""
 
     @property
     def relative_error(self) -> float:
-        """Approximate relative rounding error of the variances in the datum."""
+        """Approximate relative error of the variances in the new datum, by rounding."""
 
     @property
     def minimal_control(self) -> bool:
-        """Whether control and weights of poses are exactly sufficient for a datum."""
+        """Whether control and weights of poses are exactly minimal for a datum."""
 
     @property
     def weak_unknowns(self) -> list[tuple[int, int]]:
-        """The same as `weak` for common unknowns: unknowns and their components."""
+        """Shared unknowns and their components, as in `weak`."""
 
     @property
     def adjusted_unknowns(
         self,
     ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], list[float], int]]:
-        """The adjusted common unknowns, in the given order.
+        """Adjusted shared unknowns, in the input order.
 
-        Change from the given values, position (3), rotation matrix row by row (9), cofactors row by row for
-        rotations about the adjusted axes, cofactors with the previous unknown in its block (empty for the
-        first), redundancy numbers, and the number of observations.
+        Change, position (3), rotation matrix row by row (9); cofactors row by row for rotations about the
+        adjusted axes. Then cofactors with the unknowns of the previous one in its block (empty for the
+        first), redundancy numbers, and the number of observations and images.
         """
 
     @property
     def weak_cameras(self) -> list[tuple[int, int]]:
-        """The same as `weak` for cameras shared by several photos: cameras and their parameters."""
+        """Shared cameras and their parameters, as in `weak`."""
 
     @property
     def cameras(self) -> list[CameraRow]:
-        """The adjusted cameras, in the given order."""
+        """Adjusted cameras, in the input order."""
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
-        """Excluded points, each with the reason."""
+        """Excluded points, with reasons."""
 
     @property
     def sums_of_squares(self) -> tuple[float, float, float, float]:
-        """Weighted sums of squares: camera, ground, plates, additional observations."""
+        """Weighted sums of squares: photos, control, image coordinates, additional observations."""
 
     @property
     def redundancies(self) -> tuple[float, float, float, float] | None:
-        """Sums of the redundancy numbers of these; None without covariances."""
+        """Sums of the redundancy numbers of the same types; None without covariances."""
 
     @property
     def adjusted_observations(
         self,
     ) -> list[tuple[list[float], list[float], list[float], float, float] | None]:
-        """Results of each additional observation, in the order of the groups.
+        """Results of each observation, in the order of the groups.
 
         Residuals, redundancy numbers and standardized residuals of its components, in the units of its type;
         its weighted square; the factor of its weight by a loss. None for observations of excluded points.
@@ -1801,14 +1796,14 @@ class BlockSolution(_NetworkSolution):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Degrees of freedom of the chosen unit variance."""
+        """Degrees of freedom for the selected unit variance."""
 
     @property
     def photo_order(self) -> _Indices:
-        """(P,) indices of the photos in the order of their elimination."""
+        """(P,) indices of the photos in elimination order."""
 
 class ResectionError(Exception):
-    """A photo that cannot be resected.
+    """Photo that cannot be resected.
 
     `args` is (kind, message): kind is `too few points`, `collinear`, `danger cylinder`, `undetermined`, `no
     placement`, `not finite` or `input`.
@@ -1832,7 +1827,7 @@ def resect(
     max_iterations: int,
     covariance: bool,
 ) -> ResectionSolution:
-    """Resect one photo by least squares on the calling thread; Ctrl-C is checked between iterations.
+    """Resect one photo by least squares on the calling thread; Ctrl-C is checked in iterations.
 
     Parameters
     ----------
@@ -1844,21 +1839,22 @@ def resect(
     principal_distance
         Millimetres, signed.
     known, known_sd
-        (6,) prior position and attitude (NaN if unknown), and standard deviations: infinite free, 0 fixed.
+        (6,) known position and attitude (NaN if unknown), and their standard deviations: infinite is free, 0
+        is fixed.
     start
-        (6,) initial values; None: computed from triples of points.
+        (6,) initial values; None to compute them from triples of points.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
-        The sense of the angles.
+        Direction of the angles.
     at_measured
-        Form the partials at the measured image positions, as program W5344 does (USGS Computer Contribution
-        2, 1969, equations 4 and 5), instead of the computed ones.
+        Whether to form the partial derivatives at the measured image positions, as program W5344 does (USGS
+        Computer Contribution 2, 1969, equations 4 and 5), instead of the computed ones.
     criterion, limit
-        `fraction`: no unknown changes by more than `limit` of its standard deviation; `position`: the
+        `fraction`: no unknown changes by more than `limit` of its standard deviation. `position`: the
         correction of the position is shorter than `limit`, full steps without damping (program W5344).
     max_iterations
-        Maximum number of iterations from each start.
+        Maximum number of iterations from each initial pose.
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
 
@@ -1867,12 +1863,12 @@ def resect(
     ResectionError
         If the photo cannot be resected.
     ValueError
-        If a shape, length or choice is invalid; the message names the argument.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class ResectionSolution:
-    """A resected photo with n points. Cofactors hold for a priori unit weight."""
+    """Resected photo with n points. Cofactors refer to a-priori unit weight."""
 
     @property
     def status(self) -> str:
@@ -1880,7 +1876,7 @@ class ResectionSolution:
 
     @property
     def iterations(self) -> list[IterationRow]:
-        """Every iteration."""
+        """All iterations."""
 
     @property
     def history(self) -> _Floats:
@@ -1888,7 +1884,7 @@ class ResectionSolution:
 
     @property
     def start(self) -> _Floats:
-        """(6,) the pose from which the adjustment started."""
+        """(6,) initial pose of the adjustment."""
 
     @property
     def pose(self) -> _Floats:
@@ -1900,7 +1896,7 @@ class ResectionSolution:
 
     @property
     def pose_redundancy(self) -> _Floats:
-        """(6,) redundancy numbers of position and attitude as observations; 0 unless weighted."""
+        """(6,) redundancy numbers of observed position and attitude; 0 unless weighted."""
 
     @property
     def point_positions(self) -> _Floats:
@@ -1924,11 +1920,11 @@ class ResectionSolution:
 
     @property
     def standardized(self) -> _Floats:
-        """(n, 2) residual / (standard deviation x root of redundancy number), a priori unit weight."""
+        """(n, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight."""
 
     @property
     def partials(self) -> _Floats:
-        """(n, 2, 6) partials of x and y with respect to position and attitude, at the solution."""
+        """(n, 2, 6) partial derivatives of x and y by position and attitude, at the solution."""
 
     @property
     def points_behind(self) -> _Indices:
@@ -1940,26 +1936,26 @@ class ResectionSolution:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Observations and weighted unknowns less unknowns."""
+        """Observations and weighted unknowns minus unknowns."""
 
     @property
     def alternatives(self) -> list[tuple[list[float], float]]:
-        """Other poses (6 values) that fit about as well, with their sums of squares."""
+        """Other poses (6 values) with a similar fit, with their sums of squares."""
 
     @property
     def undetermined(self) -> str | None:
-        """Reason why another fitting pose is undetermined, as in `ResectionError`; None without one."""
+        """Reason why another fitting pose is undetermined, a kind as in `ResectionError`; or None."""
 
     @property
     def outside_danger_cylinder(self) -> float | None:
         """Distance of the projection centre from the danger cylinder, negative inside, or None."""
 
 class ComparatorError(Exception):
-    """A calibration that cannot be adjusted: (message, cases, points), both by their indices."""
+    """Calibration that cannot be adjusted: (message, cases, points), both as indices."""
 
 @final
 class ComparatorSolution:
-    """An adjusted calibration of a comparator. Cofactors are for a priori unit weight."""
+    """Adjusted calibration of a comparator. Cofactors refer to a-priori unit weight."""
 
     @property
     def converged(self) -> bool:
@@ -1975,7 +1971,7 @@ class ComparatorSolution:
 
     @property
     def comparator_cofactors(self) -> _Floats:
-        """(k, k) joint cofactors."""
+        """(k, k) joint cofactors of these parameters."""
 
     @property
     def case_placements(self) -> _Floats:
@@ -1983,7 +1979,7 @@ class ComparatorSolution:
 
     @property
     def case_cofactors(self) -> _Floats:
-        """(q, 3, 3) of each case."""
+        """(q, 3, 3) cofactors of each case."""
 
     @property
     def grid_xy(self) -> _Floats:
@@ -1991,7 +1987,7 @@ class ComparatorSolution:
 
     @property
     def grid_cofactors(self) -> _Floats:
-        """(l, 2, 2) of each grid point."""
+        """(l, 2, 2) cofactors of each grid point."""
 
     @property
     def grid_redundancy(self) -> _Floats:
@@ -2011,7 +2007,7 @@ class ComparatorSolution:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Readings and weighted grid coordinates less unknowns."""
+        """Readings and weighted grid coordinates minus unknowns."""
 
 def adjust_comparator(
     grid_xy: _Floats,
@@ -2031,47 +2027,47 @@ def adjust_comparator(
     limit: float,
     max_iterations: int,
 ) -> ComparatorSolution:
-    """Adjust a comparator, its polynomials, the plate placements and their grids together.
+    """Adjust a comparator, its polynomials, plate placements and grids together.
 
-    grid = M (x' + P(x') - centre) + t with x' = N S x: scales, lack of orthogonality, then polynomials, then
-    rotation. Polynomials have the terms u^d, v^d, ... u^2, v^2; u and v are x' and y' minus `centre`, divided
-    by `half_range`.
+    grid = M (x' + P(x') - centre) + t with x' = N S x: scales, non-orthogonality, then polynomials, then
+    rotation. Polynomials consist of u^d, v^d, ... u^2, v^2; u and v are x' and y' minus `centre`, divided by
+    `half_range`.
 
     Parameters
     ----------
     grid_xy, grid_sd
         (l, 2) coordinates of the grid points in the axes of their plate, and their standard deviations:
-        infinite free, zero fixed.
+        infinite is free, zero is fixed.
     case_placements
         (q, 3) initial rotation (rad) and grid coordinates of `centre`.
     case_left_handed
-        (q) whether X and Y of the grid are exchanged.
+        (q) whether X and Y of the grid are swapped.
     measured_cases, measured_points
         (m,) indices of the case and the grid point of each reading.
     measured_xy, measured_sd
         (m, 2) readings and their standard deviations, in the unit of the grid.
     coefficients, coefficient_sd
         Initial coefficients in x and in y, in the unit of the grid, and their standard deviations: infinite
-        free, zero fixed.
+        is free, zero is fixed.
     degree, centre, half_range
         Degree, centre and half range of the polynomials.
     limit, max_iterations
-        Convergence: largest change in standard deviations.
+        Convergence limit, largest change in standard deviations; maximum number of iterations.
 
     Raises
     ------
     ComparatorError
-        If unknowns are undetermined, or indices and lengths are inconsistent.
+        If the readings leave unknowns undetermined, or indices and lengths are inconsistent.
     ValueError
-        If a shape differs; the message names the argument and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 _Vector = tuple[float, float, float] | list[float]
 _Matrix = list[list[float]]
 
 CentredRow = tuple[float, _Matrix, _Vector, _Vector, _Vector]
-"""Scale s, rotation A (3 x 3), shift t, centre of the control c_X, centre of the model c_x of the similarity
-x - c_x = s A (X - c_X) + t."""
+"""Scale s, rotation A (3 x 3), translation t, centre of the control c_X, centre of the model c_x of the
+similarity x - c_x = s A (X - c_X) + t."""
 
 ParametersRow = tuple[float, _Matrix, _Vector]
 """Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
@@ -2082,10 +2078,10 @@ normal equations C (7, 8); auxiliary table D (7, 8); seven results; corrected om
 b3."""
 
 class SimilarityError(Exception):
-    """A model that cannot be oriented.
+    """Model that cannot be oriented.
 
     `args` is (kind, message, stations): kind is `insufficient`, `undetermined`, `first stations`, `scale`,
-    `not finite` or `input`; stations is a list of the affected indices.
+    `not finite` or `input`; stations is a list of the indices concerned.
     """
 
 def orient_model(
@@ -2103,44 +2099,43 @@ def orient_model(
     trace: bool,
     scale: float | None = None,
 ) -> SimilaritySolution:
-    """Estimate the similarity x = s A X + B of control X and model x (C&GS Technical Bulletin 19).
+    """Compute the similarity x = s A X + B from control X and model x (C&GS Technical Bulletin 19).
 
     Parameters
     ----------
     control, control_sd
-        (n, 3) ground units: coordinates, NaN if unknown, and standard deviations, zero if exact, infinite if
-        not used.
+        (n, 3) ground units: coordinates, NaN if unknown, and standard deviations; zero for an exact one,
+        infinite for an unused one.
     model, model_sd
-        (n, 3) model units: coordinates and standard deviations; zero only if the control is not exact.
+        (n, 3) model units: coordinates and their standard deviations; zero if those for control are positive.
     method
         `rigorous`, `report` or `fill-in`.
     start
         `auto`, `report` or `closed-form`; ignored with `former`.
     former
-        A previous result used as initial values, or None.
+        Former result to start from, or None.
     max_iterations
         Maximum number of iterations.
     tolerance
-        Largest change of an unknown at convergence, as a fraction of its standard deviation (rigorous
-        method).
+        Convergence limit: fraction of the standard deviation of any unknown (rigorous method).
     threads
-        Number of threads; 0: chosen by the core (see `BlockNetwork`).
+        Number of threads; 0: selected by the core (see `BlockNetwork`).
     trace
-        True to store intermediate results of the report's methods.
+        Whether the methods of the report store intermediate results of each cycle.
     scale
-        Fixed s, with six remaining unknowns; None: estimated.
+        Fixed scale s, which leaves six unknowns; None: free.
 
     Raises
     ------
     SimilarityError
         If the model cannot be oriented.
     ValueError
-        If a shape, length or choice is invalid; the message names the argument.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class SimilaritySolution:
-    """An oriented model, in the order of its n stations. Cofactors hold for a priori unit weight."""
+    """Oriented model, in the order of its n stations. Cofactors refer to a-priori unit weight."""
 
     @property
     def status(self) -> str:
@@ -2152,31 +2147,31 @@ class SimilaritySolution:
 
     @property
     def similarity(self) -> CentredRow:
-        """The similarity."""
+        """Adjusted similarity."""
 
     @property
     def initial(self) -> CentredRow:
-        """Initial values of the iteration."""
+        """Initial similarity of the iteration."""
 
     @property
     def alternatives(self) -> list[CentredRow]:
-        """Other orientations that fit as well."""
+        """Other orientations with the same fit."""
 
     @property
     def iterations(self) -> list[IterationRow]:
-        """Iterations of the rigorous method; empty with the report's."""
+        """Iterations of the rigorous method; empty for the methods of the report."""
 
     @property
     def cycles(self) -> list[float] | None:
-        """Largest angle correction (rad) in each cycle of the report's methods, otherwise None."""
+        """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
 
     @property
     def traces(self) -> list[TraceRow]:
-        """Intermediate results of each of these cycles, if requested."""
+        """Intermediate results of these cycles, if requested."""
 
     @property
     def tangent_cofactors(self) -> _Floats:
-        """(7, 7) of three small rotations about the model axes (rad), s, t."""
+        """(7, 7) cofactors of three small rotations about the model axes (rad), s, t."""
 
     @property
     def condition(self) -> float:
@@ -2184,14 +2179,14 @@ class SimilaritySolution:
 
     @property
     def weakness(self) -> tuple[str, list[int]] | None:
-        """Reason for weak control, and the affected stations.
+        """Reason for weak control, and the stations concerned.
 
         `coincident` (horizontal stations in plan), `elevations in line` (in plan) or `stations in line`.
         """
 
     @property
     def sum_of_squares(self) -> float:
-        """Weighted sum of squares, both systems."""
+        """Weighted sum of squares in both systems."""
 
     @property
     def misclosures(self) -> _Floats:
@@ -2207,7 +2202,7 @@ class SimilaritySolution:
 
     @property
     def control_cofactors(self) -> _Floats:
-        """(n, 3, 3) of the adjusted control coordinates."""
+        """(n, 3, 3) cofactors of the adjusted control coordinates."""
 
     @property
     def redundancy(self) -> _Floats:
@@ -2215,21 +2210,21 @@ class SimilaritySolution:
 
     @property
     def standardized(self) -> _Floats:
-        """(n, 3) misclosure / its standard deviation, a priori; NaN if unknown or without redundancy."""
+        """(n, 3) misclosure / a-priori standard deviation; NaN if unknown or unchecked."""
 
 def transform_points(
     similarity: CentredRow, tangent_covariance: _Floats, points: _Floats, points_sd: _Floats
 ) -> tuple[_Floats, _Floats]:
-    """Return control coordinates of model points with covariances.
+    """Compute control coordinates of model points, with covariances.
 
     Parameters
     ----------
     similarity
-        The similarity.
+        Similarity.
     tangent_covariance
         (7, 7) of three small rotations about the model axes (rad), s, t.
     points, points_sd
-        (n, 3) model coordinates and their own standard deviations, model units.
+        (n, 3) model coordinates and their standard deviations, model units.
 
     Returns
     -------
@@ -2238,11 +2233,11 @@ def transform_points(
     Raises
     ------
     ValueError
-        If a shape differs; the message names the argument and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 def similarity_partials(similarity: CentredRow) -> _Floats:
-    """Return (7, 7) partials of omega, phi, kappa, s, b1, b2, b3 by three small rotations, s, t."""
+    """Return (7, 7) partials of omega, phi, kappa, s, b1, b2, b3 by small rotations, s, t."""
 
 def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
     """Solve seven normal equations by the Gauss-Crout scheme of TB 19, section 4.
@@ -2259,38 +2254,38 @@ def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
     Raises
     ------
     ValueError
-        If a shape differs; the message names the argument and its shape.
+        If a shape is wrong; the message names the argument and its shape.
     """
 
 _Station = tuple[float, float, float, float]
 """Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury)."""
 _CameraKind = tuple[float | None, bool, bool] | tuple[str, bool]
 """For plates: principal distance of the distorted image (None: scale first), Brown's decentering, common
-scale.
-For another model (`camera_models`): its name, and whether fx is the principal distance of both axes."""
+scale. For another model (`camera_models`): its name, and whether fx is the principal distance of both axes.
+"""
 
 class StellarError(Exception):
-    """A camera that cannot be calibrated.
+    """Camera that cannot be calibrated.
 
     `args` are the kind (`undetermined stars`, `undetermined`, `weight`, `not finite`, `input`), a message,
-    and the indices of the affected stars, or of the parameters if the kind is `undetermined`.
+    and the indices of the stars concerned, or of the parameters if these are `undetermined`.
     """
 
 def refraction(
     zenith_distances: _Floats, temperature: float, pressure: float, tau: _Floats, observed: bool
 ) -> _Floats:
-    """Return the refraction of observed or true zenith distances (NOAA TR NOS 55, equations 7 to 11).
+    """Compute the refraction of (n,) zenith distances (NOAA TR NOS 55, equations 7 to 11).
 
     Parameters
     ----------
     zenith_distances
-        (n,) radians.
+        (n,) zenith distances, observed or true, radians.
     temperature, pressure
         Kelvin, millimetres of mercury.
     tau
         (4,) coefficients in seconds of arc.
     observed
-        True for observed zenith distances.
+        Whether the zenith distances are observed ones.
 
     Returns
     -------
@@ -2300,7 +2295,7 @@ def refraction(
 def measured_feature(
     kind: str, points: _Floats, covariance: _Floats
 ) -> tuple[list[tuple[str, bool]], _Floats, _Floats, _Floats, tuple[float, int] | None]:
-    """Fit a feature to points, with the covariances of its quantities (docs/features.md).
+    """Fit a feature to points, with covariance and test (docs/features.md).
 
     Parameters
     ----------
@@ -2309,41 +2304,41 @@ def measured_feature(
     points
         (n, 3), any unit of length.
     covariance
-        (3n, 3n) of all coordinates, point by point.
+        (3n, 3n) covariance of all coordinates, point by point.
 
     Returns
     -------
     Names of q quantities, and whether each is a length (else a component of a unit vector); (q,) values; (q,
-    q) their covariance; (n, 4) deviations of points, radial (of a plane along its normal) and axial, each
-    with its standard deviation; statistic and degrees of freedom of their test, or None.
+    q) covariance; (n, 4) deviations of points, radial (for a plane along its normal) and axial, each with its
+    standard deviation; statistic and degrees of freedom of the test, None without a test.
 
     Raises
     ------
     InputError
-        If there are too few points, the feature is undetermined or ambiguous, a value is not finite, or a
-        shape differs.
+        If there are too few points, the feature is not uniquely determined, a value is not finite, or shapes
+        are wrong.
     ValueError
-        If the kind is unknown.
+        If the kind does not exist.
     """
 
 def nearest_points(points: _Floats, others: _Floats, limit: float, but: _Indices | None = None) -> _Indices:
-    """Return the nearest of the others for each point of a plane, (n,); -1 if none is near enough.
+    """Return the index (n,) of the nearest of the others for each point; -1 if beyond the limit.
 
     Parameters
     ----------
     points
-        (n, 2).
+        (n, 2) points in a plane.
     others
-        (m, 2), sorted into cells as wide as the limit.
+        (m, 2), sorted into cells with the width of the limit.
     limit
-        Largest distance, in the unit of the points.
+        Maximum distance, in the unit of the points.
     but
-        (n,) for each point one of the others to ignore; -1 for none.
+        (n,) one of the others to ignore for each point; -1 for none.
 
     Raises
     ------
     InputError
-        If shapes differ.
+        If shapes are wrong.
     """
 
 def star_similarities(
@@ -2359,52 +2354,52 @@ def star_similarities(
     limit: float,
     wanted: int,
 ) -> tuple[int, _Floats]:
-    """Find similarities between images and stars from pairs of candidates and votes of all images.
+    """Find similarities between images and stars: candidate pairs define them, all images vote.
 
     Parameters
     ----------
     images
-        (m, 2), the brightest first; every one votes.
+        (m, 2), the brightest first; all images vote.
     stars
         (n, 2) predicted images.
     candidates
-        (c, 2) an image, of the first `makers`, and a star that it may show.
+        (c, 2) an image, one of the first `makers`, and a star that it may show.
     makers
-        Number of images whose pairs define similarities.
+        Number of images that define similarities.
     tolerance, stretch
-        Tolerance of the difference of the separations of two images and of their stars, and the added part of
-        the separation of the images.
+        Maximum difference of the separations of two images and of their stars: a constant, and a part of the
+        image separation that is added.
     least
-        Lower limit of the separation of two images.
+        Minimum separation of two images.
     axis
-        x, y of the point of rotation of the camera, and its largest displacement; None for any rotation.
+        x, y of the centre of possible rotation of the camera, and its maximum shift; None for any rotation.
     limit
-        Distance from a star within which an image votes, with cells of half this width.
+        Maximum distance from a star for an image to vote; cells have half this width.
     wanted
         Maximum number of returned similarities.
 
     Returns
     -------
-    Number of agreeing pairs, and (k, 4) similarities with the most votes, best first: an image z, as a
-    complex number, is mapped to (a + b i) z + (c + d i). All images vote for the 4,096 candidates of the
-    makers.
+    Number of pairs that agree, and (k, 4) similarities with the most votes, the best first. An image z, as a
+    complex number, is mapped to (a + b i) z + (c + d i). All images vote on the 4,096 similarities selected
+    by the makers.
 
     Raises
     ------
     InputError
-        If shapes differ.
+        If shapes are wrong.
     ValueError
         If a candidate is not an image and a star.
     """
 
 def standard_coordinates(places: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:
-    """Return refracted standard coordinates xi (north), eta (east), (n, 2), of apparent positions.
+    """Compute refracted standard coordinates xi (north), eta (east), (n, 2), of apparent places.
 
-    NaN at and below the horizon.
+    `places` are (n, 2). The result is NaN at and below the horizon.
     """
 
 def star_places(standard: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:
-    """Return apparent right ascension and declination, (n, 2), of refracted standard coordinates."""
+    """Compute apparent right ascension and declination, (n, 2), of refracted coordinates."""
 
 def pointing_matrix(angles: _Floats) -> _Floats:
     """Return the matrix (3, 3) of alpha, omega, kappa: north, east, zenith to x, y, axis (equation 19)."""
@@ -2413,7 +2408,7 @@ def pointing_of_matrix(matrix: _Floats) -> _Floats:
     """Return the angles alpha, omega, kappa (3,) of a matrix (3, 3)."""
 
 def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: _CameraKind) -> _Floats:
-    """Return plate coordinates (n, 2) of standard coordinates (n, 2); NaN behind the camera.
+    """Compute plate coordinates (n, 2) of standard coordinates (n, 2); NaN behind the camera.
 
     Parameters
     ----------
@@ -2425,13 +2420,13 @@ def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: 
         (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3. For another model
         its own parameters, then zeros: x to the right, y down.
     camera
-        Its kind.
+        Kind of the camera.
     """
 
 def plate_directions(
     xy: _Floats, angles: _Floats, interior: _Floats, camera: _CameraKind, *, tolerance: float, passes: int
 ) -> _Floats:
-    """Return directions of plate coordinates, the inverse of `plate_images`.
+    """Compute directions of plate coordinates, the inverse of `plate_images`.
 
     Returns
     -------
@@ -2440,12 +2435,12 @@ def plate_directions(
 
 @final
 class StellarProblem:
-    """A calibration with its initial values: S stars, G attitudes, m images.
+    """Calibration problem with prior values: S stars, G attitudes, m images.
 
     Parameters
     ----------
     station, camera
-        Station, and type of the camera.
+        Station, and kind of the camera.
     pointings, common
         (G, 3) attitudes; (17,) 13 interior parameters and 4 coefficients of refraction (arcsec).
     fixed
@@ -2453,17 +2448,17 @@ class StellarProblem:
     weighted, weighted_values, weight_root
         (k,) indices of weighted parameters, their given values, and R (k, k) of their weight matrix R^T R.
     star_places, star_catalogue, star_weights, star_fixed
-        (S, 2) initial and catalogue positions; (S, 2, 2) weights, zero for unknown directions; S flags.
+        (S, 2) initial and catalogue places; (S, 2, 2) weights, zero for unknown directions; S flags.
     image_stars, image_pointings, image_xy, image_weights, image_times, image_shifts
-        (m,) indices of star and attitude; (m, 2) measured; (m, 2, 2); (m,) sidereal time; (m, 2) position of
-        the star at the time of the image minus the adjusted position.
+        (m,) indices of star and attitude; (m, 2) measured; (m, 2, 2); (m,) sidereal time; (m, 2) place of the
+        star at the time of the image minus the adjusted place.
     axis
         Attitude, standard coordinates, plate coordinates and weight of the axis, if it is known.
 
     Raises
     ------
     ValueError
-        If a shape differs.
+        If a shape is wrong.
     """
 
     def __new__(
@@ -2500,45 +2495,45 @@ class StellarProblem:
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         whole: bool = False,
     ) -> dict[str, Any]:
-        """Adjust by least squares with exact partials.
+        """Adjust by least squares with exact partial derivatives.
 
         Parameters
         ----------
         unit
-            Expected standard deviation of unit weight, the unit of `fraction` and the history.
+            Expected mean error of unit weight, the unit of `fraction` and of the history.
         fraction
-            Convergence limit of the change of an unknown, as a fraction of its standard deviation.
+            Convergence limit: largest change of an unknown as a fraction of its standard deviation.
         max_iterations, covariance, threads, progress
             As in `block_network`.
         whole
-            True to compute the joint cofactors of all parameters, if cofactors are computed.
+            Whether to compute the cofactors of all pairs of parameters, if there are cofactors.
 
         Returns
         -------
         `status`, `iterations`, `initial_sum_of_squares` (in units of `unit` squared), `parameters` (3 G +
-        17,); `places` (S, 2), `place_cofactors` (S, 2, 2), `place_inverses` (S, 2, 2): the same for known
-        parameters; `residuals` (m, 2) measured minus computed, `axis_residual`, `sums_of_squares` (images,
-        stars, parameters, axis), and `redundancy` and `standardized` of `image`, `place`, `axis`: of
-        decorrelated components if weights are correlated. With cofactors, all for unit weight:
+        17,). `places` (S, 2), `place_cofactors` (S, 2, 2), and `place_inverses` (S, 2, 2), the cofactors for
+        known parameters. `residuals` (m, 2) measured minus computed, `axis_residual`, `sums_of_squares`
+        (images, stars, parameters, axis). `redundancy` and `standardized` of `image`, `place`, `axis`; for
+        correlated weights of decorrelated components. With cofactors, all for unit weight:
         `pointing_cofactors` (G, 3, 3), `cross_cofactors` (G, 3, 17) of attitudes and common parameters,
-        `common_cofactors` (17, 17); with `whole`, `cofactors` (3 G + 17, 3 G + 17) and `log_determinant`:
-        natural logarithm of the determinant of the normal equations reduced to the parameters.
+        `common_cofactors` (17, 17). With `whole`: `cofactors` (3 G + 17, 3 G + 17) and `log_determinant`, the
+        natural logarithm of the determinant of the reduced normal equations.
 
         Raises
         ------
         StellarError
-            If stars or parameters are undetermined, or without image at the initial values.
+            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def without_effect(self) -> list[int]:
-        """Return the indices of parameters that affect no image, no weight and not the axis.
+        """Return the indices of parameters that no image, weight or axis touches.
 
-        Fixed parameters are not included.
+        Fixed parameters are excluded.
 
         Raises
         ------
         StellarError
-            If stars are without image at the initial values.
+            If a star has an undefined image at the initial values.
         """
 
     def correction(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
@@ -2551,19 +2546,19 @@ class StellarProblem:
 
         Returns
         -------
-        `parameters` (3 G + 17,): corrections; `cofactors` of every two and `log_determinant`, both for unit
-        weight; `without_effect`: indices of parameters without effect, which are not corrected.
+        `parameters` (3 G + 17,): corrections; `cofactors` of all pairs and `log_determinant`, both for unit
+        weight; `without_effect`: indices of the parameters that nothing touches, which are not corrected.
 
         Raises
         ------
         StellarError
-            If stars or parameters are undetermined, or without image at the initial values.
+            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def residual_cycle(
         self, cofactors: _Floats, *, refraction: float, distortion: float, passes: int
     ) -> dict[str, Any]:
-        """Correct the stars for given parameters; residuals and their tests (equations 64 to 71).
+        """Correct the stars with fixed parameters; return residuals and tests (equations 64 to 71).
 
         Parameters
         ----------
@@ -2574,18 +2569,18 @@ class StellarProblem:
 
         Returns
         -------
-        As in `adjust`, but of the plate coordinates themselves: `places`, `place_cofactors`,
+        As in `adjust`, with plate coordinates instead of angles: `places`, `place_cofactors`,
         `place_inverses`, `residuals`, `axis_residual`, `sums_of_squares`, and `redundancy` and `standardized`
         of `image` and `place`.
 
         Raises
         ------
         StellarError
-            If stars are undetermined, or without image.
+            If stars or their images are undetermined.
         """
 
     def equations(self) -> dict[str, _Floats]:
-        """Return unweighted equations of the images at the initial values with exact partials.
+        """Return unweighted image equations at the initial values with exact partial derivatives.
 
         Returns
         -------
@@ -2594,10 +2589,10 @@ class StellarProblem:
         """
 
     def axis_equations(self) -> dict[str, _Floats]:
-        """Return equations of the axis, like `equations`, with one row or none."""
+        """Return the equations of the axis as in `equations`, with one row or none."""
 
     def published(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
-        """Return equations of the images as in the report's program (equations 48 to 62, 73, 74).
+        """Return image equations as in the report's program (equations 48 to 62, 73, 74).
 
         Parameters
         ----------
@@ -2613,9 +2608,9 @@ class StellarProblem:
         """Return right ascension and declination (m, 2) of every image at the initial values."""
 
 class CollectionError(Exception):
-    """A collection that cannot be adjusted: (kind, message, combinations, points).
+    """Collection that cannot be adjusted: (kind, message, combinations, points).
 
-    The kinds are as in :class:`BlockError`, without `no intersection`.
+    The kinds are the same as in :class:`BlockError`, without `no intersection`.
     """
 
 def read_numbers(text: bytes) -> tuple[_Floats, bool]:
@@ -2628,40 +2623,40 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
 
 @final
 class TableReader:
-    """Columns of a table of text whose lines are all regular.
+    """Reader of the columns of a text table with regular lines.
 
-    A regular line has as many cells as columns, or an empty one more. The cells of columns of numbers are
-    empty or numbers with the same decimal mark. Names are without control characters. A cell can be in
-    quotation marks if no quotation mark is inside. Comments, and blank lines above others, are irregular.
+    A regular line has as many cells as columns, or an empty one more. Cells of number columns are empty or
+    numbers with the same decimal mark. Names are without control characters. A cell can be in quotation marks
+    if no quotation mark is inside. Comments, and blank lines above others, are irregular.
 
     Parameters
     ----------
     delimiter
-        The code of the character between cells (ASCII).
+        Code of the character between cells (ASCII).
     numeric
         For each column, whether its cells are numbers.
     """
 
     def __new__(cls, delimiter: int, numeric: Sequence[bool]) -> TableReader: ...
     def add(self, lines: bytes) -> bool:
-        """Append whole lines. Return False and drop all columns if a line is irregular."""
+        """Append whole lines. Return False if a line is irregular; the reader is then empty."""
 
     def columns(self) -> list[_Floats | tuple[bytes, _Indices, bool]]:
         """Return the columns and empty the reader.
 
         Returns
         -------
-        Numbers, NaN for empty cells. For names: each unique name in the order of the rows, followed by a line
-        feed; the number of the name of each row; whether no name is known to be empty or NaN, and all differ
-        by more than blanks and case.
+        For numbers, an array with NaN for empty cells. For names: the unique names in order of appearance,
+        each followed by a line feed; the index of the name of each row; whether it is known that no name is
+        empty or NaN, and that all differ by more than blanks and case.
         """
 
 def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]) -> bytes:
     """Return the rows of a table as comma-separated text (UTF-8), one line each.
 
-    Numbers have the shortest digits that are read back to the last bit, NaN and None are empty cells, truth
-    values are `true` and `false`. Texts are quoted if commas, semicolons, bars, tabs, hashes, quotation
-    marks, line ends or outer blanks would be misread. Line ends are replaced by blanks.
+    Numbers have the shortest digits that are read back exactly. NaN and None are empty cells, Booleans are
+    `true` and `false`. Texts with commas, semicolons, bars, tabs, hashes, quotation marks, line ends or
+    surrounding blanks are in quotation marks if necessary. Line ends become blanks.
 
     Parameters
     ----------
@@ -2684,16 +2679,16 @@ def control_header(
     Parameters
     ----------
     data
-        The file.
+        Content of the file.
     start, stop
-        Position of the header in the file.
+        Position of the header in the content.
     file
-        Its name, for errors.
+        File name, for errors.
 
     Returns
     -------
-    Network, target, created, modified, description and user, None if missing; the number of points, if given;
-    version 2: the lengths of the points' messages; radii in metres; unknown fields, byte for byte.
+    Network, target, created, modified, description and user, None if unspecified; the number of points, if
+    specified; version 2: the lengths of the point messages; radii in metres; unknown fields, unchanged bytes.
 
     Raises
     ------
@@ -2704,7 +2699,7 @@ def control_header(
 def control_header_message(
     texts: Sequence[str | None], points: int, radii: Sequence[float], rest: bytes
 ) -> bytes:
-    """Return the header of a binary control network of version 5; see :func:`control_header`."""
+    """Write the header of a binary control network of version 5, from :func:`control_header`."""
 
 def control_points(
     data: bytes, start: int, stop: int, lengths: Sequence[int] | None, file: Path | None
@@ -2714,24 +2709,25 @@ def control_points(
     Parameters
     ----------
     data
-        The file.
+        Content of the file.
     start, stop
-        Position of the points in the file.
+        Position of the points in the content.
     lengths
-        The lengths of their messages; None if each length precedes its message.
+        Lengths of the messages; None if each precedes its message.
     file
-        Its name, for errors.
+        File name, for errors.
 
     Returns
     -------
-    Columns of points, columns of measures, the first measure of each point and the number of all (n + 1).
-    Columns are arrays by name; `ids` is a list of texts, `serial` indices and their texts. Empty columns are
-    omitted. `rest` contains fields without a column, byte for byte, and the start of each row.
+    Columns of points, columns of measures, the first measure of each point and the number of measures (n +
+    1). Columns are arrays by name, `ids` a list of texts, `serial` indices and texts. Empty columns are
+    omitted. `rest` contains fields without a column: unchanged bytes of messages, and the first byte of each
+    row.
 
     Raises
     ------
     InputError
-        If the points are damaged; its record is the number of the point, from 1.
+        If the points are damaged; the record is the number of the point, from 1.
     """
 
 def control_points_of_text(
@@ -2741,16 +2737,16 @@ def control_points_of_text(
 
     Returns
     -------
-    The same as :func:`control_points`, and the text without its points, on the same lines.
+    The result of :func:`control_points`, and the text without its points, with unchanged line numbers.
 
     Raises
     ------
     InputError
-        If the text is not a control network; its record is the number of the line, from 1.
+        If the text is not a control network; the record is the number of the line, from 1.
     """
 
 def control_point_messages(points: _ControlColumns, measures: _ControlColumns, firsts: _Indices) -> bytes:
-    """Return points as messages of version 5, each after its length; see :func:`control_points`.
+    """Write points of :func:`control_points` as messages of version 5 with lengths.
 
     Raises
     ------
@@ -2759,7 +2755,7 @@ def control_point_messages(points: _ControlColumns, measures: _ControlColumns, f
     """
 
 def control_point_text(points: _ControlColumns, measures: _ControlColumns, firsts: _Indices) -> bytes:
-    """Return points as text in the object of their network; see :func:`control_points`.
+    """Write points of :func:`control_points` as text, as in the object of their network.
 
     Raises
     ------
@@ -2768,34 +2764,34 @@ def control_point_text(points: _ControlColumns, measures: _ControlColumns, first
     """
 
 UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]
-"""Types of common unknowns: name, and for each unknown its name and whether it is a `length`, a `speed`, an
+"""Types of shared unknowns: name, and for each unknown its name and whether it is a `length`, a `speed`, an
 `angle` or a `ratio`."""
 
 CAMERAS: list[str]
 """Names of the camera models."""
 
 def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -> _Floats:
-    """Return image coordinates of points, row by row: point i on the photo of row i.
+    """Project points into photos row by row: point i into photo i.
 
     Parameters
     ----------
     camera
-        The model, one of `CAMERAS`; `docs/cameras.md` has their formulas.
+        Camera model, one of `CAMERAS`; `docs/cameras.md` contains the formulas.
     photo_parameters
         (n, 6 + k) angle-axis vector w (rad) and t, so that P = R(w) X + t in the photo's axes (x right, y up,
         looking along -z), then the k parameters of the camera.
     points
-        (n, 3) X.
+        (n, 3) object points X.
 
     Returns
     -------
-    (n, 2) in the unit of the camera; not finite in the plane of the projection centre. For a point behind the
-    camera, the formula is applied as well.
+    (n, 2) in the unit of the camera; not finite in the plane of the projection centre. The formula also
+    applies to points behind the camera.
 
     Raises
     ------
     ValueError
-        If a shape, length or choice is invalid; the message names the argument.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 def collection_network(
@@ -2816,46 +2812,46 @@ def collection_network(
     ordering: str,
     memory: int | None,
 ) -> CollectionNetwork:
-    """Return a collection of photos for adjustment by Levenberg-Marquardt steps.
+    """Create a collection for adjustment by Levenberg-Marquardt steps.
 
     Parameters
     ----------
     camera
-        The model of the cameras, one of `CAMERAS`.
+        Camera model, one of `CAMERAS`.
     photo_parameters, photo_sd
-        (P, 6 + k) initial parameters (also the observed values of weighted ones) and their standard
-        deviations, infinite for free ones, zero for fixed ones; see :func:`collection_images`.
+        (P, 6 + k) initial (and, if weighted, observed) parameters and their standard deviations: infinite for
+        free ones, zero for fixed ones; see :func:`collection_images`.
     point_positions, point_sd
-        (n, 3) likewise.
+        (n, 3) initial positions and standard deviations, in the same way.
     image_photos, image_points
         (m,) indices.
     image_xy, image_sd
         (m, 2) pixels.
     decrease
-        Convergence limit of the relative decrease of the weighted sum of squares by a step.
+        Convergence limit: relative decrease of the weighted sum of squares by a step.
     max_iterations
         Maximum number of iterations.
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
     loss
-        Robust loss of the image points, `huber` or `cauchy`, and its scale in standard deviations a priori.
+        Robust loss of the image points, `huber` or `cauchy`, and its scale in a-priori standard deviations.
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     memory
-        Limit of memory of the adjustment, bytes; None for no limit.
+        Maximum bytes of the adjustment; None: unlimited.
 
     Raises
     ------
     ValueError
-        If a shape, length or choice is invalid; the message names the argument.
+        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
 class CollectionNetwork:
-    """A collection with the options of its adjustment; arguments as in :class:`BlockNetwork`.
+    """Collection with the options of its adjustment; arguments as in :class:`BlockNetwork`.
 
-    The methods raise CollectionError if the collection cannot be adjusted, and ValueError if observations
-    refer to missing photos or points.
+    Methods raise CollectionError for a collection that cannot be adjusted, and ValueError for images with
+    invalid photo or point indices.
     """
 
     def adjust(
@@ -2865,7 +2861,7 @@ class CollectionNetwork:
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         start: BlockState | None = None,
     ) -> CollectionSolution:
-        """Adjust the collection, possibly from the end of an adjustment with other weights."""
+        """Adjust the collection, optionally from a former state with other weights."""
 
     def covariances(
         self,
@@ -2874,47 +2870,47 @@ class CollectionNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> BlockCovariances:
-        """Factor the normal equations at the end of the adjustment."""
+        """Factor the normal equations at the adjusted state."""
 
     def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
-        """Prepare trials without some observations, from the end of an adjustment or from the start."""
+        """Prepare trials without some observations, from an adjusted state or from the start."""
 
 @final
 class CollectionSolution(_NetworkSolution):
-    """An adjusted collection; k is 6 plus the number of parameters of a camera."""
+    """Adjusted collection; k is 6 plus the number of parameters of a camera."""
 
     @property
     def photo_parameters(self) -> _Floats:
-        """(P, k) adjusted parameters, as given."""
+        """(P, k) adjusted parameters, as in the input."""
 
     @property
     def photo_images(self) -> _Indices:
-        """(P,) number of used observations."""
+        """(P,) number of used images."""
 
     @property
     def point_rays_behind(self) -> _Indices:
-        """(n,) number of observations with the point behind the camera."""
+        """(n,) number of images with the point behind the camera."""
 
     @property
     def collapsed(self) -> list[int]:
-        """Indices of excluded points that collapsed to a station."""
+        """Indices of the points that converged to a station and were excluded."""
 
     @property
     def beside_stations(self) -> list[int]:
-        """Indices of excluded points that are given near an observing station and do not fit."""
+        """Indices of the points that are fixed close to a station and were excluded."""
 
     @property
     def not_determined(self) -> list[int]:
-        """Indices of excluded points that their rays do not determine."""
+        """Indices of the points that were excluded because their rays do not determine them."""
 
     @property
     def sum_of_squares(self) -> float:
-        """Weighted sum of squares, with the weights changed by the loss."""
+        """Weighted sum of squares, with weights modified by the loss."""
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Observations and weighted unknowns less unknowns."""
+        """Observations and weighted unknowns minus unknowns."""
 
     @property
     def datum(self) -> list[tuple[int, int]]:
-        """Photos and parameters fixed to define the datum; empty if observations and weights define it."""
+        """Photos and parameters fixed to define a datum; empty if observations and weights define one."""

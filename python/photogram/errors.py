@@ -1,4 +1,4 @@
-"""What goes wrong: a small tree of exceptions under :class:`PhotogramError`."""
+"""Exceptions of photogram, all derived from :class:`PhotogramError`."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ __all__ = [
 
 
 class PhotogramError(Exception):
-    """Base of every exception that photogram raises on purpose; all can be pickled.
+    """Base class of all exceptions that photogram raises; every exception can be pickled.
 
     Parameters
     ----------
     message
-        What is wrong: a sentence, or its code with fields.
+        Error message: a sentence, or its code with fields.
 
     Attributes
     ----------
     phrase
-        The message as a code with fields; None if it has none.
+        The message as a code with fields; None for a plain sentence.
     """
 
     phrase: Phrase | None = None
@@ -41,31 +41,31 @@ class PhotogramError(Exception):
 
     @property
     def code(self) -> str:
-        """The code of the message in the files of words; empty if it has none."""
+        """Code of the message in the message catalogue; empty for a plain sentence."""
         return "" if self.phrase is None else self.phrase.code
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Not by what the class is called with, which differs from one to the other.
+        # Constructors of subclasses have different arguments.
         return _again, (type(self), self.args, self.__dict__)
 
 
 def _again(kind: type[PhotogramError], arguments: tuple[Any, ...], held: dict[str, Any]) -> PhotogramError:
-    """Make an exception anew of what it holds."""
-    # Of a MemoryError that is an error of ours first, too, the base makes the object.
+    """Rebuild a pickled exception from its arguments and attributes."""
+    # BaseException can also create subclasses whose first base is MemoryError.
     error = BaseException.__new__(kind, *arguments)
     error.__dict__.update(held)
     return error
 
 
 class InputError(PhotogramError, ValueError):
-    """Input that cannot be used: a file, a record of it, or an array.
+    """Invalid input: a file, a record of a file or an array.
 
     Parameters
     ----------
     message
-        What is wrong: a sentence, or its code with fields.
+        Error message: a sentence, or its code with fields.
     file, record, text
-        The file, the number of the record in it (from 1) and the record itself, as far as they apply.
+        File, record number in the file (from 1) and text of the record, if they apply.
     """
 
     def __init__(
@@ -85,41 +85,41 @@ class InputError(PhotogramError, ValueError):
 
 
 def message_of(error: Exception) -> str | Phrase:
-    """Return the message of an error without its place, as a code with fields if it has one."""
+    """Return the message of an error without its location, as a code if it has one."""
     message: str | Phrase = getattr(error, "phrase", None) or getattr(error, "message", "") or str(error)
     return message
 
 
 class ContradictionError(InputError):
-    """Input that can be read and contradicts itself: what would be made of it could not be used."""
+    """Readable input that contradicts itself and would give an unusable result."""
 
     @classmethod
     def of(cls, error: InputError) -> Self:
-        """Return it at the place of another error, with its message."""
+        """Convert another input error; message and location are copied."""
         return cls(message_of(error), file=error.file, record=error.record, text=error.text)
 
 
 class AdjustmentError(PhotogramError):
-    """The adjustment could not be carried out."""
+    """Adjustment that cannot be carried out."""
 
 
 class OutOfMemoryError(AdjustmentError, MemoryError):
-    """The work would take more memory than there is, or an allocation has failed. The process goes on."""
+    """Insufficient memory: too little is available, or an allocation failed. The process continues."""
 
 
 class RankError(AdjustmentError):
-    """The observations do not determine all unknowns; the message names the photos and points concerned.
+    """Rank defect: unknowns that the observations do not determine, with their photos and points.
 
     Parameters
     ----------
     message
-        What is undetermined: a sentence, or its code with fields.
+        Description of the undetermined unknowns: a sentence, or its code with fields.
     photos, points
         Identifiers of the photos and points concerned.
     cameras
         Names of the cameras concerned.
     what
-        What is undetermined, in one line; nothing where it is the message.
+        Undetermined unknowns in one line. Default: the message.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""How much memory there is, and the refusal of work that would take more."""
+"""Available memory, and rejection of work that needs more."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from photogram.errors import OutOfMemoryError
 from photogram.words import phrase
 
 GROUPS = (
-    # Version 2, alone and beside version 1; then version 1.
+    # Control groups version 2, without and with version 1; then version 1.
     ("", "sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
     ("", "sys/fs/cgroup/unified", "memory.max", "memory.current", "inactive_file"),
     (
@@ -24,17 +24,15 @@ GROUPS = (
         "total_inactive_file",
     ),
 )
-"""Controllers as `/proc/self/cgroup` names them, where the tree of their groups stands, the files with the
-limit of a group and with what it uses, and what of that the kernel gives back when asked."""
-STACK = 160 << 20  # Addresses for the stack of a thread, its share of the heap, and what is kept in reserve
+"""Controller, root of its group tree, files with limit and usage, and key of the reclaimable memory."""
+STACK = 160 << 20  # Bytes of addresses for the stack of a thread, its share of the heap and a reserve
 
 
 def available_memory(root: Path = Path("/")) -> int | None:
-    """Return the bytes that this process can still take without swapping; None where nothing tells.
+    """Return the memory available to this process without swapping, bytes; None if unknown.
 
-    The least of what Linux says is available, of what the control group of the process (a container) and
-    the groups around it may still take, and of what the limits of the process (`ulimit -v`, `ulimit -d`)
-    leave.
+    The minimum of three values: the available memory reported by Linux, the unused memory of the control
+    groups (containers), and the unused part of the limits (`ulimit -v`, `ulimit -d`).
     """
     threads = os.cpu_count() or 1
     own = addresses_of_a_thread(root)
@@ -44,13 +42,13 @@ def available_memory(root: Path = Path("/")) -> int | None:
 
 
 def resident_memory(root: Path = Path("/")) -> int | None:
-    """Return the bytes of memory that this process holds; None where nothing tells."""
+    """Return the resident memory of this process, bytes; None if unknown."""
     fields = _text(root / "proc/self/statm").split()
     return os.sysconf("SC_PAGE_SIZE") * int(fields[1]) if len(fields) > 1 else None
 
 
 def give_back() -> None:
-    """Have what was freed given back to the system, where the library that keeps it can be told to."""
+    """Return freed memory to the operating system, if the allocators support it."""
     from photogram import _photocore
 
     if "pyarrow" in sys.modules:
@@ -59,7 +57,7 @@ def give_back() -> None:
 
 
 def require(needed: float, what: str) -> None:
-    """Refuse work that would take more memory than there is, before it begins."""
+    """Raise an OutOfMemoryError if work needs more memory than is available."""
     available = available_memory()
     if available is not None and needed > available:
         raise OutOfMemoryError(
@@ -69,14 +67,14 @@ def require(needed: float, what: str) -> None:
 
 @contextmanager
 def turned(what: str) -> Iterator[None]:
-    """Turn an allocation that fails into an :class:`OutOfMemoryError`; `what` says for what it was."""
+    """Convert a failed allocation into an :class:`OutOfMemoryError` that names the work."""
     try:
         yield
     except OutOfMemoryError:
         raise
     except MemoryError as error:
         detail = f"; {error}" if str(error) else ""
-        # The files of words may not fit into the rest of the memory.
+        # The message catalogue may not fit into the remaining memory.
         exhausted = OutOfMemoryError(f"{what}: there is not enough memory{detail}")
         exhausted.phrase = phrase("memory.exhausted", subject=what, error=str(error))
         raise exhausted from None
@@ -88,14 +86,14 @@ def gibibytes(number: float) -> str:
 
 
 def _machine(root: Path) -> Iterator[int]:
-    """Yield what Linux says is available."""
+    """Yield the available memory of the machine, as reported by Linux."""
     for line in _text(root / "proc/meminfo").splitlines():
         if line.startswith("MemAvailable:"):
             yield 1024 * int(line.split()[1])
 
 
 def _groups(root: Path) -> Iterator[int]:
-    """Yield what the control groups of the process, and all around them, may still take."""
+    """Yield the unused memory of each control group of the process."""
     for limit, usage, stat, spare in _counters(root, _text(root / "proc/self/cgroup")):
         most = _text(limit).strip()
         if most.isdecimal() and (used := _text(usage).strip()).isdecimal():
@@ -105,7 +103,7 @@ def _groups(root: Path) -> Iterator[int]:
 
 @cache
 def _counters(root: Path, groups: str) -> tuple[tuple[Path, Path, Path, str], ...]:
-    """Find the files that count the memory of groups: limits may change, where they stand does not."""
+    """Find the files that count the memory of groups; their paths do not change."""
     found = []
     for line in groups.splitlines():
         _, _, rest = line.partition(":")
@@ -113,7 +111,7 @@ def _counters(root: Path, groups: str) -> tuple[tuple[Path, Path, Path, str], ..
         for controller, tree, limit, usage, spare in GROUPS:
             if controller not in controllers.split(","):
                 continue
-            # In a container the tree may begin at the group itself, and its path be that of the host.
+            # In a container, the tree may begin at the group itself while its path starts at the host.
             group = root / tree / ("" if ".." in path else path.strip("/"))
             for place in (group, *group.parents):
                 if (place / limit).exists():
@@ -124,11 +122,11 @@ def _counters(root: Path, groups: str) -> tuple[tuple[Path, Path, Path, str], ..
 
 
 def _limits(root: Path) -> Iterator[int]:
-    """Yield what the limits of the process leave."""
+    """Yield the unused part of each limit of the process."""
     try:
         import resource
     except ImportError:
-        # Not on this system.
+        # The module does not exist on this system.
         return
     limits = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
     if all(soft == resource.RLIM_INFINITY for soft in limits):
@@ -143,27 +141,27 @@ def _limits(root: Path) -> Iterator[int]:
 
 @cache
 def addresses_of_a_thread(root: Path = Path("/")) -> int:
-    """Return the addresses that a thread of the core takes; 0 where the cache is not known.
+    """Return the addresses that a thread of the core needs, bytes; 0 if the cache size is unknown.
 
-    The products of matrices have buffers of twice the cache. The core takes them before it begins.
+    Buffers of matrix products have twice the size of the cache and are allocated first.
     """
     size = _text(root / "sys/devices/system/cpu/cpu0/cache/index3/size").strip()
     return 2048 * int(size[:-1]) + STACK if size.endswith("K") and size[:-1].isdecimal() else 0
 
 
 def threads_that_fit(threads: int, root: Path = Path("/")) -> int:
-    """Return how many of some threads half of what a limit of addresses leaves suffices for; one at least."""
+    """Return how many threads, at least 1, fit into half of the address limit."""
     left = min(_limits(root), default=None)
     return threads if left is None else _fitting(left, threads, addresses_of_a_thread(root))
 
 
 def _fitting(left: int, threads: int, own: int) -> int:
-    """Return how many of some threads, each with `own` addresses, half of those left suffices for."""
+    """Return how many threads with `own` addresses each fit into half of `left`; at least 1."""
     return max(1, min(threads, (left - own) // 2 // own)) if own else threads
 
 
 def _text(path: Path) -> str:
-    """Read what the system tells; empty where it does not."""
+    """Read a system file; return an empty text if it is not readable."""
     try:
         return path.read_text()
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Remarks on the input that do not stop the run."""
+"""Notes on the input that do not stop the run."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from photogram.words import Phrase
 
 __all__ = ["Message", "Undetermined"]
 
-MOST_NAMES = 12  # Names that a message lists at most
+MOST_NAMES = 12  # Maximum number of names in a message
 
-MANY = 2_000  # Names among which no nearest one is looked for
+MANY = 2_000  # Number of names above which no nearest name is searched
 
-MOST_CHARACTERS = 200  # Characters of a record in a message
+MOST_CHARACTERS = 200  # Maximum number of characters of a record in a message
 
 
 def shortened(text: str, most: int = MOST_CHARACTERS) -> str:
-    """Return the beginning of a long text, and how long it is; a short one as it is."""
+    """Shorten a long text to its beginning and its length; return a short text unchanged."""
     return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
 
 
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
-    """Put the place (file, record number, record text) before and after a message.
+    """Add the location (file, record number and record text) to a message.
 
-    Of a long record the beginning is shown. Characters that do not print stand there as U+FFFD, one for one.
+    Long records are shortened. Each unprintable character is replaced by U+FFFD.
     """
     place = ", ".join(
         part for part in (printable(str(file)) if file else "", f"record {record}" if record else "") if part
@@ -38,12 +38,12 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
 
 
 def printable(text: str) -> str:
-    """Return a text with U+FFFD for each character that does not print: no terminal should get it."""
+    """Replace each unprintable character by U+FFFD, to protect terminals."""
     return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 
 def unknown_name(kind: str | Phrase, name: str, names: Iterable[str]) -> Phrase:
-    """Return the message that there is no thing with a name: with the nearest name, or all names."""
+    """Return the message for an unknown name, with the nearest name or all names."""
     import difflib  # a wrong name is rare
 
     known = list(names)
@@ -63,34 +63,34 @@ def by_name(things: Iterable[Any], name: str, kind: str) -> Any:
 
 
 def missing_columns(missing: Sequence[str], columns: Sequence[str]) -> Phrase:
-    """Return the message that a table lacks some columns."""
+    """Return the message for missing columns of a table."""
     fields = {"n": len(missing), "names": list(missing), "columns": list(columns)}
     return Phrase("error.missing-columns", fields)
 
 
 def counted(count: int, noun: str) -> str:
-    """Return a number with its noun, which has an s where there are several: 1 photo, 2 photos."""
+    """Return a number and its noun in singular or plural: 1 photo, 2 photos."""
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def listed(names: list[str], most: int = MOST_NAMES) -> str:
-    """Name all of a few, and some of many: `most` of them."""
+    """List up to `most` names, followed by the number of the others."""
     shown = ", ".join(names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
 @dataclass(frozen=True)
 class Message:
-    """A remark on the input that does not stop the run.
+    """Note on the input that does not stop the run.
 
     Attributes
     ----------
     text
-        The remark: a sentence, or its code with fields, of which this is the sentence.
+        The note: a sentence, or its code with fields, which is converted to the sentence.
     file, record, record_text
-        The file, the number of the record in it (from 1) and the record itself, as far as they apply.
+        File, record number in the file (from 1) and text of the record, if they apply.
     phrase
-        The remark as a code with fields; None if it has none.
+        The note as a code with fields; None for a plain sentence.
     """
 
     text: str | Phrase
@@ -106,12 +106,12 @@ class Message:
 
     @classmethod
     def of(cls, code: str, file: Path | None = None, /, **fields: Any) -> Message:
-        """Return the remark of a code with its fields."""
+        """Return the note with this code and fields."""
         return cls(Phrase(code, fields), file)
 
     @property
     def code(self) -> str:
-        """The code of the remark; empty if it has none."""
+        """Code of the note; empty for a plain sentence."""
         return "" if self.phrase is None else self.phrase.code
 
     def __str__(self) -> str:
@@ -120,6 +120,6 @@ class Message:
 
 @dataclass(frozen=True)
 class Undetermined(Message):
-    """A remark on unknowns that adjusted values leave undetermined, or so nearly that others fit as well."""
+    """Note on unknowns that are undetermined, or nearly so, despite their adjusted values."""
 
-    what: str = ""  # The unknowns, and what that is
+    what: str = ""  # The undetermined unknowns and their meaning

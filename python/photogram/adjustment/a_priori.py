@@ -1,4 +1,4 @@
-"""What is known of a block before its photos have poses, in cartesian axes."""
+"""Prior positions and attitudes of a block before its photos are oriented, in cartesian axes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from photogram.network.unknowns import Boresight, LeverArm
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of P photos and n points, in cartesian axes; NaN where nothing is.
+    """Prior values of P photos and n points in cartesian axes; NaN if unknown.
 
-    Given poses are (P, 3) and (P, 3, 3), photo to object, both parts or none; observed ones the same of
-    photos without a given pose, as observed or given by halves. Points are (n, 3) of control, their standard
-    deviations infinite where they are not held.
+    Given poses are (P, 3) and (P, 3, 3), photo to object, always complete. Observed poses belong to photos
+    without a given pose and may be incomplete. Points (n, 3) are control; free components have infinite
+    standard deviations.
     """
 
     positions: Floats
@@ -31,13 +31,13 @@ class Known:
 
     @classmethod
     def of(cls, block: Block, axes: Cartesian) -> Known:
-        """Return what a block knows."""
+        """Collect the prior values of a block."""
         positions = axes.positions(block.photo_positions)
         attitudes = axes.from_local(
             photo_axes(block.photo_attitudes, block.photo_to_ground), block.photo_positions
         )
         given = np.asarray(np.isfinite(np.column_stack([positions, attitudes.reshape(-1, 9)])).all(axis=1))
-        # No picture has the pose of a photo that is on a trajectory with others, or line by line.
+        # A photo on a shared trajectory, or of a line scanner, has several poses.
         given &= ~(on_shared(block) | scanners(block))
         observed = block.photo_positions_observed
         centres = positions.copy()
@@ -63,7 +63,7 @@ class Known:
 
 
 def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: Floats) -> None:
-    """Put observed attitudes, A_obs B', and positions, less their lever arms, in place."""
+    """Insert observed attitudes A_obs B', and observed positions minus lever arms."""
     place = {name: row for row, name in enumerate(block.photo_ids)}
     of_photos = [each for each in block.observations if each.moment is None]
     positions = [each for each in of_photos if isinstance(each, Position)]
@@ -88,7 +88,7 @@ def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: F
 
 
 def _control(block: Block, axes: Cartesian) -> tuple[Floats, Floats]:
-    """Return positions and standard deviations of control, in cartesian axes."""
+    """Return positions and standard deviations of control in cartesian axes."""
     points, sd = block.point_positions.copy(), block.point_sd.copy()
     place = {name: row for row, name in enumerate(block.point_ids)}
     for each in block.observations:
@@ -98,7 +98,7 @@ def _control(block: Block, axes: Cartesian) -> tuple[Floats, Floats]:
     held = np.isfinite(sd)
     points[~held.any(axis=1)] = np.nan
     if axes.spheroid is not None:
-        # Only full control has a place in geocentric axes; one standard deviation stands for all three.
+        # Only full control is usable in geocentric axes, with one standard deviation for all axes.
         full = held.all(axis=1, keepdims=True)
         metric = sd * [axes.spheroid.a, axes.spheroid.a, 1.0]
         sd = np.where(full, np.broadcast_to(metric.max(axis=1, keepdims=True), sd.shape), np.inf)

@@ -51,11 +51,11 @@ UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
-AS_PUBLISHED = 4  # Iterations of the 1987 program, where nobody says how many
-OF_CAMERAS = 200  # Most iterations with free camera parameters
-OF_KNOTS = 400  # Most iterations with the knots of a splined lens
+AS_PUBLISHED = 4  # Default number of iterations of the 1987 program
+OF_CAMERAS = 200  # Maximum iterations with free camera parameters
+OF_KNOTS = 400  # Maximum iterations with the knots of a splined lens
 NOTABLE_RISE = 1e-3  # Percent; less is rounding
-TURNS = 5  # So often at the most do tables of trajectories take over large corrections
+TURNS = 5  # Maximum number of updates of trajectory tables by large corrections
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class AsPublished:
     Attributes
     ----------
     percent
-        Converged when the weighted sum of squares changes by less than this from one iteration to the next.
+        Convergence limit: relative change of the weighted sum of squares between iterations, percent.
     """
 
     percent: float = 5.0
@@ -73,16 +73,16 @@ class AsPublished:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far an adjustment has come.
+    """Progress of an adjustment.
 
     Attributes
     ----------
     phase
-        `form` (with the factorisation), `solve`, `invert` (with cofactors), or `iteration` when one is over.
+        `form` (with factorisation), `solve`, `invert` (with cofactors), or `iteration` after an iteration.
     done, total
-        Points done of all, within the phase.
+        Processed points and all points of the phase.
     iteration
-        The iteration that is over.
+        The completed iteration.
     """
 
     phase: str
@@ -106,76 +106,72 @@ def adjust(
 ) -> Result:
     """Adjust a block by least squares.
 
-    Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
-    are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
-    their rays. Refraction, where the block has it, is applied in every iteration. A block that is too large
-    for one process, or too slow in it, is for :func:`photogram.adjust_in_parts`; one whose photos keep their
-    poses is `block.with_fixed_photos()`.
+    Every unknown is a weighted parameter, from free to fixed. Points that their image observations do not
+    determine are excluded (see `messages` and `dropped` of the result). Other points start from the
+    intersection of their rays. Refraction of the block is applied in every iteration. Use
+    :func:`photogram.adjust_in_parts` for a block that is too large or too slow for one process, and
+    `block.with_fixed_photos()` for fixed poses.
 
     Parameters
     ----------
     block
         The block.
     datum
-        Of a block that is free: what is held (minimum constraints), or chosen points and photos that stay as
-        near as they come to their given places (inner constraints); see docs/datum.md. None: minimum
-        constraints, chosen where nothing else gives a datum.
+        Datum of a free block: minimum constraints, or inner constraints on selected points and photos; see
+        docs/datum.md. None: minimum constraints, selected if nothing else defines the datum.
     unit_variance
-        What the variance of unit weight is based on: every weighted quantity as the observation that it is
-        (`constrained`), 1 (`unity`), or the redundancy numbers of image coordinates, control and observations
-        beside images (`redundancy`, docs/weights.md). `free`, the default of the 1987 program (GIANT guide,
-        Appendix E), counts image coordinates and ground control only, and is too large where photos or
-        cameras are weighted. Covariances are scaled by it.
+        Basis of the variance of unit weight. `constrained`: every weighted quantity is an observation.
+        `unity`: the variance is 1. `redundancy`: redundancy numbers of image coordinates, control and
+        additional observations (docs/weights.md). `free`, the default of the 1987 program (GIANT guide,
+        Appendix E): image coordinates and ground control only; too large if photos or cameras are weighted.
+        Covariances are scaled by the variance.
     loss
-        Robust loss in place of the squares of image coordinates: `huber` or `cauchy`, of both coordinates
-        of an image point together; None for least squares. `("huber", 2.0)` also says where it sets in, in
-        standard deviations a priori, which is at 1.50 for `huber` and 2.55 for `cauchy` otherwise. Variance,
-        covariances and redundancy numbers hold for the weights as the loss has modified them
-        (`image_weights`).
+        Robust loss of image coordinates: `huber` or `cauchy`, of both coordinates of an image point together.
+        None: least squares. `("huber", 2.0)` also specifies the scale in a-priori standard deviations,
+        otherwise 1.50 for `huber` and 2.55 for `cauchy`. Variance, covariances and redundancy numbers refer
+        to the weights modified by the loss (`image_weights`).
     covariance
-        Whether to compute covariances, redundancy numbers and standardized residuals. `verdict`: the verdict,
-        or a report, will be asked for too; the adjustment takes about a twentieth longer, and keeps what the
-        tests need until then, where there is memory, so that they form nothing again. It does so without a
-        loss and inner constraints, and where it converges.
+        Whether to compute covariances, redundancy numbers and standardized residuals. `verdict`: a verdict or
+        report will follow. The adjustment then takes about 5 % longer and stores data for the tests, if there
+        is enough memory. This requires convergence, no loss and no inner constraints.
     tolerance
-        Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
-        weight), or until the rate of convergence shows that none would by more than a tenth of it. A step
-        that raises the sum of squares is damped (Levenberg-Marquardt). Or as the 1987 program did.
+        Convergence limit: largest change of an unknown, as a fraction of its standard deviation (a-priori
+        unit weight). The iteration also ends if the convergence rate predicts less than a tenth of it. A step
+        that increases the sum of squares is damped (Levenberg-Marquardt). `AsPublished`: the criterion of the
+        1987 program.
     max_iterations
-        Largest number of iterations. When None, 50; 200 with a loss, because reweighting needs more of them,
-        or with free parameters of cameras, because a weak network follows a curved valley; 400 with a splined
-        lens, whose knots few images leave to their priors, and steps along these are short; 4 as the 1987
-        program did.
+        Maximum number of iterations. None: 50; 200 with a loss, which needs reweighting, or with free camera
+        parameters, which converge slowly in weak networks; 400 with a splined lens, whose knots may depend on
+        their priors only; 4 for `AsPublished`.
     ordering
-        How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
-        approximate minimum degree, by nested dissection across their positions, or across their ties alone.
-        `auto` takes the one with the least predicted work.
+        Elimination order of photos: input order, narrow band (reverse Cuthill-McKee), approximate minimum
+        degree, nested dissection by positions, or by ties only. `auto` selects the order with the least
+        predicted work.
     threads
-        Number of threads, no more than four for each processor. When None, a block of a few thousand image
-        points stays on the calling thread, to which others would only be a burden; a larger one has all
-        processors. The result does not depend on it, to the last bit.
+        Number of threads, at most four per processor. None: one thread for up to a few thousand image points,
+        otherwise all processors. The result is identical to the last bit for any number.
     progress
-        Called now and then with what is going on; an exception it raises stops the adjustment.
+        Called with the progress from time to time; an exception that it raises stops the adjustment.
 
     Returns
     -------
-    The result; its `status` says whether the adjustment converged.
+    The result; its `status` is `converged` if the adjustment converged.
 
     Raises
     ------
     RankError
-        The observations do not determine all unknowns; names the photos and points concerned.
+        If the observations do not determine all unknowns; lists the photos and points concerned.
     AdjustmentError
-        There is nothing to adjust, the initial values give no finite image coordinates, or double precision
-        is too coarse for coordinates so large; names the photos and points concerned. A datum was asked for,
-        and the block is not free.
+        If there is nothing to adjust, initial values give infinite image coordinates, or double precision is
+        insufficient for large coordinates; lists the photos and points concerned. If a datum is specified for
+        a block that is not free.
     OutOfMemoryError
-        The adjustment would take more memory than there is.
+        If the adjustment needs more memory than is available.
     InputError
-        An option that cannot be, a datum of points and photos that do not carry it, a photo that is not above
-        the water of the block; a datum that photos on trajectories would carry.
+        If an option is invalid, or the points and photos of the datum cannot define it or are on
+        trajectories. If a photo is not above the water of the block.
     KeyboardInterrupt
-        Ctrl-C.
+        If interrupted by Ctrl-C.
     """
     checked(block)
     keep = isinstance(covariance, str) and covariance == "verdict"
@@ -209,7 +205,7 @@ def adjust(
 
 
 def iteration_limit(block: Block, tolerance: float | AsPublished = 1e-5) -> int | None:
-    """Return the default largest number of iterations for the cameras of a block; None if they need none."""
+    """Return the maximum number of iterations that free cameras need; None for the default."""
     if any(each.knot_unknowns for each in block.cameras):
         return OF_KNOTS
     if isinstance(tolerance, AsPublished) or not any(
@@ -222,7 +218,7 @@ def iteration_limit(block: Block, tolerance: float | AsPublished = 1e-5) -> int 
 def with_datum(
     block: Block, options: CoreOptions, datum: InnerConstraints | MinimumConstraints | None
 ) -> tuple[CoreOptions, DatumRow | None]:
-    """Return options with what is to be held of a block, and inner constraints as the core knows them."""
+    """Return options with the minimum constraints of a block, and inner constraints for the core."""
     if isinstance(datum, MinimumConstraints):
         options = replace(options, minimum=minimum_row(block, datum))
     return options, datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
@@ -237,13 +233,13 @@ def core_options(
     *,
     ordering: Ordering = "auto",
 ) -> CoreOptions:
-    """Return how the core adjusts, by options of :func:`adjust`, checked; nothing is chosen to be held."""
+    """Return validated options for the core, without minimum constraints."""
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     row = loss_row(loss)
     as_published = isinstance(tolerance, AsPublished)
     limit = tolerance.percent if isinstance(tolerance, AsPublished) else tolerance
     if max_iterations is None:
-        # Reweighting takes more iterations.
+        # Reweighting needs more iterations.
         max_iterations = AS_PUBLISHED if as_published else 50 if row is None else 200
     check_iteration(ordering, max_iterations, limit)
     if unit_variance == "redundancy" and not covariance:
@@ -269,7 +265,7 @@ def adjusted_from(
     threads: int | None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Result:
-    """Adjust a block whose values, those of points too, are where an adjustment of much of it has ended."""
+    """Adjust a block whose values and point positions are close to an adjusted state."""
     options = replace(options, points_given=True)
     return _adjusted(started(block), options, core_threads(threads), progress)
 
@@ -306,9 +302,9 @@ def _adjusted(
 def adjusted_again(
     block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
 ) -> Result:
-    """Adjust a block, of which only weights have changed, from where an adjustment of it has ended.
+    """Continue an adjustment of a block after a change of weights.
 
-    `options` and `start` are those of the former result, and where it ended: its `options` and `state`.
+    `options` and `start` are `options` and `state` of the former result.
     """
     return _adjusted(block, options, core_threads(threads), start=start)
 
@@ -316,7 +312,7 @@ def adjusted_again(
 def messages_of(
     block: Block, solution: _photocore.BlockSolution, options: CoreOptions, datum: ResultDatum
 ) -> list[Message]:
-    """Return what a result remarks on, but for hints."""
+    """Return the notes of a result, without hints."""
     messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     messages += remark(options.loss, solution.image_weights)
     iterations = [Iteration(*row) for row in solution.iterations] if options.criterion == "percent" else []
@@ -330,7 +326,7 @@ def messages_of(
 def teller(
     progress: Callable[[Progress], None],
 ) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
-    """Return the function that the core calls, which calls `progress`."""
+    """Return the callback of the core that calls `progress`."""
     if not callable(progress):
         raise kind_error("progress", "a function", progress)
 
@@ -341,7 +337,7 @@ def teller(
 
 
 def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
-    """Refuse invalid options of an iteration."""
+    """Reject invalid options of an iteration."""
     one_of("ordering", ordering, get_args(Ordering))
     at_least("max_iterations", max_iterations, 1)
     if not number("tolerance", tolerance) > 0:
@@ -349,14 +345,14 @@ def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> Non
 
 
 def at_least(name: str, value: object, least: int) -> int:
-    """Return a whole number that is not below a limit."""
+    """Return a validated whole number with a lower limit."""
     if (whole := whole_number(name, value)) < least:
         raise argument_error(name, "least", low=least, value=whole)
     return whole
 
 
 def core_threads(threads: int | None) -> int:
-    """Return the number of threads for the core, a few for each processor; 0 leaves it to the core."""
+    """Return the number of threads for the core, a few per processor; 0 is the default of the core."""
     if threads is None:
         processors = os.cpu_count() or 1
         fit = threads_that_fit(processors)
@@ -365,7 +361,7 @@ def core_threads(threads: int | None) -> int:
 
 
 def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Collect remarks on the block that did not stop the adjustment, the gravest first."""
+    """Collect notes on the block, the most severe first."""
     error = None if solution.undetermined is None else named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
@@ -393,7 +389,7 @@ def named(
     *,
     unknowns: Sequence[Unknown] | None = None,
 ) -> AdjustmentError:
-    """Put names to the indices of a failure of the core; `unknowns` where it has others than the block."""
+    """Name the objects of a core failure; `unknowns` if they are not the unknowns of the block."""
     point_names = [block.point_ids[i] for i in points]
     if kind == "undetermined points":
         seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})

@@ -1,8 +1,8 @@
-"""Gross errors and weights together: snooping, variance components, snooping again, until both stand.
+"""Gross errors and weights: data snooping and variance components, repeated until both are stable.
 
-Components of contaminated data are worth nothing, and with weights that are far too optimistic half of the
-observations would be taken for gross errors. So first gross errors go, with the given weights; only when the
-rest still contradicts its weights are these estimated, and snooping begins anew, from all observations.
+Variance components of contaminated data are meaningless, and with far too optimistic weights half of the
+observations would be removed. Therefore gross errors are removed first, with the given weights. Only if the
+rest contradicts its weights, components are estimated and snooping is repeated from all observations.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from photogram.show.page import Document, Part, Remarks, Section
 from photogram.statistics.components import WORTH_CHANGING
 from photogram.words import phrase
 
-MOST_ROUNDS = 3  # Of components and snooping
-STANDS = 0.05  # Components that change by less are the same
+MOST_ROUNDS = 3  # Maximum number of rounds of components and snooping
+STANDS = 0.05  # Components with a smaller relative change are stable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cleaned(Brief, Documented):
-    """A network without gross errors, with weights that its residuals bear out.
+    """Network without gross errors, with weights that agree with its residuals.
 
     Attributes
     ----------
     snooped
-        The last snooping: its result is the network that is left, with the weights it has now.
+        Last snooping; its result is the remaining network with its final weights.
     components
-        The last variance components, relative to the weights of that result; None where the given weights
-        explained the residuals as soon as gross errors were out.
+        Last variance components, relative to the weights of that result. None if the given weights explain
+        the residuals after removal of gross errors.
     groups, factors
-        Names of the groups, and by what their given variances were multiplied in all.
+        Names of the groups, and total factors of their given variances.
     rounds
-        How many times components were estimated.
+        Number of component estimations.
     settled
-        Whether the last round changed neither a decision nor a component by more than 5 percent.
+        Whether the last round changed no decision and no component by more than 5 percent.
     """
 
     snooped: Snooped
@@ -77,7 +77,7 @@ class Cleaned(Brief, Documented):
         return [str(message) for message in messages]
 
     def section(self) -> Section:
-        """Return the section on weights: what was done to them, and the components that are left."""
+        """Return the report section on weights: changes and remaining components."""
         from photogram.results.components import components_section
 
         parts: list[Part] = [Remarks(self.changes)]
@@ -87,12 +87,12 @@ class Cleaned(Brief, Documented):
         return Section("components", "Weights", parts, intro)
 
     def document(self) -> Document:
-        """Return the document of the network that is left, with what was done to weights and observations."""
+        """Return the document of the remaining network with changes of weights and observations."""
         network = self.snooped.document()
         return replace(network, sections=[self.section(), *network.sections])
 
     def report(self) -> str:
-        """Return what was done to weights and observations as text."""
+        """Return the changes of weights and observations as text."""
         from photogram.show.forms import text
 
         return text(Document("Weights", "", [], [], [], [self.section()]))
@@ -108,30 +108,30 @@ def clean(
     threads: int | None = None,
     **options: Any,
 ) -> Cleaned:
-    """Take gross errors out and estimate weights, in the order in which neither spoils the other.
+    """Remove gross errors and estimate weights in alternation.
 
-    Snooping with the given weights; if the global test then still rejects: components, snooping from the full
-    set with the new weights, at most three times, until no decision changes and no component by more than 5
-    percent. Weights change only where a component is significant, and standard deviations are wrong by more
-    than a quarter.
+    Snooping uses the given weights first. If the global test then rejects, components are estimated and
+    snooping is repeated from the full set with the new weights, at most three times. It ends if no decision
+    changes and no component by more than 5 percent. Weights change only if a component is significant and
+    standard deviations are wrong by more than a quarter.
 
     Parameters
     ----------
     network
         The block or collection.
     groups, held, probing
-        As of :func:`photogram.variance_components`.
+        As in :func:`photogram.variance_components`.
     level
-        Of the tests of snooping, and of those of components.
+        Significance level of the tests in snooping and of components.
     threads
-        As of :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
     options
-        Further ones of :func:`photogram.snoop`.
+        Other options of :func:`photogram.snoop`.
 
     Raises
     ------
     InputError, AdjustmentError, RankError
-        As of :func:`photogram.snoop` and :func:`photogram.variance_components`.
+        As in :func:`photogram.snoop` and :func:`photogram.variance_components`.
     """
     grouping = grouped(observables(network), groups)
     names = grouping.groups.names
@@ -151,19 +151,19 @@ def clean(
         snooped = snoop(scaled(network, grouping, changed), level=level, threads=threads, **options)
         stands = bool((np.abs(changed / factors - 1) <= STANDS).all())
         factors, settled = changed, stands and before == _out(snooped)
-    # What is left is estimated once more, with its test of equality, for the report.
+    # Components of the remaining network, with the equality test, are estimated for the report.
     left, own = _left(network, grouping, snooped.result)
     found = of_grouping(left, own, replace(settings, equality=True), held=held, threads=threads)
     return Cleaned(snooped, found, names, factors, rounds, settled)
 
 
 def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[Any, Grouping]:
-    """Return what snooping has left of a network, and the groups of its observations."""
+    """Return the network after snooping, and the groups of its observations."""
     left = result.given
     points = int(network.image_points.max(initial=0)) + 1
     keys = network.image_photos * points + network.image_points
     order = np.argsort(keys)
-    # A photo has one image of a point.
+    # Each point is observed at most once per photo.
     places = order[np.searchsorted(keys, left.image_photos * points + left.image_points, sorter=order)]
     observations = grouping.observations
     if len(observations) != len(left.observations):
@@ -177,12 +177,12 @@ def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[An
 
 
 def _told(observation: Any) -> tuple[object, ...]:
-    """Return what tells an observation from others whatever its weight is."""
+    """Return a key of an observation that does not depend on its weight."""
     return (observation.label, observation.of, observation.observed.tobytes())
 
 
 def _changed(found: VarianceComponents, names: Sequence[str], factors: Floats) -> Floats:
-    """Return the factors of the given variances: those that differ enough, ones for all others."""
+    """Return factors of the given variances; 1 for components without a significant change."""
     changed = factors.copy()
     for each in found.components:
         rows = [names.index(name) for name in each.members if name in names]

@@ -1,4 +1,4 @@
-"""Variance components of blocks (and, by what is registered here, of collections)."""
+"""Variance components of blocks and, by registration, of collections."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from photogram.results.network import AdjustedNetwork
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 from photogram.words import phrase
 
-NOTHING = 1e-6  # A redundancy that is rounding
-OTHERS = "all other observations"  # What is in no group
-DECREASE = 1e-12  # Relative decrease of the sum of squares by a step that ends the adjustment of a collection
-SHARPER = 1e-2  # Of the tolerance of components, that of the adjustments in standard deviations
+NOTHING = 1e-6  # Redundancy below this value is rounding
+OTHERS = "all other observations"  # Name of the rest group
+DECREASE = 1e-12  # Relative decrease of the sum of squares that ends the adjustment of a collection
+SHARPER = 1e-2  # Tolerance of adjustments (standard deviations) relative to the tolerance of components
 
 
 class Weighing:
-    """A network that is adjusted again and again with other weights, each time from where it stood."""
+    """Repeated adjustment of a network with other weights, each from the previous state."""
 
     def __init__(self, network: object, *, threads: int | None, tolerance: float) -> None:
         self.result: AdjustedNetwork
@@ -102,11 +102,11 @@ def variance_components(
     threads: int | None = None,
     progress: Callable[[int, Floats], None] | None = None,
 ) -> VarianceComponents:
-    """Estimate by which factors the variances of groups of observations are wrong, all at once.
+    """Estimate variance components: factors of the variances of groups of observations.
 
-    Steps of Foerstner's, every fifth of Helmert's, to the fixed point of both: in every group the weighted
-    sum of squares is the sum of the redundancy numbers. Each adjustment starts from the last. Take gross
-    errors out first (docs/weights.md).
+    The iteration combines steps of Foerstner with a step of Helmert every fifth time. At the fixed point, the
+    weighted sum of squares in every group is the sum of its redundancy numbers. Each adjustment continues the
+    previous one. Remove gross errors first (docs/weights.md).
 
     Parameters
     ----------
@@ -114,30 +114,30 @@ def variance_components(
         The block or collection.
     groups
         `kind`, `camera`, `strip`, `photo`, `point class`, `rays`, `component` (x and y; plan and height of
-        control; positions and attitudes), several of these for all combinations, or a mapping with labels of
-        one's own for `images`, `control`, `stations`, `observations`.
+        control; positions and attitudes), a list of these for all combinations, or a mapping with your own
+        labels of `images`, `control`, `stations`, `observations`.
     held
-        Groups that keep their variances.
+        Groups with fixed variances.
     tolerance, max_steps, least_redundancy, level, equality
-        As of `photogram.statistics.components.estimate`.
+        As in `photogram.statistics.components.estimate`.
     probing
-        How the Helmert matrix is found: its seed, and how many vectors.
+        Computation of the Helmert matrix: seed and number of random vectors.
     threads
-        As of :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
     progress
-        Told after each adjustment of its number and the factors; what it raises ends the work.
+        Called with number and factors after each adjustment; an exception that it raises stops the work.
 
     Returns
     -------
-    Components with standard deviations, intervals and tests, what was merged or held and why, and the network
-    with the new weights and its adjustment.
+    Components with standard deviations, intervals and tests, merged or fixed groups with reasons, and the
+    network with the new weights and its adjustment.
 
     Raises
     ------
     InputError
-        What is no network, groups that there are not, no redundancy at all.
+        If the network is invalid, a group does not exist, or redundancy is missing.
     AdjustmentError, RankError
-        As of the adjustment.
+        As in the adjustment.
     """
     probability("tolerance", tolerance)
     at_least("max_steps", max_steps, 1)
@@ -148,7 +148,7 @@ def variance_components(
 
 @dataclass(frozen=True)
 class Settings:
-    """How components are estimated: see :func:`variance_components`."""
+    """Options of the estimation; see :func:`variance_components`."""
 
     tolerance: float = 1e-4
     max_steps: int = 100
@@ -167,7 +167,7 @@ def of_grouping(
     threads: int | None = None,
     progress: Callable[[int, Floats], None] | None = None,
 ) -> VarianceComponents:
-    """Estimate the components of groups that are numbered already; see :func:`variance_components`."""
+    """Estimate the components of numbered groups; see :func:`variance_components`."""
     names = grouping.groups.names
     if unknown := [name for name in held if name not in names]:
         raise InputError(phrase("weighting.unknown-group", group=unknown[0], groups=list(names)))
@@ -206,7 +206,7 @@ def of_grouping(
 
 
 def _without_nothing(found: Estimate) -> Estimate:
-    """Leave out the group of all others where there are none."""
+    """Remove the rest group if it is empty."""
     keep = [each.name != OTHERS or each.redundancy > NOTHING for each in found.components]
     components = tuple(each for each, kept in zip(found.components, keep, strict=True) if kept)
     messages = [each for each in found.messages if keep[-1] or each.fields.get("name") != OTHERS]

@@ -1,4 +1,4 @@
-"""Backward elimination: terms of lenses that the observations do not ask for are left out, one by one."""
+"""Backward elimination of lens terms that the observations do not require, one group at a time."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """What backward elimination has left of a model.
+    """Result of the backward elimination of lens terms.
 
     Attributes
     ----------
     removed
-        Tests of the groups that were left out, in order.
+        Tests of the removed groups, in order.
     kept
-        Tests of those that stay.
+        Tests of the remaining groups.
     level
-        Of each test: that of all divided by the number of groups (Bonferroni).
+        Significance level of each test: the total level divided by the number of groups (Bonferroni).
     block, result
-        The block with the terms that stay, and its adjustment.
+        Block with the remaining terms, and its adjustment.
     """
 
     removed: tuple[TermsTest, ...]
@@ -40,7 +40,7 @@ class Elimination:
     result: Result
 
     def log(self) -> list[str]:
-        """Return removed terms with the reason, then the remaining terms."""
+        """Return removed terms with reasons, then the remaining terms."""
         codes = ["improbable" if not each.probability < self.level else "small" for each in self.removed]
         rows = [*zip(codes, self.removed, strict=True), *(("kept", each) for each in self.kept)]
         return [
@@ -66,28 +66,29 @@ def eliminate_terms(
     unit_variance: UnitVariance = "constrained",
     threads: int | None = None,
 ) -> Elimination:
-    """Leave out terms of lenses that are not worth having, the least probable group first.
+    """Remove unnecessary lens terms, the least significant group first.
 
-    A group stays when it is significant and moves an image by more than a fifth of its standard deviation. A
-    radial term is only asked about when those of higher powers are out. Every round adjusts anew.
+    A group remains if it is significant and moves an image by more than a fifth of its standard deviation. A
+    radial term is tested only after all terms of higher power are removed. The block is adjusted in every
+    round.
 
     Parameters
     ----------
     block
-        A block with cameras; free or weighted terms of their lenses are asked about.
+        Block with cameras; free or weighted terms of their lenses are tested.
     groups
-        Terms that stay or go together; None: radial ones one by one, all others by their letter.
+        Terms that are removed together. None: radial terms separately, others by their letter.
     level
-        Of all tests together.
+        Significance level of all tests together.
     unit_variance, threads
-        As of :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
 
     Raises
     ------
     InputError
-        No cameras, or no terms to ask about.
+        If cameras or terms to test are missing.
     AdjustmentError, RankError
-        As of the adjustment.
+        As in the adjustment.
     """
     if not isinstance(block, Block) or not block.cameras:
         raise kind_error("block", "a Block with cameras", block)
@@ -125,7 +126,7 @@ def _groups(camera: AdjustedCamera, given: Sequence[Sequence[str]] | None) -> li
 
 
 def _waits(test: TermsTest, tests: Sequence[TermsTest]) -> bool:
-    """Whether a radial term has one of a higher power above it."""
+    """Return whether a radial term of higher power remains."""
     name = test.names[0]
     if len(test.names) > 1 or name[0] not in "Kk":
         return False
@@ -134,7 +135,7 @@ def _waits(test: TermsTest, tests: Sequence[TermsTest]) -> bool:
 
 
 def _without(block: Block, test: TermsTest) -> Block:
-    """Return the block with terms held at zero."""
+    """Return the block with terms fixed at zero."""
     place = block.camera_names.index(test.camera)
     camera = block.cameras[place]
     if camera.covariance is not None and set(camera.covariance[0]) & set(test.names):

@@ -1,4 +1,4 @@
-"""First values of planes, lines, levels, boresights and sensors of rigs, from points and photos."""
+"""Initial values of planes, lines, levels, boresights and rig sensors, from points and photos."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from photogram.network.rays import meet_rays
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
 from photogram.words import phrase
 
-FLAT = 1e-3  # Largest relative width of points that form a line, not a plane
+FLAT = 1e-3  # Maximum relative width of points that form a line, not a plane
 
 
 def started(block: Block) -> Block:
-    """Return a block with poses whose common unknowns all have values to start from.
+    """Return an oriented block with initial values of all shared unknowns.
 
-    Planes and lines follow the principal axes of their points, which stand at their given places or where
-    their rays meet; plumb lines go through their middle, levels have their mean height. A boresight is the
-    chordal mean of A' A_obs, a sensor the median of positions and the chordal mean of rotations in the frames
-    of its photos (the rotation nearest to the mean of matrices). InputError: an unknown whose points or
-    photos do not give it.
+    Planes and lines follow the principal axes of their points, at given positions or ray intersections. Plumb
+    lines pass through the centre of their points, levels have the mean height. A boresight is the chordal
+    mean of A' A_obs, i.e. the rotation nearest to the mean matrix. A sensor has the median position and
+    chordal mean rotation in the frames of its photos. InputError if points or photos do not determine an
+    unknown.
     """
     waiting = [each for each in block.unknowns if each.is_open]
     if not waiting:
@@ -52,7 +52,7 @@ def started(block: Block) -> Block:
 
 
 class _Sites:
-    """Where points and photos of a block are before its adjustment, in cartesian axes."""
+    """Positions of points and photos before the adjustment, in cartesian axes."""
 
     def __init__(self, block: Block) -> None:
         self.block, self.axes = block, Cartesian(block.spheroid)
@@ -61,7 +61,7 @@ class _Sites:
         self.photos = {name: row for row, name in enumerate(block.photo_ids)}
 
     def places(self, names: Sequence[str], of: Unknown, least: int) -> Floats:
-        """Return (k, 3) places of points, those that have one; `least` are needed."""
+        """Return (k, 3) known positions of points; InputError for fewer than `least`."""
         rows = np.array(sorted({self.points[name] for name in names}), dtype=np.int64)
         places = self.axes.positions(self.block.point_positions)[rows]
         unknown = ~np.isfinite(places).all(axis=1)
@@ -73,7 +73,7 @@ class _Sites:
         return np.asarray(found)
 
     def _met(self, rows: Indices) -> Floats:
-        """Return (k, 3) where the rays of points meet."""
+        """Return (k, 3) intersections of the rays of points."""
         block, known = self.block, self.known
         images = np.flatnonzero(np.isin(block.image_points, rows))
         photos = block.image_photos[images]
@@ -91,13 +91,13 @@ class _Sites:
         return meet_rays(places, len(rows), known.positions[photos], directions)
 
     def local(self, middle: Floats) -> Floats:
-        """Return (3, 3) the axes X, Y, Z or, in geographic space, east, north, up at a place, as rows."""
+        """Return (3, 3) axes X, Y, Z, or east, north, up at a position, as rows."""
         if self.axes.spheroid is None:
             return np.eye(3)
         return np.asarray(geometry.local_frames(self.axes.from_cartesian(middle[np.newaxis]))[0])
 
     def place(self, position: Floats) -> Floats:
-        """Return (3,) a place in coordinates of the block."""
+        """Return a position (3,) in coordinates of the block."""
         return np.asarray(self.axes.from_cartesian(position[np.newaxis])[0])
 
 
@@ -150,7 +150,7 @@ def _boresight(sites: _Sites, boresight: Unknown, own: Sequence[Observation]) ->
             at = sites.block.photo_positions[row : row + 1]
             observed = sites.axes.from_local(each.observed[:9].reshape(1, 3, 3), at)[0]
             turns.append(sites.known.attitudes[row].T @ observed)
-    # Photos that have no pose start from the observed attitude, as if the body were the photo.
+    # Photos without a pose start from the observed attitude, with an identity boresight.
     posed = [turn for turn in turns if np.isfinite(turn).all()]
     return boresight.replace(value=_mean_rotation(posed) if posed else np.eye(3))
 
@@ -190,13 +190,13 @@ _FINDERS: dict[type[Unknown], Callable[[_Sites, Unknown, Sequence[Observation]],
 
 
 def _principal(places: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the middle of places, their principal axes (rows, the longest first), and spreads along them."""
+    """Return the centre, principal axes (rows, longest first) and spreads of positions."""
     middle = places.mean(axis=0)
     _, spread, axes = np.linalg.svd(places - middle, full_matrices=True)
     return middle, axes, np.concatenate([spread, np.zeros(3 - len(spread))])
 
 
 def _mean_rotation(turns: Sequence[Floats]) -> Floats:
-    """Return the rotation that is nearest to the mean of some."""
+    """Return the rotation that is nearest to the mean of some rotations."""
     u, _, v = np.linalg.svd(np.mean(turns, axis=0))
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)

@@ -1,7 +1,7 @@
-"""First values: poses of photos whose positions and attitudes are not known, from everything that is.
+"""Initial values: poses of photos with unknown position or attitude, from all other data.
 
-The search is that of the core (`photocore::programs::first_values`); `docs/first-values.md` says what it does
-in which order.
+The core performs the search (`photocore::programs::first_values`). `docs/first-values.md` describes its
+steps.
 """
 
 from __future__ import annotations
@@ -33,43 +33,43 @@ from photogram.words import Phrase, phrase
 
 _Array = TypeVar("_Array", bound=NDArray[np.generic])
 
-NEEDED = 4  # Known points of a photo that is resected
-DOUBTFUL = 0.3  # Part of the images of control that do not fit where the control, or the start, is doubted
-ESTIMATES = 3  # Times that free cameras are estimated and photos are searched again, at most
-IN_COMMON = 3  # What a model must have in common with what is known
+NEEDED = 4  # Minimum number of known points for resection
+DOUBTFUL = 0.3  # Part of inconsistent control images that makes control, or the initial poses, doubtful
+ESTIMATES = 3  # Maximum number of camera estimations followed by a new search
+IN_COMMON = 3  # Minimum number of objects shared by a model and known data
 SOURCES = ("given", "resected", "observed", "oriented")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FirstValues(Brief):
-    """First values of a block of P photos, n points and m images.
+    """Initial values of a block with P photos, n points and m image observations.
 
     Attributes
     ----------
     block
-        The block with initial values for all photos that could be started; NaN stays where they could not.
-        What was given stays as it was; weighted values are observed as before.
+        Block with initial values of all oriented photos; NaN for other photos. Given values and observed
+        values do not change.
     sources
-        Where the pose of each started photo comes from: `given`, `resected`, `observed` or `oriented`.
+        Source of the pose of each oriented photo: `given`, `resected`, `observed` or `oriented`.
     missing
-        The photos that could not be started, each with the reason.
+        Photos that could not be oriented, with reasons.
     contradicted
-        Those of them whose images agree with no pose at all: they are of something else, or stand under wrong
-        names.
+        Photos in `missing` whose observations are inconsistent with any pose: they show something else, or
+        names are wrong.
     point_positions
-        (n, 3) where the rays of points meet, as in the block; NaN where they do not.
+        (n, 3) intersections of the rays of points, as in the block; NaN if undefined.
     set_aside
-        (m,) whether an image does not fit the poses: a wrong point, or a poor ray.
+        (m,) image observations that are inconsistent with the poses: a wrong point, or a poor ray.
     contradicted_control
-        Control points whose image observations agree with each other but not with the coordinates. They take
-        part in the adjustment with all their images.
+        Control points whose image observations agree with each other but not with the coordinates. They are
+        adjusted with all their images.
     misfit
-        Median of the angles between observed and computed directions, radians; NaN without any.
+        Median of the angles between observed and computed directions, radians; NaN without observations.
     first_photo
-        The photo that is the origin, with a base of length 1 (or scale from observed distances), where no
-        control, pose or observed position gives a datum; None where something does.
+        Photo at the origin, with a base of length 1 (or scale from observed distances), if control, poses and
+        observed positions do not define a datum; otherwise None.
     messages
-        The same in sentences.
+        Summary in sentences.
     """
 
     block: Block
@@ -84,12 +84,12 @@ class FirstValues(Brief):
     messages: list[Message]
 
     def usable(self) -> Block:
-        """Return the block of the started photos, without images that were set aside: ready to adjust.
+        """Return the block of oriented photos without inconsistent images, ready to adjust.
 
         Raises
         ------
         InputError
-            Observations of photos that could not be started.
+            If there are observations of photos that could not be oriented.
         """
         started = np.array([photo in self.sources for photo in self.block.photo_ids])
         usable = of_photos(kept_images(self.block, ~self.set_aside), started)
@@ -97,35 +97,35 @@ class FirstValues(Brief):
 
 
 def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
-    """Find initial positions and attitudes of photos.
+    """Compute initial positions and attitudes of photos.
 
-    Photos whose position or attitude is NaN in the block are started from what is known: rays are intersected
-    where poses are given, photos with four known points are resected, observed positions and attitudes
-    (:class:`photogram.Position`, :class:`photogram.network.Attitude`) give poses, and photos of which nothing
-    but images is known are oriented relative to each other, chained, and carried onto control, given poses or
-    observed positions by a similarity. Every step is a consensus, so that wrong points are borne; a robust
-    adjustment ends it. Refraction and unknowns of cameras are left out. Photos on trajectories stay where
-    they are given, and help no others: they are no pictures with one pose.
+    Photos whose position or attitude is NaN are oriented from known data. Rays are intersected if poses are
+    given, and photos with four known points are resected. Observed positions and attitudes
+    (:class:`photogram.Position`, :class:`photogram.network.Attitude`) give poses. Other photos are oriented
+    relative to each other, joined, and transformed to control, given poses or observed positions by a
+    similarity. Every step is a consensus search that tolerates wrong points, followed by a robust adjustment.
+    Refraction and unknown camera parameters are ignored. Photos on trajectories retain their given poses and
+    are not used, because their images do not share one pose.
 
     Parameters
     ----------
     block
-        Photos with NaN for what is not known. A position without an attitude, or an observed one with a
-        standard deviation, serves as an observed position; so does an attitude.
+        Photos to orient have NaN in positions or attitudes. A position without an attitude, or an observed
+        one with a standard deviation, is an observed position. The same applies to attitudes.
     keep_all
-        Whether images that do not fit stay in: they are counted, and none is set aside.
+        Whether to retain inconsistent images. If True, they are only counted.
 
     Returns
     -------
-    The block with initial values, and how each photo came by them. Photos that could not be started are named
-    with the reason.
+    The block with initial values, and the source of each pose. Photos that could not be oriented are listed
+    with reasons.
 
     Raises
     ------
     InputError
-        What is no block.
+        If the argument is not a block.
     AdjustmentError
-        No photo could be started, or none in the datum of photos on trajectories; the message says why.
+        If no photo can be oriented, or none in the datum of trajectories; the message contains the reason.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     kept = truth_value("keep_all", keep_all)
     control = tuple(np.array(block.point_ids, dtype=object)[against])
     mirrored = _mirrored(block, known, directions, len(sources), aside | against[block.image_points])
-    # One image of a control point is not checked by others: the adjustment tests it.
+    # A single image of a control point cannot be compared with others; the adjustment tests it.
     posed = np.array([why[0] in SOURCES for why in how])[block.image_photos]
     images = np.bincount(block.image_points[posed], minlength=len(block.point_ids))
     aside = aside & ~((images == 1) & np.isfinite(block.point_sd).any(axis=1))[block.image_points]
@@ -195,7 +195,7 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
 
 
 def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
-    """Find first values of photos that are on no trajectory; the others stay where they are given."""
+    """Compute initial values of photos at rest; photos on trajectories do not change."""
     timed = timed_photos(block)
     poses = np.hstack([block.photo_positions, block.photo_attitudes])
     stay = timed | np.isfinite(poses).all(axis=1)
@@ -242,17 +242,16 @@ def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
 
 
 def _with(values: _Array, rows: Bools, others: _Array) -> _Array:
-    """Return an array with others in some rows."""
     found = values.copy()
     found[rows] = others
     return found
 
 
 def _searched(block: Block, known: Known, axes: Cartesian) -> tuple[Floats, _photocore.FoundRow]:
-    """Search with the cameras as they are given, and again with the cameras that the photos estimate.
+    """Search with the given cameras, then with cameras estimated from the photos.
 
-    Images and photos that fit only estimated cameras are not set aside for the start values of cameras. If
-    photos or control still do not fit, cameras are estimated without control.
+    Images and photos that fit estimated cameras only are accepted. If photos or control still do not fit,
+    cameras are estimated without control.
     """
     given = image_directions(block)
     best = _improved(block, known, axes, given)
@@ -269,7 +268,7 @@ def _searched(block: Block, known: Known, axes: Cartesian) -> tuple[Floats, _pho
 def _improved(
     block: Block, known: Known, axes: Cartesian, directions: Floats
 ) -> tuple[Floats, _photocore.FoundRow]:
-    """Search, and again with estimated cameras as long as more fits; returns the directions of the best."""
+    """Repeat the search with estimated cameras while more fits; return the best directions too."""
     best = directions, _found(block, known, directions)
     for _ in range(ESTIMATES):
         before, search = best
@@ -288,15 +287,15 @@ def _improved(
 
 
 def _fitting(search: _photocore.FoundRow) -> tuple[int, int, int]:
-    """Return how many photos have a pose, how many images fit, and minus how much control does not."""
+    """Return counts of oriented photos, and minus counts of inconsistent images and control."""
     _, _, how, _, aside, against, _, _ = search
     return sum(why[0] in SOURCES for why in how), -int(aside.sum()), -int(against.sum())
 
 
 def _calibrated(block: Block, axes: Cartesian, search: _photocore.FoundRow) -> Block | None:
-    """Return the block with cameras that are adjusted with the poses of a search.
+    """Return the block with cameras adjusted with the poses of a search.
 
-    None if all images fit, no camera is free or the adjustment fails.
+    None if all images fit, all cameras are fixed, or the adjustment fails.
     """
     positions, attitudes, how, _, aside, against, _, _ = search
     posed = np.array([why[0] in SOURCES for why in how])
@@ -304,7 +303,7 @@ def _calibrated(block: Block, axes: Cartesian, search: _photocore.FoundRow) -> B
     if not free or not posed.any() or (posed.all() and not aside.any() and not against.any()):
         return None
     start = _started(block, axes, positions, attitudes, how)
-    # What is left of contradicted control and of images may not suffice for a datum, or for the cameras.
+    # Without inconsistent control and images, the datum or the cameras may be undetermined.
     fewer = start.replace(point_sd=np.where(against[:, np.newaxis], np.inf, block.point_sd))
     for each, kept in ((fewer, ~aside), (start, ~aside), (start, np.ones_like(aside))):
         try:
@@ -335,10 +334,10 @@ def _found(block: Block, known: Known, directions: Floats) -> _photocore.FoundRo
 def _on_nominal(
     block: Block, known: Known, directions: Floats, axes: Cartesian
 ) -> tuple[_photocore.FoundRow, list[Message]] | None:
-    """Return photos that are oriented relative to each other and carried onto nominal coordinates of points.
+    """Orient photos relatively and transform the model to nominal coordinates of points.
 
-    None if no point has some fixed or weighted coordinates and others free, if fewer than three points with
-    coordinates have a place in the model, or all of these are on a line.
+    None if no point has both constrained and free coordinates. None if the model contains fewer than three
+    points with coordinates, or if these are collinear.
     """
     held = np.isfinite(block.point_sd)
     if not (held.any(axis=1) & ~held.all(axis=1)).any():
@@ -363,9 +362,9 @@ def _on_nominal(
 
 
 def _mirrored(block: Block, known: Known, directions: Floats, started: int, against: Bools) -> list[Message]:
-    """Return remarks on control that does not fit, or that fits mirrored photos.
+    """Return notes on inconsistent control, or on control that fits mirrored photos.
 
-    Relative orientation does not see a mirrored photo; control that is not in a plane does.
+    Only control that is not in a plane reveals mirrored photos; relative orientation does not.
     """
     control = np.asarray(np.isfinite(known.point_sd).all(axis=1))
     of_control = control[block.image_points]
@@ -383,7 +382,7 @@ def _mirrored(block: Block, known: Known, directions: Floats, started: int, agai
 
 
 def _of_control(block: Block, contradicted: tuple[str, ...], aside: Bools) -> list[Message]:
-    """Report control points that their images contradict, and those without an image that fits."""
+    """Report control points that are inconsistent with their images, or without a consistent image."""
     messages = []
     if contradicted:
         messages.append(Message(phrase("first.contradicted", points=list(contradicted))))
@@ -397,7 +396,7 @@ def _of_control(block: Block, contradicted: tuple[str, ...], aside: Bools) -> li
 def _started(
     block: Block, axes: Cartesian, positions: Floats, attitudes: Floats, how: list[tuple[str, int, int]]
 ) -> Block:
-    """Fill in what was found; what was given stays, and weighted values are observed as they were."""
+    """Insert the computed poses; given poses and observed values do not change."""
     found = np.array([why[0] in SOURCES and why[0] != "given" for why in how])
     new_positions, new_attitudes = block.photo_positions.copy(), block.photo_attitudes.copy()
     if found.any():
@@ -416,7 +415,7 @@ def _started(
 
 
 def _scale(block: Block, points: Floats) -> float:
-    """Observed distances over those between the points found; 1 without any."""
+    """Return the ratio of observed to computed distances; 1 without observed distances."""
     place = {name: row for row, name in enumerate(block.point_ids)}
     ratios = [
         each.length / float(np.linalg.norm(points[place[each.first]] - points[place[each.second]]))

@@ -1,7 +1,7 @@
-"""Prediction: the covariances a block would have, from its geometry and weights alone.
+"""Prediction of the covariances of a planned block from geometry and weights.
 
-Covariances and redundancy numbers depend on where photos and points are and on the weights, not on what is
-measured. So a network can be judged before it is flown (GIANT guide, introduction: with a fictitious data
+Covariances and redundancy numbers depend on positions and weights, not on measured values. A network can
+therefore be assessed before the flight (GIANT guide, introduction: with a fictitious data
 generator "a user may predict results before using a set of photographs").
 """
 
@@ -28,7 +28,7 @@ from photogram.results.result import Result
 from photogram.words import phrase
 
 _OF_POSES = (Attitude, Position, Rate, Velocity)
-_AGREES = 1e-3  # Standard deviations by which an observation of a trajectory may differ from it
+_AGREES = 1e-3  # Maximum deviation of a trajectory observation, in standard deviations
 
 
 def predict(
@@ -38,36 +38,35 @@ def predict(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Result:
-    """Predict the covariances and redundancy numbers of a block at its given positions and attitudes.
+    """Predict covariances and redundancy numbers at given positions and attitudes.
 
-    The image coordinates of the block are not read: they are computed from the given values, so that one
-    linearization is the adjustment. Which photo shows which point, and all standard deviations, are those of
-    the block; the variance of unit weight is 1.
+    The image coordinates of the block are not used. They are computed from the given values, so that the
+    adjustment is a single linearization. Incidences and standard deviations are taken from the block. The
+    variance of unit weight is 1.
 
     Parameters
     ----------
     block
-        The planned block. Every point that has images needs its three coordinates; the standard deviations
-        say what of them is control. Photos may be on trajectories, which are taken as they are given, with
-        observations of these, which must agree with them: the truth of :func:`photogram.simulate`.
+        The planned block. Every point with images needs three coordinates; standard deviations define the
+        control. Photos may be on trajectories, with given poses and observations that must agree with them,
+        e.g. the truth of :func:`photogram.simulate`.
     ordering, threads, progress
-        As for :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
 
     Returns
     -------
-    Positions are the given ones but for rounding, cofactors and covariances the same; residuals and
-    standardized residuals mean nothing.
+    Positions equal the given ones except for rounding. Use cofactors and covariances only; residuals are
+    meaningless.
 
     Raises
     ------
     InputError
-        Points with images but without coordinates, or behind a photo that shows them, or where it never
-        looks, named; observations beside images, but those of trajectories; of these what does not agree with
-        the given values.
+        If a point with images is without coordinates, behind a photo, or out of its view; lists these points.
+        If there are additional observations other than of trajectories, or they contradict the given values.
     RankError
-        The network does not determine all unknowns; names the photos and points concerned.
+        If the network does not determine all unknowns; lists the photos and points concerned.
     AdjustmentError
-        There is nothing to adjust, or rays are so nearly parallel that their points cannot be found.
+        If there is nothing to adjust, or rays are too parallel to intersect.
     """
     _check_positions(_check_observations(checked(block)))
     result = adjust(
@@ -81,7 +80,7 @@ def predict(
     )
     if not result.converged:
         raise AdjustmentError(phrase("predict.not-converged", status=result.status))
-    # Residuals of observations that do not agree with the given values are none of the network's.
+    # Residuals of observations that contradict the given values do not belong to the network.
     for kind in result.kinds.values():
         tests = np.abs(kind.residuals / kind.sd)
         if (tests > _AGREES).any():
@@ -91,7 +90,7 @@ def predict(
 
 
 def computed_images(block: Block) -> Floats:
-    """Return (m, 2) the image coordinates that the given positions, attitudes and cameras of a block have."""
+    """Compute (m, 2) image coordinates from the given values of a block."""
     if not block.timed:
         return _frame_images(block)
     moving = timed_photos(block)[block.image_photos][:, np.newaxis]
@@ -99,7 +98,6 @@ def computed_images(block: Block) -> Floats:
 
 
 def _frame_images(block: Block) -> Floats:
-    """Return (m, 2) the same of photos that are taken at once."""
     photos, points = block.image_photos, block.image_points
     distances = block.principal_distances
     ideal = geometry.project(
@@ -114,16 +112,16 @@ def _frame_images(block: Block) -> Floats:
     )
     if block.photo_cameras is None:
         return ideal
-    # With a principal distance of -1 an image is the direction (u1, u2) / -u3 of what lies in front.
+    # With principal distance -1, an image is the direction (u1, u2) / -u3 of a point in front.
     directions = np.column_stack([ideal, np.full(len(ideal), -1.0)])
     return images_of(block.cameras, block.photo_cameras[photos], directions)
 
 
 def at_adjusted(result: Result) -> Block:
-    """Return the block of an adjustment with adjusted for given values, ready for :func:`predict`.
+    """Return the block of an adjustment with adjusted values as given, for :func:`predict`.
 
-    Images of points that were left out are left out too. AdjustmentError: the adjustment has not converged;
-    InputError: photos on trajectories.
+    Images of excluded points are removed. AdjustmentError if the adjustment has not converged; InputError for
+    photos on trajectories.
     """
     if not result.converged:
         raise AdjustmentError(phrase("predict.not-converged", status=result.status))
@@ -143,10 +141,10 @@ def at_adjusted(result: Result) -> Block:
 
 
 def image_depths(block: Block) -> Floats:
-    """Return how far the points of image observations are in front of the planes of their photos, (m,).
+    """Return (m,) distances of image points in front of the planes of their photos.
 
-    In the linear unit, along the axes of the photos: divided by the principal distance, the scale. Photos on
-    trajectories that are given are where they are said to be about.
+    The unit is the linear unit, along the axes of the photos; scale is distance / principal distance. Photos
+    on given trajectories have approximate positions.
     """
     points, photos = block.point_positions, block.photo_positions
     directions = geometry.viewing_directions(
@@ -160,7 +158,7 @@ def image_depths(block: Block) -> Floats:
 
 
 def _check_observations(block: Block) -> Block:
-    """Refuse observations that are not those of trajectories, and photos on frames."""
+    """Reject observations other than of trajectories, and photos on frames."""
     if not block.timed:
         return of_images_alone(block, "predict")
     if block.mounts:
@@ -175,7 +173,7 @@ def _check_observations(block: Block) -> Block:
 
 
 def _check_positions(block: Block) -> None:
-    """Refuse points that cannot be projected: unknown, or behind a photo (collinearity knows no behind)."""
+    """Reject points with unknown positions or behind a photo (not detected by collinearity)."""
 
     def refuse(code: str, images: Any) -> None:
         if images.any():

@@ -1,9 +1,8 @@
-"""What was left out before an adjustment, judged again by what it has found: its cameras, poses and points.
+"""Re-evaluation of rejected images and photos with adjusted cameras, poses and points.
 
-First values estimate cameras from a part of the images, and set aside what does not fit these. Once cameras
-are calibrated, these images are looked at again, until nothing returns. (What leaves an adjustment itself,
-points whose rays do not meet, is judged by cameras that are being calibrated, and anew in each of these
-adjustments.)
+Initial values use cameras estimated from some images and reject images that do not fit. Once cameras are
+adjusted, the rejected images are tested again, until none is reinstated. Points that an adjustment itself
+excludes are re-evaluated in each of these adjustments.
 """
 
 from __future__ import annotations
@@ -30,31 +29,31 @@ from photogram.results.result import Result
 from photogram.words import Phrase, phrase
 
 FITS = 10.0
-"""Standard deviations, by the median of the images that take part, within which an image returns: the tests
-name what is wrong by so much, and the adjustment bears it; what is beyond would bend it."""
-MEDIAN_LENGTH = 1.1774  # The length of a vector with two components of standard deviation 1 has this median
+"""Limit for reinstating an image, in standard deviations scaled by the median of the used images. Tests
+detect smaller errors and the adjustment tolerates them; larger ones would distort it."""
+MEDIAN_LENGTH = 1.1774  # Median length of a vector with two components of standard deviation 1
 
 
 def adjust_started(started: FirstValues, *, by: Callable[..., Result] = adjust, **options: Any) -> Result:
-    """Adjust a block from first values, and judge what these set aside again by the adjusted block.
+    """Adjust a block from initial values, then re-evaluate the rejected observations.
 
-    Images that fit the adjusted cameras, photos and points within ten standard deviations return, photos that
-    could not be started are tried again, and the block is adjusted again, until nothing returns. What stays
-    out is named in the verdict (`Result.set_aside`).
+    Images within ten standard deviations of the adjusted cameras, photos and points are reinstated. Missing
+    photos are oriented again if possible. The block is adjusted again until nothing changes. The verdict
+    lists observations that remain rejected (`Result.set_aside`).
 
     Parameters
     ----------
     started
-        First values of the block (:func:`photogram.first_values`).
+        Initial values of the block (:func:`photogram.first_values`).
     by
-        What adjusts: :func:`photogram.adjust`, or :func:`photogram.adjust_in_parts`.
+        Function that adjusts: :func:`photogram.adjust` or :func:`photogram.adjust_in_parts`.
     options
-        Those of the call that adjusts.
+        Options of this function.
 
     Raises
     ------
     InputError, AdjustmentError, RankError, OutOfMemoryError
-        As the call that adjusts.
+        As in the function that adjusts.
     """
     first, result = started, by(started.usable(), **options)
     while result.converged and (started.missing or started.set_aside.any()):
@@ -69,9 +68,9 @@ def adjust_started(started: FirstValues, *, by: Callable[..., Result] = adjust, 
 
 
 def _judged(started: FirstValues, result: Result) -> FirstValues:
-    """Return first values without what does not fit the cameras, photos and points of an adjustment.
+    """Re-evaluate rejected images and missing photos with the results of an adjustment.
 
-    All start from where they did, but for photos that have a pose by these cameras only.
+    Initial values do not change, except for photos that are now oriented.
     """
     posed = np.array([photo in started.sources for photo in started.block.photo_ids])
     changes: dict[str, Any] = {"cameras": [each.camera for each in result.cameras]} if result.cameras else {}
@@ -99,7 +98,7 @@ def _judged(started: FirstValues, result: Result) -> FirstValues:
 
 
 def _fitting(block: Block, aside: Bools, result: Result) -> Bools:
-    """Return which images of a block are near the points of an adjustment, where these have a place."""
+    """Return which images are close to the adjusted points."""
     axes = Cartesian(block.spheroid)
     known = Known.of(block, axes)
     photos, points = block.image_photos, block.image_points
@@ -108,14 +107,14 @@ def _fitting(block: Block, aside: Bools, result: Result) -> Bools:
     rays = np.einsum("mij,mj->mi", known.attitudes[photos], image_directions(block))
     missed = np.linalg.norm(to / np.linalg.norm(to, axis=1, keepdims=True) - rays, axis=1)
     missed /= direction_deviations(block)
-    # Of photos that move nothing was set aside, and their rays have no one pose.
+    # Images of moving photos were not rejected, and their rays do not share one pose.
     missed[timed_photos(block)[photos]] = np.nan
     usual = np.nanmedian(missed[~aside]) / MEDIAN_LENGTH
     return np.asarray(missed <= FITS * max(float(usual), 1.0))
 
 
 def _named(started: FirstValues) -> tuple[Phrase, ...]:
-    """Name what is still out: photos with the reason, and images."""
+    """List the remaining missing photos with reasons, and the rejected images."""
     block = started.block
     images = zip(
         block.image_photos[started.set_aside].tolist(),

@@ -1,4 +1,4 @@
-"""How an adjustment ended, and where a reader must be careful: remarks and errors with names."""
+"""Notes and errors of an adjustment that name photos, points and cameras."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from photogram.network.trajectories import Coefficient
 from photogram.results.cameras import adjusted_cameras
 from photogram.words import Phrase, phrase
 
-NEAR = 1e-3  # A point nearer to a station than this part of the median of such distances is at its place
-NOTABLE_EXCESS = 1e-5  # Reported difference of the sum of redundancy numbers
-MOST_CORRELATIONS = 8  # Most correlations or weak parameters in a message
-HIGHEST_GIANT = 9000.0  # Metres: the flying height up to which Appendix F of the GIANT guide holds
+NEAR = 1e-3  # Distance from a station relative to the median distance, below which a point coincides with it
+NOTABLE_EXCESS = 1e-5  # Minimum reported excess of the sum of redundancy numbers
+MOST_CORRELATIONS = 8  # Maximum number of correlations or weak parameters in a message
+HIGHEST_GIANT = 9000.0  # Maximum flying height in metres of Appendix F of the GIANT guide
 
 
 def undetermined(
     block: Block, solution: _photocore.BlockSolution, error: AdjustmentError | None
 ) -> list[Message]:
-    """Remark on what the adjusted values leave undetermined, `error`, or determine only weakly."""
+    """Report unknowns that the adjusted values leave undetermined (`error`) or nearly so."""
     messages: list[Message] = []
     if error is not None:
         what = error.what if isinstance(error, RankError) else str(error)
@@ -42,7 +42,7 @@ def undetermined(
 
 
 def hardly_determined(status: str, weak: str, causes: Sequence[Phrase] = ()) -> Message:
-    """Remark on weakly determined unknowns, `weak`, with causes and figures."""
+    """Report weakly determined unknowns, `weak`, with causes and numbers."""
     details = phrase("adjust.weak.details", causes=list(causes)) if causes else ""
     code = f"adjust.weak.{'converged' if status == 'converged' else 'slow'}"
     return Undetermined(phrase(code, unknowns=weak, details=details), what=f"{weak}{details}")
@@ -50,7 +50,7 @@ def hardly_determined(status: str, weak: str, causes: Sequence[Phrase] = ()) -> 
 
 def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     messages = []
-    # Hardly ever is there one: small blocks need not wait for this.
+    # Such cases are rare, and small blocks should not wait for this.
     seen = set(block.image_photos.tolist()) if solution.loose_photos else set()
     empty = [photo for photo in solution.loose_photos if photo not in seen]
     loose = [photo for photo in solution.loose_photos if photo in seen]
@@ -62,10 +62,10 @@ def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 
 
 def harmful_points(weak: Sequence[tuple[int, float, float]], point_ids: Sequence[str]) -> list[Message]:
-    """Remark on points at a station's own place, and on nearly parallel rays.
+    """Report points that coincide with a station, and points with nearly parallel rays.
 
-    Weak are points with how much worse they are along their rays than across, and their distance from a
-    station.
+    `weak` contains points, the ratio of precision along and across their rays, and the relative distance from
+    a station.
     """
     near = [(point, distance) for point, _, distance in weak if distance < NEAR]
     flat = [(point, ratio) for point, ratio, distance in weak if distance >= NEAR]
@@ -80,7 +80,7 @@ def harmful_points(weak: Sequence[tuple[int, float, float]], point_ids: Sequence
 
 
 def _weak_figures(block: Block, solution: _photocore.BlockSolution) -> list[Phrase]:
-    """Return value, standard deviation and correlations of each weak parameter of cameras."""
+    """Return value, standard deviation and correlations of each weak camera parameter."""
     found = []
     cameras = adjusted_cameras(block, solution, solution.variance_of_unit_weight or 1.0)
     for row, k in dict.fromkeys(weak_parameters(block, solution)):
@@ -108,7 +108,7 @@ def _weak_figures(block: Block, solution: _photocore.BlockSolution) -> list[Phra
 
 
 def _weak_unknowns(block: Block, solution: _photocore.BlockSolution) -> str:
-    """Name photos and their unknowns (0 to 5), parameters of cameras, common unknowns."""
+    """Name photos with their unknowns (0 to 5), camera parameters and shared unknowns."""
     of_photos, of_others = solution.weak, solution.weak_unknowns
     names = [*position_columns(block), *ATTITUDE_COLUMNS]
     parts = [
@@ -131,7 +131,7 @@ def _weak_unknowns(block: Block, solution: _photocore.BlockSolution) -> str:
 
 
 def rounded(excess: float | None) -> list[Message]:
-    """Remark on cofactors with rounding errors, from the excess of the sum of redundancy numbers."""
+    """Report cofactors with rounding errors, detected by the excess of redundancy."""
     if excess is None or abs(excess) <= NOTABLE_EXCESS:
         return []
     return [Message(phrase("adjust.rounding", excess=abs(excess)))]
@@ -147,11 +147,10 @@ def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 
 
 def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions.
+    """Report images outside the one-to-one radius of a lens, which fit two directions.
 
-    Points that are known give the ray, so that camera, pose or coordinates are wrong by more than an error of
-    measurement: that is an AdjustmentError. Where the point itself is unknown, one image may be a mistake,
-    which its residual shows: that is a remark, and the result is there to look for it.
+    If the point is known, its ray shows that camera, pose or coordinates are grossly wrong: AdjustmentError.
+    If the point is unknown, one image may be wrong, and its residual shows this: a note in the result.
     """
     images = np.asarray(solution.images_folded)
     if not len(images):
@@ -171,7 +170,7 @@ def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 
 
 def _fold_of(block: Block, solution: _photocore.BlockSolution, image: int) -> Phrase:
-    """Return the radius at which the lens of an image's camera folds, at its adjusted parameters."""
+    """Return the radius at which the lens of an image folds, at adjusted parameters."""
     row = 0 if block.photo_cameras is None else int(block.photo_cameras[block.image_photos[image]])
     camera, name = block.cameras[row], block.camera_names[row]
     domain = _photocore.radial_domain(camera.model, np.array(solution.cameras[row][0]))
@@ -182,7 +181,7 @@ def _fold_of(block: Block, solution: _photocore.BlockSolution, image: int) -> Ph
 
 
 def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
-    """Remark on image observations of points behind the camera; no photos are named if there is one only."""
+    """Report image observations of points behind the camera; a single photo is not named."""
     if not images:
         return []
     on = phrase("adjust.behind.photos", photos=photos) if photos else ""
@@ -190,7 +189,7 @@ def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
 
 
 def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
-    """Name photos and points whose values are rounded too coarsely in double precision."""
+    """Return the error for photos and points with coordinates too large for double precision."""
     parts = [
         phrase(f"adjust.list.{kind}", names=names)
         for kind, names in (("photos", photos), ("points", points))
@@ -200,7 +199,7 @@ def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
 
 
 def check_cameras(block: Block) -> None:
-    """Refuse photos taken from below the water."""
+    """Reject photos taken from below the water."""
     refraction = block.refraction
     if refraction is None or refraction.water is None:
         return
@@ -213,7 +212,7 @@ def check_cameras(block: Block) -> None:
 
 
 def refraction_remarks(block: Block, photo_positions: NDArray[np.float64]) -> list[Message]:
-    """Remark on limits of the refraction models, for (P, 3) adjusted stations."""
+    """Report limits of the refraction models for (P, 3) adjusted stations."""
     refraction = block.refraction
     if refraction is None or (refraction.air is None and refraction.water is None):
         return []

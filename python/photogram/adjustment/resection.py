@@ -1,7 +1,7 @@
 """Resection: position and attitude of one photo from control points, without initial values.
 
-The model is that of the block (`docs/adjustment.md`); `docs/resection.md` says how the start is found, what
-the covariance holds for, and which configurations determine no pose.
+The model is the block model (`docs/adjustment.md`). `docs/resection.md` describes the search for initial
+values, the validity of the covariance, and critical configurations.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ SOLVED = (
     *("status", "cofactors", "pose_redundancy", "point_positions", "point_cofactors", "point_redundancy"),
     *("residuals", "redundancy", "standardized", "degrees_of_freedom", "outside_danger_cylinder"),
 )
-"""What a resection has as the core gives it."""
+"""Attributes of a resection that are copied from the core."""
 UNKNOWNS = ("X", "Y", "Z", "omega", "phi", "kappa")
-DOUBTFUL = 3.0  # Standard deviations: a nearer danger cylinder is reported
+DOUBTFUL = 3.0  # Minimum distance from the danger cylinder, in standard deviations
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A position and an attitude.
+    """Position and attitude.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Pose:
     attitude
         (3,) omega, phi, kappa in radians.
     weighted_sum_of_squares
-        Of the adjustment that ended there; NaN where there was none.
+        Weighted sum of squares of the final adjustment; NaN if there was none.
     """
 
     position: Floats
@@ -68,50 +68,50 @@ class Pose:
 
     @classmethod
     def of(cls, values: ArrayLike, weighted_sum_of_squares: float = math.nan) -> Self:
-        """Return the pose of six values, position first."""
+        """Create the pose from six values, position first."""
         six = np.asarray(values, dtype=np.float64)
         return cls(six[:3], six[3:], weighted_sum_of_squares)
 
 
 @dataclass(frozen=True, eq=False)
 class Resection(Judged):
-    """A resected photo with n control points, in the order of the input.
+    """Resected photo with n control points, in input order.
 
-    Positions are X, Y, Z or longitude (rad), latitude (rad), height; angles are radians, image coordinates
-    millimetres. Cofactors hold for a priori unit weight; covariances are cofactors times the variance of unit
-    weight.
+    Positions are X, Y, Z or longitude (rad), latitude (rad), height. Angles are in radians, image coordinates
+    in millimetres. Cofactors refer to a-priori unit weight; covariances are cofactors times the variance of
+    unit weight.
 
     Attributes
     ----------
     status
         `converged`, `not converged` or `diverged`.
     messages
-        Remarks: other poses that fit, a station near the danger cylinder, no redundancy.
+        Notes: other poses that fit, a station near the danger cylinder, missing redundancy.
     position, attitude
-        (3,) each: the projection centre, and omega, phi, kappa.
+        (3,) each: projection centre, and omega, phi, kappa.
     cofactors
-        (6, 6): position, then attitude.
+        (6, 6) cofactors of position and attitude.
     pose_redundancy
         (6,) redundancy numbers of position and attitude as observations; 0 unless they were weighted.
     point_positions, point_cofactors, point_redundancy
         (n, 3), (n, 3, 3) and (n, 3): adjusted control, its cofactors, and the redundancy numbers of its
-        coordinates as observations; 0 unless weighted.
+        observed coordinates; 0 unless weighted.
     residuals, redundancy, standardized
         (n, 2) each: observed minus computed in millimetres, redundancy numbers, and residual / (standard
         deviation x root of redundancy number) for a priori unit weight (Baarda's w; NaN without redundancy).
     pose_standardized, point_standardized
-        (6,) and (n, 3): the same of position and attitude, and of control, as observations.
+        (6,) and (n, 3): standardized residuals of observed position and attitude, and of control.
     point_ids
         Names of the points.
     weighted_sum_of_squares, degrees_of_freedom
-        Of everything observed: image coordinates, weighted control, weighted position and attitude.
+        Of all observations: image coordinates, weighted control, weighted position and attitude.
     start
-        The pose from which the adjustment started.
+        Initial pose of the adjustment.
     iterations
-        The history.
+        Iterations of the adjustment.
     alternatives
-        Other poses that fit about as well: minima whose weighted sum of squares is larger by at most nine
-        variances of unit weight. With three points there are often one to three of them.
+        Other poses with a similar fit: minima whose weighted sum of squares is larger by at most nine
+        variances of unit weight. Three points often have one to three of them.
     outside_danger_cylinder
         Distance of the projection centre from the danger cylinder, negative inside; None unless there are
         exactly three points.
@@ -145,7 +145,7 @@ class Resection(Judged):
         def named(code: str, row: int) -> Phrase:
             return Phrase(code, {"point": str(self.point_ids[row])})
 
-        # Standard deviations are given, so the unit weight is known.
+        # Standard deviations are given, so that the unit weight is known.
         tests: tuple[tuple[str, Floats, Floats, Callable[[tuple[int, ...]], Phrase]], ...] = (
             (
                 "test.image_coordinates",
@@ -179,12 +179,12 @@ class Resection(Judged):
 
     @property
     def converged(self) -> bool:
-        """Whether the criterion of convergence was met."""
+        """Whether the convergence criterion was met."""
         return self.status == "converged"
 
     @property
     def global_test(self) -> GlobalTest | None:
-        """The test of all residuals together; None without degrees of freedom."""
+        """Test of all residuals together; None without degrees of freedom."""
         return global_test(self.weighted_sum_of_squares, self.degrees_of_freedom)
 
     @property
@@ -221,29 +221,29 @@ def resect(
     max_iterations: int = 200,
     tolerance: float = 1e-5,
 ) -> Resection:
-    """Resect a photo: its position and attitude from control points, without initial values.
+    """Compute position and attitude of a photo from control points without initial values.
 
-    Well-spread triples of points give poses directly (Grunert's problem in the form of Persson and Nordberg,
-    2018); each is checked against all points, those that fit are adjusted, and the one with the least sum of
-    squares is the result. Others that fit about as well are its `alternatives`.
+    Poses are computed directly from well-spread triples of points (Grunert's problem in the form of Persson
+    and Nordberg, 2018) and checked against all points. Consistent poses are adjusted. The result has the
+    least sum of squares; other poses with a similar fit are its `alternatives`.
 
     Parameters
     ----------
     object_points
-        (n, 3) control: X, Y, Z, or longitude (rad), latitude (rad), height when a spheroid is given.
+        (n, 3) control: X, Y, Z, or longitude (rad), latitude (rad), height if a spheroid is given.
     image_xy
         (n, 2) image coordinates in millimetres, reduced to the principal point and free of distortion.
     principal_distance
         Millimetres: negative for the positive (diapositive) plane, positive for the negative plane.
     image_sd
-        Their standard deviations in millimetres: a number or (n, 2).
+        Standard deviations of image coordinates in millimetres: a number or (n, 2).
     object_sd
         Standard deviations of control in the units of its coordinates: a number, (3,) or (n, 3); 0 fixes it.
     position, position_sd
-        (3,) known position and its standard deviations (a number or (3,)): infinite free, 0 fixed, weighted
-        between.
+        (3,) known position and its standard deviations (a number or (3,)): infinite is free, 0 is fixed, and
+        others are weighted.
     attitude, attitude_sd
-        (3,) known omega, phi, kappa in radians, likewise.
+        (3,) known omega, phi, kappa in radians, with standard deviations as for the position.
     spheroid, photo_to_ground
         As in :class:`photogram.Block`.
     point_ids
@@ -259,12 +259,12 @@ def resect(
     Raises
     ------
     RankError
-        Fewer than three points, points on one line, a station on the danger cylinder, or observations that
-        otherwise leave the pose undetermined; the message says which.
+        If there are fewer than three points, points are collinear, the station is on the danger cylinder, or
+        the pose is otherwise undetermined; the message contains the reason.
     AdjustmentError
-        No position sees the points in front of the camera as the image shows them.
+        If no position sees all points in front of the camera at their image coordinates.
     InputError
-        Arrays of the wrong shape, values that are not finite, standard deviations that are none.
+        If shapes are wrong, values are not finite, or standard deviations are invalid.
 
     Examples
     --------
@@ -325,7 +325,7 @@ def resect(
 
 
 def _nearest(differences: Floats, angles: list[int]) -> Floats:
-    """Take whole turns off the components that are angles."""
+    """Reduce the angle components to the nearest multiple of a full circle."""
     nearest = differences.copy()
     nearest[..., angles] -= math.tau * np.round(nearest[..., angles] / math.tau)
     return nearest
@@ -333,7 +333,7 @@ def _nearest(differences: Floats, angles: list[int]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """What a photo shows: control (n, 3), images (n, 2), their standard deviations, n names."""
+    """Input of a resection: control (n, 3), images (n, 2), standard deviations and n names."""
 
     points: Floats
     point_sd: Floats
@@ -352,7 +352,7 @@ class Observed:
         principal_distance: float,
         point_ids: Sequence[str] | None,
     ) -> Self:
-        """Return what a caller gave; InputError of another shape, or of values that cannot be."""
+        """Return the validated input; InputError for wrong shapes or values."""
         count = length("image_xy", xy)
         ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
         if len(ids) != count:
@@ -392,9 +392,9 @@ def solve(
     spheroid: Spheroid | None = None,
     photo_to_ground: bool = False,
 ) -> _photocore.ResectionSolution:
-    """Resect with everything the core offers: :func:`resect` and the programs on top of it call this.
+    """Resect with all options of the core, for :func:`resect` and other programs.
 
-    RankError: the pose is not determined; the message says why. AdjustmentError: any other failure.
+    RankError if the pose is undetermined, with the reason; AdjustmentError for other failures.
     """
     try:
         return _photocore.resect(
@@ -422,7 +422,7 @@ def solve(
 
 
 def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return standard deviations; a row of three stands for every point."""
+    """Return validated standard deviations; three values apply to every point."""
     array = numbers(name, value)
     if len(shape) == 2 and array.shape == shape[1:]:
         array = np.broadcast_to(array, shape)
@@ -433,7 +433,7 @@ def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
 
 
 def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
-    """Return known values, NaN where nothing is known."""
+    """Return validated known values; NaN if unknown."""
     if value is None:
         if np.isfinite(numbers(f"{name}_sd", sd)).any():
             raise InputError(phrase("resection.value-missing", name=name))
@@ -460,7 +460,7 @@ def _messages(solution: _photocore.ResectionSolution, spheroid: Spheroid | None)
 
 
 def _largest_position_sd(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> float:
-    """Return the largest standard deviation of the position, in the linear unit (a priori unit weight)."""
+    """Return the maximum standard deviation of the position in the linear unit (a-priori weight)."""
     metric = (
         np.ones(3) if spheroid is None else np.array([spheroid.a * np.cos(solution.pose[1]), spheroid.a, 1.0])
     )

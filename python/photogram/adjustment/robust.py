@@ -13,17 +13,16 @@ from photogram.words import phrase
 
 LossName = Literal["huber", "cauchy"]
 Loss = LossName | tuple[LossName, float]
-"""A robust loss, perhaps with its scale: where it sets in, in standard deviations a priori."""
+"""Robust loss, optionally with its scale in a-priori standard deviations."""
 
 SCALES = {"huber": 1.50, "cauchy": 2.55}
-"""Scales with which 95 percent of the accuracy of least squares is kept where errors are normal, for the two
-coordinates of an image point taken together."""
+"""Scales with 95 percent efficiency for normal errors, for both coordinates of an image point together."""
 
-NOTABLE = 0.5  # Image points whose weight falls below this fraction are counted as modified strongly
+NOTABLE = 0.5  # Image points with a smaller weight are counted as strongly modified
 
 
 def loss_row(loss: Loss | None) -> tuple[str, float] | None:
-    """Return a loss and its scale as the core takes them; InputError where there is none such."""
+    """Return a loss and its scale for the core; InputError for an invalid loss."""
     if loss is None:
         return None
     if isinstance(loss, tuple) and len(loss) == 2:
@@ -37,7 +36,7 @@ def loss_row(loss: Loss | None) -> tuple[str, float] | None:
 
 
 def remark(row: tuple[str, float] | None, weights: NDArray[np.float64]) -> list[Message]:
-    """Return the remark on weights that a loss has modified."""
+    """Return the note on weights modified by a loss."""
     if row is None:
         return []
     used = weights[np.isfinite(weights)]

@@ -1,4 +1,4 @@
-"""Data snooping of a block: gross errors found one after the other and taken out."""
+"""Data snooping of a block: iterative detection and removal of gross errors."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import Phrase, phrase
 
-MOST_PHOTOS = 0.2  # Of the photos, that may agree with no pose: with more it is the consensus that is wrong
+MOST_PHOTOS = 0.2  # Maximum part of photos without a consistent pose; beyond it the consensus is wrong
 
 
 def snoop(
@@ -73,54 +73,54 @@ def snoop(
     progress: Callable[[Progress], None] | None = None,
     **options: Any,
 ) -> Snooped:
-    """Take gross errors out of a block, or of a collection, one after the other.
+    """Remove gross errors from a block or collection by iterative data snooping.
 
     Every image (x and y together), control point (plan, height or all), component of a weighted station and
-    observation beside images is tested as a group; the least probable goes first, and the others are tested
-    without it. After each round the network is adjusted, and what is out is tested against the rest: what
-    agrees comes back. docs/blunders.md has the formulas, and how well it works.
+    additional observation is tested as a group. The least probable is removed first, and others are tested
+    without it. After each round the network is adjusted, and removed observations that agree with the rest
+    are reinstated. docs/blunders.md contains the formulas and success rates.
 
     Parameters
     ----------
     block
         The block, or a :class:`photogram.collection.Collection`.
     level
-        Probability that any good observation is taken out of a network without gross errors (Bonferroni; the
-        number of tests is that of the start in all rounds).
+        Probability of removing any correct observation from a network without gross errors (Bonferroni). The
+        number of tests is the initial one in all rounds.
     fdr
-        A false discovery rate in place of `level`: the limit rises with every group that is out.
+        False discovery rate instead of `level`: the critical value depends on the number of removed groups.
     unit_weight
-        `known`: the given standard deviations are right, tests are chi-square. `unknown`: they are right but
-        for a common factor, tests are F. With `known`, standard deviations that are more than twice too small
-        by the median of all test values are multiplied by that factor for the tests.
+        `known`: the given standard deviations are correct, and tests are chi-square. `unknown`: they are
+        correct up to a common factor, and tests are F. With `known`, the median of all test values may show
+        that standard deviations are too small. If the factor exceeds 2, it is applied for the tests.
     robust
-        Whether to start from a robust adjustment (Huber's loss, then Cauchy's), whose outliers are then
-        tested; None where many observations disagree, or the plain adjustment does not converge.
+        Whether to start from a robust adjustment (Huber's, then Cauchy's loss), whose outliers are then
+        tested. None: only if many observations disagree or the plain adjustment does not converge.
     parts
-        Whether a part of a control point (height, plan) or of a weighted station may go alone; otherwise all
-        of it goes.
+        Whether a part of a control point (height, plan) or of a weighted station can be removed. If False,
+        the whole is removed.
     max_rounds
-        Rounds at the most.
+        Maximum number of rounds.
     unit_variance, threads
-        See :func:`photogram.adjust`; the unit variance of collections is `constrained`.
+        As in :func:`photogram.adjust`; collections require `constrained`.
     progress
-        Told of the adjustments before and after.
+        Called with the progress of the adjustments before and after snooping.
     options
-        Of a block: `datum` and `max_iterations` of :func:`photogram.adjust`; tests do not depend on the
-        datum. Of a collection: further ones of :func:`photogram.collection.adjust`.
+        For a block, `datum` and `max_iterations` of :func:`photogram.adjust`; tests do not depend on the
+        datum. For a collection, further options of :func:`photogram.collection.adjust`.
 
     Returns
     -------
-    The adjusted network without what was taken out, and the log.
+    The adjusted network without the removed observations, and the log.
 
     Raises
     ------
     RankError, AdjustmentError, OutOfMemoryError
-        As :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
     InputError
-        An option that cannot be.
+        If an option is invalid.
     KeyboardInterrupt
-        Ctrl-C.
+        If interrupted by Ctrl-C.
     """
     truth_value("parts", parts)
     one_of("unit_weight", unit_weight, ("known", "unknown"))
@@ -189,7 +189,7 @@ def _snoop_block(
         trial = block_trial(block, None, core, threads, parts=parts)
         outcome = snooped(trial, settings, afresh)
     except (LostSupportError, _photocore.BlockError):
-        # It says by name what is not determined, or goes on where points have to leave.
+        # This adjustment names undetermined unknowns, or continues without some points.
         covariance = unit_variance == "redundancy"
         first = adjusted(block, covariance=covariance)
         if not first.converged and settings.robust is not False:
@@ -199,7 +199,7 @@ def _snoop_block(
     result = adjusted_from(cleaned, core, threads=threads, progress=progress)
     exchanged = _exchanged(block, trial, outcome, result)
     if isinstance(datum, InnerConstraints) and result.converged:
-        # Points without given coordinates carry the datum at the places of their first intersection.
+        # Points without given coordinates define the datum at their first intersection.
         poses = {"photo_positions": block.photo_positions, "photo_attitudes": block.photo_attitudes}
         again = adjusted(cleaned.replace(**poses), datum=datum)
         result = again if again.converged else result.in_datum(datum)
@@ -225,10 +225,10 @@ def finished(
     held: Callable[[], list[Tested]],
     exchanged: Iterable[Exchange],
 ) -> Snooped:
-    """Return what snooping gives, with what it has to say among the messages of its result.
+    """Create the result of snooping, with its notes among the messages.
 
-    The result is without what is out; `held` tests what is held in an adjustment of everything: it may
-    explain more than what was taken out.
+    `result` excludes the removed observations. `held` tests fixed values in an adjustment of all
+    observations, because they may explain more than the removals.
     """
     largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
     said = list(outcome.remarks)
@@ -246,7 +246,7 @@ def finished(
 
 
 def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Result) -> list[Exchange]:
-    """Find exchanged names among what is out."""
+    """Detect swapped names among the removed observations."""
     reached = block.replace(
         photo_positions=result.photo_positions,
         photo_attitudes=result.photo_attitudes,
@@ -256,7 +256,7 @@ def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Resu
 
 
 def gone(trial: NetworkTrial, out: Out, kind: int) -> tuple[Indices, Indices]:
-    """Return what of a kind is out, row by row: the numbers of the subjects, and their components."""
+    """Return subjects and components of the removed rows of a type."""
     kinds, subjects = trial.core.suspects.subjects
     group = np.repeat(np.arange(len(kinds)), np.diff(trial.core.suspects.row_starts))
     rows = out.rows & (kinds[group] == kind)
@@ -264,7 +264,7 @@ def gone(trial: NetworkTrial, out: Out, kind: int) -> tuple[Indices, Indices]:
 
 
 def used_images(trial: NetworkTrial, out: Out, count: int) -> Bools:
-    """(m,) images of a network, so many, that are not out."""
+    """Return (m,) which of `count` images are not removed."""
     used = np.ones(count, dtype=bool)
     used[gone(trial, out, IMAGE)[0]] = False
     return used
@@ -273,7 +273,7 @@ def used_images(trial: NetworkTrial, out: Out, count: int) -> Bools:
 def _snooped_from(
     first: Result, settings: Settings, threads: int | None, *, parts: bool
 ) -> tuple[NetworkTrial, Outcome]:
-    """Snoop from where an adjustment has ended; without a robust start where that leads nowhere."""
+    """Snoop from an adjusted state; retry without a robust start if it fails."""
     for attempt in (settings, dataclasses.replace(settings, robust=False)):
         trial = block_trial(first.block, first.state, first.options, threads, parts=parts)
         try:
@@ -291,7 +291,7 @@ def block_trial(
     *,
     parts: bool = True,
 ) -> NetworkTrial:
-    """Return a block as snooping asks it, from the start or from where an adjustment has ended."""
+    """Create the trial of a block for snooping, from the start or an adjusted state."""
     return network_trial(block, core_trial(block, state, options, threads), parts=parts)
 
 
@@ -303,10 +303,10 @@ def core_trial(
 
 
 def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
-    """Return a block without what is out, from where the last trial has ended.
+    """Return a block without the removed observations, from the state of the last trial.
 
-    Points start where their rays meet; what was given of them stays, for check points are compared with it.
-    Of control that is out nothing stays: what is taken for a gross error checks nothing.
+    Points start at their ray intersections. Given coordinates are retained for check points, but deleted for
+    removed control, because a gross error is not a valid check.
     """
     reached = np.array([values[:6] for values in trial.core.photos])
     images = used_images(trial, out, len(block.image_xy))
@@ -317,7 +317,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[gone(trial, out, POSITION)] = np.inf
     attitude_sd[gone(trial, out, ATTITUDE)] = np.inf
-    # Nothing is left that determines them: they stay where they are. Coefficients of trajectories do anyway.
+    # Undetermined values remain fixed here; coefficients of trajectories remain anyway.
     alone = sorted(out.photos - set(np.flatnonzero(timed_photos(block)).tolist()))
     position_sd[alone], attitude_sd[alone] = 0.0, 0.0
     rows = [row for own, _ in block.observation_groups for row in own]
@@ -339,17 +339,17 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
 
 
 def _observed(initial: Floats, observed: Floats | None, sd: Floats) -> Floats | None:
-    """Return what was observed; nothing where nothing is weighted."""
+    """Return observed values; None if nothing is weighted."""
     weighted = bool((np.isfinite(sd) & (sd > 0)).any())
     return initial if observed is None and weighted else observed
 
 
 def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
-    """Return a block with first values of its images alone, and what does not fit them.
+    """Return a block with initial values from images only, and the inconsistent observations.
 
-    The given poses of photos that are not held are not used: they may be of a block that errors have bent.
-    None where there is no consensus in the datum of the block, or nothing against it, and where photos are on
-    frames or trajectories: each is no picture with a pose of its own.
+    Given poses of photos are used only if they are fixed, because errors may have distorted them. None if
+    there is no consensus in the datum of the block, if everything agrees, or if photos are on frames or
+    trajectories.
     """
     found = None if block.mounts or block.timed else _consensus(block)
     if found is None:
@@ -363,7 +363,7 @@ def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
 
 
 def _consensus(block: Block) -> FirstValues | None:
-    """Return first values in the datum of control, or where that does not do of observed positions."""
+    """Return initial values in the datum of control, or else of observed positions."""
     free = (block.photo_position_sd != 0) | (block.photo_attitude_sd != 0)
     observed = block.photo_positions_observed
     observed = block.photo_positions if observed is None else observed
@@ -391,7 +391,7 @@ def _consensus(block: Block) -> FirstValues | None:
 
 
 def _started(block: Block, found: FirstValues) -> Block:
-    """Return the block with the poses that were found; what is observed of it stays."""
+    """Return the block with the computed poses; observed values do not change."""
     changes: dict[str, Floats] = {}
     for name in ("position", "attitude"):
         given, sd = getattr(block, f"photo_{name}s"), getattr(block, f"photo_{name}_sd")

@@ -1,8 +1,8 @@
-"""Tables of trajectories that take over large corrections of their attitudes.
+"""Update of trajectory tables by large attitude corrections.
 
-Corrections r(t) are added to each other, turns are not: bases describe small ones well. Where those of images
-and records are larger than half a radian, the table takes over the turn in their middle, A0 Exp(r), exactly
-at all times; r then begins at zero (docs/moving.md).
+Corrections r(t) are additive but rotations are not, so that bases suit small corrections only. Corrections of
+images and records may exceed half a radian. The rotation in the middle is then applied to the table, A0
+Exp(r), exactly at all times. The corrections r then restart at zero (docs/moving.md).
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from photogram.results.trajectories import AdjustedTrajectory
 from photogram.words import phrase
 
 LARGE = 0.5  # Radians
-TIMES = 1000  # At which a trajectory is looked at, at the most
+TIMES = 1000  # Maximum number of times at which a trajectory is evaluated
 
 
 def large_turns(result: Result) -> dict[str, Floats]:
-    """Return the turns that tables are to take over, by the names of their trajectories.
+    """Return the rotations that update tables, by trajectory name.
 
     (3,) rotation vectors about the axes of the photo, in radians.
     """
@@ -37,21 +37,21 @@ def large_turns(result: Result) -> dict[str, Floats]:
 
 
 def taken_over(turns: dict[str, Floats]) -> Message:
-    """Return the remark on rotations that tables have taken over, from the first to the last time."""
+    """Return the note on tables that were updated by rotations."""
     parts = [f"{name} ({np.linalg.norm(turn):.2f} rad)" for name, turn in turns.items()]
     return Message(phrase("adjust.rotations.tables", tables=parts))
 
 
 def stays(result: Result) -> list[Message]:
-    """Return the remark on large rotations that tables cannot contain."""
+    """Return the note on large rotations that cannot be applied to tables."""
     large = [own.name for own, _ in _large(result) if own.given.angles == "vector"]
     return [Message(phrase("adjust.rotations.large", trajectories=large, limit=LARGE))] if large else []
 
 
 def _large(result: Result) -> list[tuple[AdjustedTrajectory, Floats]]:
-    """Return trajectories with a large correction of the attitude somewhere, and that in the middle.
+    """Return trajectories with a large attitude correction, and the correction in the middle.
 
-    None without convergence: steps have gone astray then.
+    Empty without convergence, because the steps are then unreliable.
     """
     values = {each.name: each.position for each in result.unknowns if each.kind == RotationCoefficient.KIND}
     of_photos = _of_photos(result.block)
@@ -71,9 +71,9 @@ def _large(result: Result) -> list[tuple[AdjustedTrajectory, Floats]]:
 
 
 def _may_be_large(trajectory: Trajectory, values: dict[str, Floats], *, alone: bool) -> bool:
-    """Whether coefficients, by their names, leave room for a large correction.
+    """Return whether coefficients allow a large correction.
 
-    `alone`: of a photo's own motion, whose images are all at nearly its time: the first.
+    `alone`: only the first coefficient counts, for the motion of a single photo.
     """
     basis, own = trajectory.rotation, trajectory.coefficients[1]
     sizes = np.array([np.linalg.norm(values[each.name]) for each in (own[:1] if alone else own)])
@@ -82,17 +82,17 @@ def _may_be_large(trajectory: Trajectory, values: dict[str, Floats], *, alone: b
         reference, scale = basis.reference or 0.0, basis.scale or 1.0
         beyond = max(1.0, abs(first - reference) / scale, abs(last - reference) / scale)
         return bool((sizes * beyond ** np.arange(len(sizes))).sum() > LARGE)
-    # B-splines are positive and sum up to one.
+    # B-splines are positive and their sum is 1.
     return bool((sizes > LARGE).any())
 
 
 def _of_photos(block: Block) -> set[str]:
-    """Return the names of trajectories that are the motions of photos of their own."""
+    """Return the names of trajectories that belong to single photos."""
     return {each.photo for each in block.timed if each.trajectory is None}
 
 
 def _seen(block: Block) -> dict[str, Floats]:
-    """Return some times of images and records on trajectories, ascending, by the names of these."""
+    """Return some ascending times of images and records, by trajectory name."""
     times: dict[str, list[Floats]] = {}
     for own, trajectory, _, images in timed_images(block):
         times.setdefault(trajectory.name, []).append(own.times(block.image_xy[images]))
@@ -107,9 +107,9 @@ def _seen(block: Block) -> dict[str, Floats]:
 
 
 def _is_open(block: Block, trajectory: Trajectory) -> bool:
-    """Whether nothing but differences is known of the coefficients of rotations, whatever turn they share.
+    """Return whether a common rotation of all rotation coefficients is free.
 
-    Rates of a photo's own motion are about its axes wherever these are.
+    Rates of a photo's own motion refer to its axes and do not restrict it.
     """
     own = trajectory.coefficients[1]
     if trajectory.name in _of_photos(block):

@@ -1,4 +1,4 @@
-"""Combinations of unknowns that the observations leave undetermined, in words; names of common unknowns."""
+"""Explanation of undetermined combinations of unknowns, and names of shared unknowns."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ if TYPE_CHECKING:
 _Combination = tuple[
     tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...], tuple[str, ...]
 ]
-"""Photos, cameras, common unknowns, parameters of cameras and parts of poses that move together."""
+"""Photos, cameras, shared unknowns, camera parameters and pose components that vary together."""
 
 _DISTANCES = frozenset({"c", "f", "fx", "fy"})
 _POINTS = frozenset({"xp", "yp", "cx", "cy"})
 _DECENTRING = frozenset({"P1", "P2", "p1", "p2", "B1", "B2"})
 _AFFINITY = frozenset({"b1", "b2"})
 _OF_RING = frozenset({"b1", "yp", "cy", "fx", "fy"})
-"""What photos on a ring that are not turned about their axes leave open, with c or each other."""
-_ALONG = 0.8  # Cosine of the angle between the view and an axis that is moved along it
-_PARALLEL = 0.99  # Cosine of the angle between views that are about parallel
-_UPRIGHT = 0.05  # Photos whose x axes are across one direction to this sine are not turned about their axes
-MOST = 40  # Lines of a message
-_ONE_PLACE = 1e-9  # Stations that differ by less than this part of their coordinates are one
-_ON_LINE = 1e-3  # Places whose spread across a line is less than this part of that along it are on it
+"""Parameters that photos on a ring, not rotated about their axes, cannot separate from c or each other."""
+_ALONG = 0.8  # Minimum cosine of the angle between the view and a translation along it
+_PARALLEL = 0.99  # Minimum cosine of the angle between parallel views
+_UPRIGHT = 0.05  # Maximum sine for which the x axes of all photos are perpendicular to one direction
+MOST = 40  # Maximum number of lines of a message
+_ONE_PLACE = 1e-9  # Stations with a smaller difference relative to their coordinates coincide
+_ON_LINE = 1e-3  # Points with a smaller ratio of spreads across and along a line are collinear
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Geometry of the photos of a block that explains undetermined unknowns."""
+    """Geometry of the photos of a block, to explain undetermined unknowns."""
 
     photos: int = 0
-    parallel: bool = False  # Whether all photos look in about the same direction
-    upright: bool = False  # Whether the x axes, or the y axes, of all photos are across one direction
+    parallel: bool = False  # Whether the views of all photos are about parallel
+    upright: bool = False  # Whether the x or the y axes of all photos are perpendicular to one direction
     control: bool = False  # Whether any coordinate of a point is control
     heights: bool = True  # Whether any height of a point or photo is known
-    on_line: bool = False  # Whether all known places of points and photos are on one straight line
+    on_line: bool = False  # Whether all known points and photos are on one straight line
 
 
 def setting_of(block: Block) -> Setting:
@@ -80,7 +80,7 @@ def setting_of(block: Block) -> Setting:
 
 
 def in_one_place(block: Block, photos: Sequence[int]) -> bool:
-    """Return whether some photos were all taken from one place."""
+    """Return whether photos were all taken from one position."""
     stations = block.photo_positions[list(photos)]
     if len(stations) < 2 or (on_shared(block) | scanners(block))[list(photos)].any():
         return False
@@ -92,9 +92,9 @@ def undetermined_combinations(
     combinations: list[_photocore.CombinationRow],
     unknowns: Sequence[Unknown] | None = None,
 ) -> RankError:
-    """Name the photos, points and cameras of undetermined combinations, and what they are.
+    """Return the error that names and explains undetermined combinations.
 
-    `unknowns` are the common ones that the combinations count, where they are not those of the block alone.
+    `unknowns` are the shared unknowns of the combinations, if they are not the unknowns of the block.
     """
     common = unknowns or block.unknowns
     rows = [
@@ -129,7 +129,7 @@ def undetermined_combinations(
 
 
 def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: list[str]) -> Phrase:
-    """Return the photos, cameras and common unknowns that a combination moves."""
+    """Return the photos, cameras and shared unknowns of a combination."""
     parts = [phrase("moved.cameras", cameras=[block.camera_names[row] for row in cameras])] if cameras else []
     if unknowns:
         parts.append(phrase("moved.unknowns", names=unknowns))
@@ -149,7 +149,7 @@ def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unkn
 
 
 def _cause(block: Block, combination: _Combination, at: Setting, common: Sequence[Unknown]) -> Phrase | None:
-    """Return parameters and parts of poses with the cause and the remedy; None if it has no name."""
+    """Return parameters and pose components with cause and remedy; None if the cause is unknown."""
     photos, cameras, others, moved, poses = combination
     if not moved:
         kinds = {common[row].KIND for row in others}
@@ -167,7 +167,7 @@ def _cause(block: Block, combination: _Combination, at: Setting, common: Sequenc
 
 
 def _of_unknowns(block: Block, kinds: set[str], photos: int, at: Setting) -> Phrase | None:
-    """Return the cause if shifts, drifts, motions, or control on a line leave unknowns open."""
+    """Return the cause if shifts, drifts, motions or collinear control leave unknowns free."""
     if cause := of_motion(kinds, placed=at.control or bool(block.observations)):
         return cause
     if kinds == {"lever arm", "shift"}:
@@ -181,7 +181,7 @@ def _of_unknowns(block: Block, kinds: set[str], photos: int, at: Setting) -> Phr
 
 
 def weak_parameters(block: Block, solution: _photocore.BlockSolution) -> list[tuple[int, int]]:
-    """Return the cameras and parameters of the combination that no step could follow to its end."""
+    """Return the cameras and parameters of the weakest combination."""
     if block.photo_cameras is None:
         return list(solution.weak_cameras)
     cameras = block.photo_cameras.tolist()
@@ -190,7 +190,7 @@ def weak_parameters(block: Block, solution: _photocore.BlockSolution) -> list[tu
 
 
 def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> Phrase | None:
-    """Return the cause of the combination that no step could follow to its end; see :func:`in_words`."""
+    """Return the cause of the weakest combination; see :func:`in_words`."""
     names = {block.cameras[camera].names[k] for camera, k in weak_parameters(block, solution)}
     at = setting_of(block)
     if not names:
@@ -205,7 +205,7 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> Phrase | 
             poses.add("along" if abs(views[photo, unknown]) > _ALONG else "across")
         elif unknown < 6:
             poses.add("swing" if unknown == 5 else "tilt")
-    # Far along it others hardly move: what is free and fits it belongs to it.
+    # Far along this direction others hardly move; free parameters that fit it belong to it.
     named = [camera for camera in block.cameras if names & set(camera.names)]
     free = {
         name
@@ -217,9 +217,9 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> Phrase | 
 
 
 def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> Phrase | None:
-    """Return why parameters of cameras and parts of poses cannot be separated, and the remedy.
+    """Explain why camera parameters and pose components cannot be separated, with a remedy.
 
-    Parts are `along`, `across`, `tilt`, `swing`. A setting is None if it is unknown.
+    `poses` contains `along`, `across`, `tilt`, `swing`. `setting` is None if it is unknown.
     """
     at = setting or Setting()
     radial = {name for name in names if name[0] in "KkA" and name[1:].isdigit()}
@@ -245,7 +245,7 @@ def _of_distances(names: set[str], poses: set[str]) -> Phrase | None:
 
 
 def _of_setting(names: set[str], at: Setting) -> Phrase | None:
-    """Return the parameters of cameras that the directions of the photos leave open."""
+    """Return the cause if viewing directions leave camera parameters free."""
     if at.photos == 2:
         return phrase("weak.two-photos")
     if at.parallel and not at.control:
@@ -255,7 +255,7 @@ def _of_setting(names: set[str], at: Setting) -> Phrase | None:
 
 
 def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
-    """Name common unknowns, each once; coefficients by their trajectories and, of splines, times."""
+    """Name shared unknowns once; coefficients by trajectory and, for splines, by time."""
     found = list(dict.fromkeys(each.title for each in unknowns if not isinstance(each, Coefficient)))
     wanted = {id(each) for each in unknowns if isinstance(each, Coefficient)}
     if not wanted:
@@ -270,7 +270,7 @@ def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
 
 
 def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
-    """Return the name of a trajectory, with the times that its coefficients are of; nothing of others."""
+    """Return the name of a trajectory with the times of its coefficients; empty if not concerned."""
     own = [k for k, each in enumerate(trajectory.coefficients[part]) if id(each) in wanted]
     basis = (trajectory.position, trajectory.rotation)[part]
     if not own:
@@ -284,10 +284,10 @@ def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
 
 
 def beyond_trajectory(block: Block, photo: int, points: Sequence[int], seconds: Sequence[float]) -> Phrase:
-    """Return the message on a time that its trajectory does not reach.
+    """Return the message on a time beyond the reach of its trajectory.
 
-    Records on trajectories follow the photos; `points` has the point of the image, none for the photo itself
-    or a record. `seconds` are the time and the reach of the trajectory, from its origin.
+    Records on trajectories follow the photos. `points` contains the point of the image, if any. `seconds` are
+    the time and the reach of the trajectory, from its origin.
     """
     if photo < len(block.photo_ids):
         name = block.photo_ids[photo]
@@ -308,7 +308,7 @@ def beyond_trajectory(block: Block, photo: int, points: Sequence[int], seconds: 
 def of_motion(kinds: set[str], *, placed: bool) -> Phrase | None:
     """Return why unknowns of motion cannot be separated.
 
-    `placed`: there is control, or an observation besides images, so that the datum may be determined.
+    `placed`: control or additional observations exist, so that the datum may be determined.
     """
     coefficients = kinds & {"position coefficient", "rotation coefficient"}
     if "readout" in kinds and coefficients:

@@ -1,4 +1,4 @@
-"""Variances of image coordinates as a function of the radius, or of any quantity of the user's."""
+"""Variances of image coordinates as a function of the radius or another quantity."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from photogram.statistics.components import GroupsOf
 from photogram.statistics.variance_function import estimate_function
 from photogram.words import phrase
 
-TOLERANCE = 1e-6  # Of the adjustments, in standard deviations
+TOLERANCE = 1e-6  # Tolerance of the adjustments, in standard deviations
 
 
 class _Left:
-    """What an adjustment leaves of image coordinates."""
+    """Residuals and redundancy of image coordinates after an adjustment."""
 
     def __init__(self, result: AdjustedNetwork, probing: Probing) -> None:
         self._result, self._probing = result, probing
@@ -36,7 +36,7 @@ class _Left:
         self.redundancy: Floats = np.nan_to_num(result.redundancy).ravel()
 
     def information(self, terms: Floats) -> Floats:
-        """Return (t, t) sums of R_ij^2 c_i c_j^T, by random signs."""
+        """Return (t, t) sums of R_ij^2 c_i c_j^T, estimated with random signs."""
         rows, count = terms.shape
         factor = factored(self._result)
         options = self._probing.options(rows)
@@ -63,35 +63,34 @@ def variance_function(
     probing: Probing | None = None,
     threads: int | None = None,
 ) -> VarianceFunction:
-    """Estimate how the variance of image coordinates grows with the radius: sigma^2 = a^2 + b^2 r^2.
+    """Estimate the image variance as a function of the radius: sigma^2 = a^2 + b^2 r^2.
 
-    All other observations keep their weights. The regression of squared residuals on redundancy numbers is
-    repeated with the weights that it gives until nothing changes: once would be badly biased.
+    Weights of other observations do not change. Squared residuals are regressed on redundancy numbers,
+    repeatedly with the new weights, because a single step is badly biased.
 
     Parameters
     ----------
     network
-        The block or collection; the given standard deviations are the unit of a and b.
+        Block or collection; the given standard deviations are the unit of a and b.
     of
-        `radius`, or (m,) values of the user's own, not negative, one for each image: their squares take the
-        place of the squares of the radius.
+        `radius`, or (m,) non-negative values, one for each image, which replace the radius.
     center
-        What the radius is counted from, in the unit of the image coordinates.
+        Centre of the radius, in the unit of the image coordinates.
     bins
-        How many quantiles of the radius are shown beside the function.
+        Number of quantiles of the radius in the comparison with the function.
     max_steps
-        Adjustments at the most.
+        Maximum number of adjustments.
     probing
-        How standard deviations are found.
+        Computation of the standard deviations.
     threads
-        As of :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
 
     Raises
     ------
     InputError
-        What is no network, values that do not fit, no redundancy.
+        If the network is invalid, values do not fit, or redundancy is missing.
     AdjustmentError, RankError
-        As of the adjustment.
+        As in the adjustment.
     """
     probing = probing or Probing()
     at_least("bins", bins, 2)
@@ -106,7 +105,7 @@ def variance_function(
         raise InputError(phrase("weighting.no-function"))
     share = np.repeat((values / largest) ** 2, 2)
     terms = np.stack([np.ones(2 * images), share], axis=1)
-    # A group for each image coordinate, and nothing else.
+    # One group per image coordinate, and no others.
     grouping = Grouping(
         groups=GroupsOf(("",) * (2 * images)),
         images=np.arange(2 * images).reshape(-1, 2),
@@ -143,7 +142,7 @@ def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) 
 def _bins(
     result: AdjustedNetwork, values: Floats, factors: Floats, count: int, probing: Probing
 ) -> tuple[Bin, ...]:
-    """Return quantiles of the values with what their residuals say beside the function."""
+    """Return quantiles of the values, with residual variances to compare with the function."""
     edges = np.quantile(values[result.used_images], np.linspace(0, 1, count + 1)[1:-1])
     places: Indices = np.searchsorted(edges, values, side="right")
     labels = np.array([f"{place:03d}" for place in places], dtype=object)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["adjust", "adjusted"]
 
-WORSE = 100.0  # Standard deviations of a weak photo, in the median of all photos
+WORSE = 100.0  # Limit of the standard deviations of a weak photo, relative to the median of all photos
 
 
 def adjust(
@@ -42,56 +42,54 @@ def adjust(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> AdjustedCollection:
-    """Adjust a collection by Levenberg-Marquardt steps from given values, however far.
+    """Adjust a collection by Levenberg-Marquardt steps from approximate values.
 
-    Points with a free coordinate and images on one photo only are left out, and so are points that run into
-    the station of a photo, where rays that fit badly meet: they would take all digits from the others. They
-    are known by being a hundred times nearer than the other points while every other photo has the images of
-    point and station within three standard deviations, before and after a step. So is a point that runs off
-    for infinity, because its rays part or are parallel.
-    Photos that have no image then stay as they are. Where nothing weighted or fixed gives a datum, cofactors
-    are those of minimum constraints: position and attitude of the first photo and one component of the
-    translation of another are held. Residuals, redundancy
-    numbers and the variance of unit weight do not depend on which.
+    Points with a free coordinate and images on one photo only are excluded. Points that converge to the
+    station of a photo, because inconsistent rays meet there, are excluded as well, as they would ruin the
+    numerical precision. Such points are a hundred times nearer than others. In every other photo, the images
+    of point and station agree within three standard deviations, before and after a step. Points that diverge
+    to infinity on parallel or divergent rays are also excluded. Photos without remaining images do not
+    change. If weighted or fixed values define no datum, cofactors refer to minimum constraints: position and
+    attitude of the first photo, and one translation component of another. Residuals, redundancy numbers and
+    the variance of unit weight are independent of this choice.
 
     Parameters
     ----------
     collection
-        The collection, with its initial values.
+        Collection with its initial values.
     tolerance
-        Iterate until a step lowers what is minimised by less than this fraction of it. When None, 1e-8
-        without a loss, and 1e-6 with one: reweighting converges linearly.
+        Iterate until a step decreases the objective function by less than this fraction. None: 1e-8 without a
+        loss, and 1e-6 with one, because reweighting converges linearly.
     max_iterations
-        Iterations (accepted steps) at the most.
+        Maximum number of iterations (accepted steps).
     loss
-        Robust loss in place of the squares: `huber` or `cauchy`, of both coordinates of an image point
-        together; None for least squares. `("huber", 2.0)` also says where it sets in; see
-        :func:`photogram.adjust`.
+        Robust loss: `huber` or `cauchy`, of both coordinates of an image point together. None: least squares.
+        `("huber", 2.0)` also specifies the scale; see :func:`photogram.adjust`.
     covariance
         Whether to compute covariances, redundancy numbers and standardized residuals.
     ordering
-        How photos are ordered for elimination; see :func:`photogram.adjust`.
+        Elimination order of photos; see :func:`photogram.adjust`.
     threads
         Number of threads; see :func:`photogram.adjust`.
     progress
-        Called now and then with what is going on; an exception it raises stops the adjustment.
+        Called with the progress from time to time; an exception that it raises stops the adjustment.
 
     Returns
     -------
-    The result; its `status` says whether the adjustment converged, its `messages` why covariances are
-    missing, where the observations do not determine everything.
+    The result. Its `status` is `converged` if the adjustment converged; `messages` explain missing
+    covariances.
 
     Raises
     ------
     RankError
-        Damping does not help: an unknown has no observation.
+        If damping does not help, because an unknown is not observed.
     AdjustmentError
-        There is nothing to adjust, the initial values give no finite image coordinates, or double precision
-        is too coarse for values so large; names the photos and points concerned.
+        If there is nothing to adjust, initial values give infinite image coordinates, or double precision is
+        insufficient for large values; lists the photos and points concerned.
     InputError
-        An option that cannot be.
+        If an option is invalid.
     KeyboardInterrupt
-        Ctrl-C.
+        If interrupted by Ctrl-C.
     """
     if tolerance is None:
         tolerance = 1e-8 if loss is None else 1e-6
@@ -118,7 +116,7 @@ def adjusted(
     progress: Callable[[Progress], None] | None = None,
     start: _photocore.BlockState | None = None,
 ) -> AdjustedCollection:
-    """Adjust a collection, perhaps from where an adjustment of it has ended."""
+    """Adjust a collection from its initial values or from a former state."""
     try:
         network = collection_network(collection, options)
         told = None if progress is None else teller(progress)
@@ -138,12 +136,11 @@ def adjusted(
 
 
 def _messages(solution: _photocore.CollectionSolution, collection: Collection) -> list[Message]:
-    """Collect remarks that did not stop the adjustment, the gravest first."""
     messages: list[Message] = []
     if solution.undetermined is not None:
         error = named(*solution.undetermined)
         messages.append(Undetermined(phrase("collection.no-covariances", error=str(error)), what=str(error)))
-    # A point far off on parallel rays creeps alone, and is named itself.
+    # A distant point on parallel rays converges slowly; it is reported separately.
     if solution.weak and not solution.weak_points:
         photos: dict[int, list[str]] = {}
         for photo, unknown in sorted(solution.weak, key=lambda pair: pair[1]):
@@ -190,7 +187,7 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
 
 @np.errstate(all="ignore")
 def _hardly_held(solution: _photocore.CollectionSolution) -> list[Message]:
-    """Remark on photos that are far worse determined than the others, as those whose points lie on a line."""
+    """Report photos that are much weaker than others, e.g. with collinear points."""
     variances = np.diagonal(solution.photo_cofactors, axis1=1, axis2=2)
     sd = np.sqrt(np.where(variances > 0, variances, np.nan))
     free = np.isfinite(sd).any(axis=0)

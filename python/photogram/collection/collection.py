@@ -1,4 +1,4 @@
-"""A collection of photos: arrays, checked."""
+"""Collection of photos as validated arrays."""
 
 from __future__ import annotations
 
@@ -34,31 +34,31 @@ __all__ = ["Collection"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Collection(Valued, Brief):
-    """P photos with unknown cameras, n points, m image points.
+    """Collection of P photos with unknown cameras, n points and m image observations.
 
-    A photo sees a point X in P = R(w) X + t and looks along its -z axis; its camera, of the model that all
-    photos share, maps P to the image. Any unknown may be weighted, from free (infinite standard deviation) to
+    A photo sees a point X at P = R(w) X + t and looks along its -z axis. Its camera maps P to the image; all
+    photos share the camera model. Any unknown may be weighted, from free (infinite standard deviation) to
     fixed (zero).
 
     Attributes
     ----------
     photo_parameters
-        (P, k) w (rad), t (units of the object space), then those of the camera.
+        (P, k) w (rad), t (units of the object space), and the camera parameters.
     point_positions
-        (n, 3).
+        (n, 3) positions in the object space.
     image_photos, image_points
-        (m,) which photo and which point.
+        (m,) indices of photos and points.
     image_xy
-        (m, 2) pixels, as the camera counts them.
+        (m, 2) pixels, in the convention of the camera.
     image_sd
-        (m, 2) standard deviations, pixels; one number stands for all.
+        (m, 2) standard deviations, pixels; one number applies to all.
     photo_sd, point_sd
-        (P, k) and (n, 3) standard deviations of the given values as observations; infinite free, zero
-        fixed; one number stands for all but the constants of a camera, which are fixed.
+        (P, k) and (n, 3) standard deviations of the given values as observations; infinite is free, zero is
+        fixed. One number applies to all except the constants of a camera, which are fixed.
     camera
-        The model of the cameras. `bal` ("Bundle Adjustment in the Large"; Agarwal and others 2010) has f, k1,
-        k2 and maps P to f (1 + k1 p^2 + k2 p^4) p with p = -(P1, P2) / P3: pixels from the principal point, x
-        to the right, y up. `docs/cameras.md` has the others.
+        Camera model. `bal` ("Bundle Adjustment in the Large"; Agarwal and others 2010) has f, k1, k2 and maps
+        P to f (1 + k1 p^2 + k2 p^4) p with p = -(P1, P2) / P3: pixels from the principal point, x to the
+        right, y up. `docs/cameras.md` describes the other models.
     """
 
     photo_parameters: Floats
@@ -72,7 +72,7 @@ class Collection(Valued, Brief):
     camera: str = "bal"
 
     if TYPE_CHECKING:
-        # What checkers of types are told: more can be given than what the fields then hold.
+        # Signature for type checkers: arguments accept more types than the fields.
         def __init__(
             self,
             photo_parameters: ArrayLike,
@@ -87,7 +87,7 @@ class Collection(Valued, Brief):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        # What has knots is more than its parameters.
+        # Models with knots have more than parameters.
         known = [name for name in _photocore.CAMERAS if name != KNOTTED]
         if self.camera not in known:
             raise InputError(phrase("collection.camera", names=known, value=self.camera))
@@ -116,7 +116,7 @@ class Collection(Valued, Brief):
             object.__setattr__(self, name, indices(name, getattr(self, name), images, count))
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what the collection is in a few lines, as its `repr` and notebooks show it."""
+        """Return a short summary of the collection, as shown by its `repr` and in notebooks."""
         low, high = self.image_sd.min(initial=np.inf), self.image_sd.max(initial=0.0)
         return "Collection", [
             (
@@ -144,17 +144,17 @@ class Collection(Valued, Brief):
 
     @property
     def observations(self) -> tuple[Observation, ...]:
-        """What else was observed: nothing."""
+        """Additional observations: none."""
         return ()
 
     @property
     def image_unit(self) -> str:
-        """What image coordinates are measured in: `px`."""
+        """Unit of image coordinates: `px`."""
         return "px"
 
     @property
     def geographic(self) -> bool:
-        """Whether positions are longitude, latitude and height: never."""
+        """Whether positions are longitude, latitude and height: always False."""
         return False
 
     @property
@@ -168,21 +168,21 @@ class Collection(Valued, Brief):
 
     @property
     def _constant(self) -> NDArray[np.bool_]:
-        """(k,) which parameters of a photo are never unknown."""
+        """(k,) which parameters of a photo are always fixed."""
         return np.arange(len(self.parameters)) >= len(self.parameters) - self._model[2]
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Units of the k parameters: `rad`, `px`; none for numbers and for lengths in the object space."""
+        """Units of the k parameters: `rad`, `px`; empty for numbers and for lengths in object space."""
         return parameters_of(self.camera)[1]
 
     @property
     def formula(self) -> str:
-        """The image of P, a point in the axes of the photo."""
+        """Formula of the image of P, a point in the axes of the photo."""
         return self._model[0]
 
     def replace(self, **changes: Any) -> Self:
-        """Return the collection with other arrays in place of the named ones."""
+        """Return the collection with some arrays replaced."""
         return replace(self, **changes)
 
     def _observables(self) -> Observables:
@@ -195,7 +195,7 @@ class Collection(Valued, Brief):
             camera_names=self.photo_ids,
             strips=lambda: [np.arange(photos)],
             point_classes=np.where(np.isfinite(self.point_sd).any(axis=1), "control", "pass"),
-            # The core has parameters of cameras apart; they keep their weights.
+            # Weights of camera parameters, which are separate in the core, do not change.
             photo_observed=(self.photo_sd > 0) & np.isfinite(self.photo_sd) & (np.arange(width) < len(POSE)),
             stations=("rotations",) * 3 + ("translations",) * 3 + ("cameras",) * (width - len(POSE)),
             commons=0,
@@ -230,13 +230,13 @@ class Collection(Valued, Brief):
         return check(self, threads)
 
     def computed_xy(self) -> Floats:
-        """Return (m, 2) the image coordinates that the present parameters and positions give."""
+        """Compute (m, 2) image coordinates from the present parameters and positions."""
         return _photocore.collection_images(
             self.camera, self.photo_parameters[self.image_photos], self.point_positions[self.image_points]
         )
 
     def cost(self) -> float:
-        """Return half the sum of squared weighted residuals, as "Bundle Adjustment in the Large" counts."""
+        """Return half the weighted sum of squared residuals, as in "Bundle Adjustment in the Large"."""
         return 0.5 * float((((self.image_xy - self.computed_xy()) / self.image_sd) ** 2).sum())
 
 

@@ -1,4 +1,4 @@
-"""A collection as the core takes it and tests ask it, and what the core has refused of it, in words."""
+"""Conversion of a collection to the core, trials for tests, and messages for core failures."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.collection import Collection
 
-ROUGH, EXACT = 1e-7, 1e-12  # A smaller decrease of the sum of squares ends a round; EXACT with R of all rows
+ROUGH, EXACT = 1e-7, 1e-12  # Relative decrease of the sum of squares that ends a round; EXACT with full R
 
 
 def collection_network(given: Collection, options: CoreOptions) -> _photocore.CollectionNetwork:
-    """Return a collection as the core adjusts it, and answers questions about it afterwards."""
+    """Create the core network that adjusts a collection and evaluates it afterwards."""
     return _photocore.collection_network(
         given.camera,
         given.photo_parameters,
@@ -51,7 +51,7 @@ def named(
     points: list[int],
     _seconds: list[float],
 ) -> AdjustmentError | InputError:
-    """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
+    """Convert a core failure to an error; photos and points are numbered from 0."""
     if kind == "undetermined points":
         names = [str(point) for point in points]
         text = phrase("collection.undetermined-points", n=len(names), names=names)
@@ -72,7 +72,7 @@ def named(
 def collection_trial(
     collection: Collection, core: _photocore.NetworkTrial, *, parts: bool = True
 ) -> NetworkTrial:
-    """Return a collection as tests ask it."""
+    """Create the trial of a collection for tests."""
     return NetworkTrial(
         core=core,
         suspects=_Named(collection, core.suspects, parts),
@@ -89,7 +89,7 @@ class _Named(NamedSuspects):
         self.parameters = collection.parameters[len(POSE) :]
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return the rows that may go alone: of control single ones or all, of a station single ones."""
+        """Return the row sets to remove: single rows, and for control also all rows."""
         size = int(self.row_starts[group + 1] - self.row_starts[group])
         if not self.apart or int(self.kinds[group]) == IMAGE or size < 2:
             return None
@@ -97,7 +97,7 @@ class _Named(NamedSuspects):
         return [*single, tuple(range(size))] if int(self.kinds[group]) == CONTROL else single
 
     def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photo whose camera it is."""
+        """Return the photo to which the camera belongs."""
         return np.array([subject])
 
     def other_name(self, kind: int, subject: int) -> Phrase:
@@ -105,5 +105,5 @@ class _Named(NamedSuspects):
         return Phrase(f"named.photo_{KINDS[kind]}", {"photo": str(self.given.photo_ids[subject])})
 
     def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
-        """Return a parameter of a camera."""
+        """Return the name of a camera parameter, without a unit."""
         return self.parameters[component], ""

@@ -1,4 +1,4 @@
-"""The document of an adjusted collection: its report, its page, and its JSON (`docs/collection.md`)."""
+"""Document of an adjusted collection for reports, HTML pages and JSON (`docs/collection.md`)."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def collection_document(result: AdjustedCollection) -> Document:
 
 
 def collection_members(result: AdjustedCollection) -> dict[str, Any]:
-    """Return the members of the JSON document of an adjusted collection."""
+    """Return the members of the JSON file of an adjusted collection."""
     named = zip(result.collection.parameters[len(POSE) :], result.collection.units[len(POSE) :], strict=True)
     lengths, plain = list[str](), list[str]()
     for name, unit in named:
@@ -114,15 +114,15 @@ def collection_terms(result: AdjustedCollection) -> Terms:
 
 @np.errstate(invalid="ignore")
 def determined(result: AdjustedCollection) -> Determined:
-    """Turn w and t of P = R(w) X + t into the station and a turn about the axes of the photo.
+    """Convert w and t of P = R(w) X + t to the station and a rotation about the photo axes.
 
-    In w and t a photo far from the origin would look badly determined, whatever sees it.
+    With w and t, a photo far from the origin would seem badly determined.
     """
     pose = len(POSE)
     translations, cofactors = result.photo_parameters[:, 3:pose], result.photo_cofactors[:, :pose, :pose]
     vectors = np.ascontiguousarray(result.photo_parameters[:, :3])
     matrices, turns = _photocore.attitudes_from_numbers("rotation_vector_to_photo", vectors, np.eye(3))
-    # The station is -A t, and A becomes A (I + [rho]).
+    # The station is -A t; A changes to A (I + [rho]).
     partials = np.zeros((len(vectors), pose, pose))
     partials[:, :3, :3] = matrices @ np.cross(translations[:, np.newaxis, :], turns, axisb=1, axisc=1)
     partials[:, :3, 3:] = -matrices

@@ -1,4 +1,4 @@
-"""What the verdict on an adjusted collection rests on; what is held is tested by scores, as of blocks."""
+"""Tests for the verdict on an adjusted collection; fixed values have score tests, as in blocks."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
 
 FIRST_OF_TRANSLATION = 3
-STEP = 1e-6  # Of a parameter, in its own size or one
-POINTS = 3  # Coordinates of a point, whose partials stand behind those of the photos
+STEP = 1e-6  # Step of numerical derivatives, relative to the parameter or 1
+POINTS = 3  # Coordinates of a point, whose partial derivatives follow those by photos
 
 
 def collection_findings(result: AdjustedCollection) -> Findings:
     """Return the tests of a collection.
 
-    Standard deviations of pixels are guesses: single observations are tested against all others.
+    Given standard deviations of pixels are guesses, so observations are tested relative to each other.
     """
     together = CameraImages("the cameras", np.ones(len(result.photo_parameters), dtype=bool), 0)
     return replace(
@@ -39,12 +39,12 @@ def collection_findings(result: AdjustedCollection) -> Findings:
 
 
 def collection_held(result: AdjustedCollection) -> list[Tested]:
-    """Return tests of the held parameters and points with the worst images, where residuals are too large."""
+    """Return tests of fixed parameters and points with the largest residuals."""
     return held_tests(result, lambda of_images: _suspected(result, of_images), lambda: _partials(result))
 
 
 def _suspected(result: AdjustedCollection, of_images: Floats) -> list[Held]:
-    """Return what is held and has the worst images, the worst first."""
+    """Return fixed values with the largest residuals, in descending order."""
     collection, used = result.collection, result.used_images
     rows: list[tuple[float, Held]] = []
 
@@ -72,7 +72,7 @@ def _suspected(result: AdjustedCollection, of_images: Floats) -> list[Held]:
 
 
 def _worst(own: Indices, of_images: Floats, held: Bools) -> list[int]:
-    """Return the photos or points that are held and have the worst images, the worst first."""
+    """Return fixed photos or points with the largest residuals, in descending order."""
     counts = np.bincount(own, minlength=len(held))
     mean = np.bincount(own, of_images, len(held)) / np.maximum(counts, 1)
     rows = np.flatnonzero(held & (counts > 0))
@@ -80,7 +80,7 @@ def _worst(own: Indices, of_images: Floats, held: Bools) -> list[int]:
 
 
 def _partials(result: AdjustedCollection) -> Floats:
-    """(k + 3, m, 2) partials of the images by the parameters of their photos and by the coordinates."""
+    """Return (k + 3, m, 2) partial derivatives of images by photo parameters and coordinates."""
     collection = result.collection
     photos = result.photo_parameters[collection.image_photos]
     points = result.point_positions[collection.image_points]

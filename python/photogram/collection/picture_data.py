@@ -1,4 +1,4 @@
-"""What pictures draw of an adjusted collection."""
+"""Data for the figures of an adjusted collection."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from photogram.results.picture_data import PicturedNetwork
 if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
 
-BEYOND = 1.1  # How far curves of distortion go on, of the largest observed radius
-ROWS = 51  # Radii of a curve
-SHOWN = 60  # Photos whose own curves are drawn at most
+BEYOND = 1.1  # Extent of distortion curves relative to the maximum observed radius
+ROWS = 51  # Number of radii of a curve
+SHOWN = 60  # Maximum number of photos with individual curves
 
 
 class PicturedCollection(PicturedNetwork):
-    """What is drawn of an adjusted collection, whose photos have cameras of their own."""
+    """Figure data of an adjusted collection, in which each photo has its own camera."""
 
     result: AdjustedCollection
 
@@ -33,12 +33,12 @@ class PicturedCollection(PicturedNetwork):
 
     @property
     def title(self) -> str:
-        """Nothing: collections have no name."""
+        """Empty, because collections are untitled."""
         return ""
 
     @cached_property
     def plan(self) -> Plan:
-        """The network; a photo with P = R X + t stands at -R' t."""
+        """The network; a photo with P = R X + t is at -R' t."""
         result = self.result
         rotations = _photocore.vector_rotations(np.ascontiguousarray(result.photo_parameters[:, :3]))
         used = result.used_points
@@ -61,19 +61,19 @@ class PicturedCollection(PicturedNetwork):
 
     @property
     def footprints(self) -> Floats:
-        """None: nothing says which way is up."""
+        """No footprints, because the vertical is unknown."""
         return np.empty((0, 1, 3))
 
     @property
     def cameras(self) -> tuple[Indices, list[str], bool]:
-        """One frame for the cameras of all photos."""
+        """One common frame for the cameras of all photos."""
         photos = len(self.result.photo_parameters)
         together = np.zeros(photos, dtype=np.int64)
         return together, [f"cameras of all {photos} photos"], self._camera(0).image_y == "down"
 
     @property
     def correlations(self) -> list[Correlated]:
-        """Medians over all photos of the correlations of the parameters of their cameras."""
+        """Medians over all photos of the correlations between camera parameters."""
         result = self.result
         own = np.arange(len(POSE), len(result.collection.parameters))
         free = own[(result.photo_given_sd[:, own] > 0).all(axis=0)]
@@ -90,7 +90,7 @@ class PicturedCollection(PicturedNetwork):
 
     @property
     def distortion(self) -> list[Curves]:
-        """One set of curves: of some photos faintly, and that of the photo whose distortion is the middle."""
+        """Distortion curves: some photos faintly, and the photo with median distortion."""
         result = self.result
         model, values = result.collection.camera, result.photo_parameters[:, len(POSE) :]
         names = result.collection.parameters[len(POSE) :]
@@ -124,7 +124,7 @@ class PicturedCollection(PicturedNetwork):
 
     @property
     def _reach(self) -> float:
-        """How far images reach from the middle of the picture: the radius within which all but 1 % lie."""
+        """Radius from the image centre that contains 99 % of the image points."""
         xy = self.images.xy
         middle = np.median(xy, axis=0) if self.images.down else np.zeros(2)
         return float(np.quantile(np.hypot(*(xy - middle).T), 0.99))

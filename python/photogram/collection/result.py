@@ -1,4 +1,4 @@
-"""The result of the adjustment of a collection: arrays with their covariances, and the ways to show them."""
+"""Result of the adjustment of a collection: arrays with covariances, tables and documents."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ __all__ = ["AdjustedCollection"]
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AdjustedCollection(AdjustedNetwork):
-    """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
+    """Adjusted collection, with the arrays of every `AdjustedNetwork`.
 
-    The k unknowns of a photo are its parameters in the collection. Of covariances kinds are `photo` (all
-    parameters), `pose` and `camera` (its first six, the others) and `point`; photos and points are called by
-    their numbers: `("photo", 3)`, `("point", [7, 8])`. Cofactors hold for the datum that the
-    observations and weights give; where these give none, for that of the held parameters in `datum`.
+    The k unknowns of a photo are its parameters in the collection. Types of covariances are `photo` (all
+    parameters), `pose` and `camera` (its first six, the others) and `point`. Photos and points are identified
+    by number: `("photo", 3)`, `("point", [7, 8])`. Cofactors refer to the datum defined by observations and
+    weights; otherwise to the fixed parameters in `datum`.
 
     Attributes
     ----------
     collection
-        What was adjusted.
+        The collection before the adjustment.
     weighted_sum_of_squares
-        Of images and weighted unknowns, weights as the loss has modified them.
+        Of images and weighted unknowns, with weights modified by the loss.
     photo_parameters
-        (P, k) adjusted; see :class:`Collection`.
+        (P, k) adjusted parameters; see :class:`Collection`.
     photo_images
-        (P,) number of image points.
+        (P,) number of image points of each photo.
     point_rays_behind
-        (n,) how many image points have the point behind the camera.
+        (n,) number of image observations with the point behind the camera.
     datum
-        Photos and parameters that were held to give the cofactors a datum.
+        Photos and parameters that were fixed to define a datum of the cofactors.
     """
 
     collection: Collection
@@ -65,7 +65,7 @@ class AdjustedCollection(AdjustedNetwork):
     KNOWN: ClassVar[bool] = False
 
     def _table(self, what: str) -> pd.DataFrame:
-        """Return the table of one kind of thing as a data frame; pandas takes long to import."""
+        """Return a table as a data frame; pandas is imported here because it is slow."""
         import pandas as pd
 
         from photogram.results.tests import TABLES
@@ -84,47 +84,46 @@ class AdjustedCollection(AdjustedNetwork):
         return collection_files(self)
 
     def document(self) -> Document:
-        """Return the document: judgement, sections, tables."""
+        """Return the document: verdict, sections, tables."""
         from photogram.collection.document import collection_document
 
         return collection_document(self)
 
     def _members(self) -> dict[str, Any]:
-        """Return the members of the JSON document, without the sections that people read."""
         from photogram.collection.document import collection_members
 
         return collection_members(self)
 
     @property
     def given(self) -> Collection:
-        """What was adjusted: the collection."""
+        """The collection before the adjustment."""
         return self.collection
 
     @property
     def sum_and_freedom(self) -> tuple[float, float]:
-        """The weighted sum of squares of all observations, and its degrees of freedom."""
+        """Weighted sum of squares of all observations, and its degrees of freedom."""
         return self.weighted_sum_of_squares, self.degrees_of_freedom
 
     @property
     def cost(self) -> float:
-        """Half the sum that was minimised, at the adjusted values."""
+        """Half the objective function at the adjusted values."""
         last = self.iterations[-1].weighted_sum_of_squares if self.iterations else None
         return 0.5 * (self.initial_weighted_sum_of_squares if last is None else last)
 
     @property
     def photo_given_sd(self) -> Floats:
-        """(P, k) standard deviations of given parameters as observations: infinite free, zero fixed."""
+        """(P, k) standard deviations of observed parameters: infinite is free, zero is fixed."""
         return self.collection.photo_sd
 
     @property
     def photo_residuals(self) -> Floats:
-        """(P, k) given minus adjusted parameters; 0 where fixed, NaN where free."""
+        """(P, k) given minus adjusted parameters; 0 if fixed, NaN if free."""
         residuals = self.collection.photo_parameters - self.photo_parameters
         return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
 
     @property
     def point_residuals(self) -> Floats:
-        """(n, 3) given minus adjusted coordinates; 0 where fixed, NaN where free."""
+        """(n, 3) given minus adjusted coordinates; 0 if fixed, NaN if free."""
         residuals = self.collection.point_positions - self.point_positions
         return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
 
@@ -171,7 +170,7 @@ class AdjustedCollection(AdjustedNetwork):
         return collection_trial(self.collection, core)
 
     def adjusted(self) -> Collection:
-        """Return the collection at its adjusted values; points that were left out stay as they were."""
+        """Return the collection at adjusted values; excluded points do not change."""
         positions = np.where(
             self.used_points[:, np.newaxis], self.point_positions, self.collection.point_positions
         )

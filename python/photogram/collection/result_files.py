@@ -1,4 +1,4 @@
-"""The result of a collection in the files of a folder; photos and points are numbers from 0."""
+"""Files of the result of a collection in a folder; photos and points are numbered from 0."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 KIND = "collection"
 _AXES = ("x", "y", "z")
-_TABLES = {"control": "control", "stations": "station"}  # Tables of files, with their kinds
+_TABLES = {"control": "control", "stations": "station"}  # Tables of files, with their types
 
 
 def collection_files(result: AdjustedCollection) -> dict[str, Content]:
@@ -50,7 +50,7 @@ def collection_files(result: AdjustedCollection) -> dict[str, Content]:
 
 
 def collection_parts(names: tuple[str, ...], units: tuple[str, ...]) -> dict[str, list[Part]]:
-    """Return what the tables of a collection have."""
+    """Return the columns of the tables of a collection."""
     known = tuple(unit or "1" for unit in units)
     plain = ("1",) * len(names)
     photos = [

@@ -1,4 +1,4 @@
-"""The result of a collection from the files of a folder."""
+"""Reading of a saved collection result from a folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from photogram.words import Phrase
 
 
 def read_collection_result(folder: Path, document: Mapping[str, Any]) -> AdjustedCollection:
-    """Return the result of a collection that a folder keeps; InputError of files that do not hold one."""
+    """Read the result of a collection from a folder; InputError if files are invalid."""
     saved = read_saved(folder, (CoreOptions, Iteration, Message, Phrase, Removed), document)
     given = saved.members("collection", Collection)
     images = saved.sheets["images"]

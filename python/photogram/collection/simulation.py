@@ -1,4 +1,4 @@
-"""Simulated collections: photos all around a cloud of points, and an object on a turntable seen from afar."""
+"""Simulated collections: photos around a cloud of points, and a distant object on a turntable."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from photogram.words import phrase
 
 __all__ = ["Simulation", "simulate", "simulate_turntable"]
 
-DISTANCE = 10.0  # Of the photos from the centre of the cloud
+DISTANCE = 10.0  # Distance of the photos from the centre of the cloud
 SIZE = 4.0  # Side of the cloud, a cube
 FIELD = 400.0  # Image radius of the object on a turntable, pixels
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A simulated collection and the truth behind it.
+    """Simulated collection with its true values.
 
     Attributes
     ----------
     collection
-        What would be given: measured images, coarse initial values.
+        Simulated input: measured images and approximate initial values.
     truth
-        The same with true parameters and positions.
+        The same collection with true parameters and positions.
     outliers
-        (m,) which image points have a gross error.
+        (m,) image observations with a gross error.
     """
 
     collection: Collection
@@ -49,21 +49,21 @@ def simulate(
     outlier_size: float = 100.0,
     seed: int = 0,
 ) -> Simulation:
-    """Simulate photos on a circle around a cube full of points, every photo with a camera of its own.
+    """Simulate photos on a circle around a cube of points, each with its own camera.
 
     The circle has a radius of 10, the cube a side of 4; focal lengths are 800 to 1200 pixels.
 
     Parameters
     ----------
     photos, points
-        How many.
+        Number of photos and of points.
     seen
-        Share of the photos that see a point; two at least.
+        Part of the photos that see a point; at least two photos.
     noise
         Standard deviation of image coordinates, pixels.
     coarseness
-        Of the initial values: 1 gives standard deviations of 0.05 rad, of 0.5 for translations and points
-        and of 10 percent for focal lengths, and starts without distortion; 0 starts at the truth.
+        Error of the initial values. 1: standard deviations of 0.05 rad, 0.5 for translations and points and
+        10 percent for focal lengths, and zero distortion. 0: true values.
     outlier_share, outlier_size
         Share of image points with a gross error, and its standard deviation in pixels.
     seed
@@ -72,7 +72,7 @@ def simulate(
     Raises
     ------
     InputError
-        Fewer than two photos, shares outside 0 to 1, what is negative.
+        If there are fewer than two photos, a share is outside 0 to 1, or a value is negative.
     """
     if photos < 2 or points < 1:
         raise InputError(phrase("collection.few-photos", photos=2, rays=2))
@@ -111,33 +111,34 @@ def simulate_turntable(
     coarseness: float = 1.0,
     seed: int = 0,
 ) -> Simulation:
-    """Simulate an object on a turntable before a camera with a long focal length: rays are nearly parallel.
+    """Simulate an object on a turntable with nearly parallel rays (long focal length).
 
     The object is a bumpy pillar with a radius of about 1 and a height of 2; its image is 800 pixels wide.
-    Each photo has a camera of its own, whose focal length and distance can hardly be told apart: a weak
-    network, whose sum of squares has a long bent valley.
+    Each photo has its own camera, whose focal length and distance are hardly separable. The network is weak:
+    its sum of squares has a long curved valley.
 
     Parameters
     ----------
     photos, points
-        How many; photos stand all around.
+        Number of photos and of points; photos are all around.
     rays
-        The nearest photos that see a point, two at least.
+        Number of nearest photos that see a point, at least two.
     distance
-        Of the photos from the axis. By default the standard deviation of a focal length is a fifth of it.
+        Distance of the photos from the axis. By default the standard deviation of a focal length is a fifth
+        of it.
     noise
         Standard deviation of image coordinates, pixels.
     coarseness
-        Of the initial values: 1 gives standard deviations of 0.01 rad, of 0.02 across the line of sight, of
-        20 percent for focal lengths and distances together, of half a percent for distances by themselves and
-        of 0.05 for points, and starts without distortion; 0 starts at the truth.
+        Error of the initial values. 1: standard deviations of 0.01 rad, 0.02 across the line of sight, 20
+        percent for focal lengths and distances together, 0.5 percent for distances separately and 0.05 for
+        points, and zero distortion. 0: true values.
     seed
         The same seed gives the same collection.
 
     Raises
     ------
     InputError
-        Fewer than two photos or rays, no points, what is negative.
+        If there are fewer than two photos or rays, no points, or a value is negative.
     """
     if photos < 2 or points < 1 or not 2 <= rays <= photos:
         raise InputError(phrase("collection.few-photos", photos=2, rays=2))
@@ -158,7 +159,7 @@ def simulate_turntable(
     start = parameters.copy()
     start[:, :3] += coarseness * random.normal(0, 0.01, (photos, 3))
     start[:, 3:5] += coarseness * random.normal(0, 0.02, (photos, 2))
-    # A focal length that is too long makes the camera stand too far away.
+    # A focal length that is too long moves the camera too far away.
     longer = np.exp(coarseness * random.normal(0, 0.2, photos))
     start[:, 5] *= longer * (1 + coarseness * random.normal(0, 0.005, photos))
     start[:, 6] *= longer
@@ -170,7 +171,7 @@ def simulate_turntable(
 
 
 def _cameras(photos: int, random: np.random.Generator) -> Floats:
-    """Return (photos, 9) parameters of photos that look at the origin from all around."""
+    """Return (photos, 9) parameters of photos around the origin that look at it."""
     around = np.linspace(-np.pi, np.pi, photos, endpoint=False) + np.pi / photos
     parameters = np.zeros((photos, 9))
     parameters[:, 1] = -around
@@ -184,20 +185,20 @@ def _cameras(photos: int, random: np.random.Generator) -> Floats:
 
 
 def _on_turntable(photos: int, distance: float, random: np.random.Generator) -> Floats:
-    """Return (photos, 9) parameters of photos that see the axis of a turntable from far away."""
+    """Return (photos, 9) parameters of photos that see the axis of a turntable from a distance."""
     parameters = np.zeros((photos, 9))
     parameters[:, 1] = -2 * np.pi * np.arange(photos) / photos
     parameters[:, :3] += random.normal(0, 0.01, (photos, 3))
     parameters[:, 3:5] = random.normal(0, 0.02, (photos, 2))
     parameters[:, 5] = -distance * (1 + random.normal(0, 0.005, photos))
     parameters[:, 6] = FIELD * distance * (1 + random.normal(0, 0.02, photos))
-    # A thousandth of the radius at the edge of the object.
+    # The displacement at the edge of the object is a thousandth of the radius.
     parameters[:, 7] = random.normal(0, 0.001, photos) * distance**2
     return parameters
 
 
 def _pillar(points: int, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """Return (points, 3) places on a bumpy pillar and (points,) the directions from its axis, radians."""
+    """Return (points, 3) positions on a bumpy pillar and (points,) directions from its axis, radians."""
     angle, height = random.uniform(0, 2 * np.pi, points), random.uniform(-1, 1, points)
     radius = 0.8 + 0.2 * np.cos(3 * angle) * np.cos(2 * height) + random.normal(0, 0.05, points)
     return np.column_stack([radius * np.sin(angle), height, radius * np.cos(angle)]), angle
@@ -206,7 +207,7 @@ def _pillar(points: int, random: np.random.Generator) -> tuple[Floats, Floats]:
 def _measured(
     parameters: Floats, positions: Floats, incidence: tuple[Indices, Indices], xy: Floats, noise: float
 ) -> Collection:
-    """Return a collection with the measured images; exact ones have a standard deviation of one pixel."""
+    """Return a collection with measured images; errorless ones have a standard deviation of 1 px."""
     photos, points = incidence
     return Collection(
         photo_parameters=parameters,

@@ -1,4 +1,4 @@
-"""Data snooping of a collection, and its check: that of its block."""
+"""Data snooping of a collection, and the check of its equivalent block."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from photogram.collection import Collection
 
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
-FAR = 5.0  # Robust standard deviations from which on an image is out at first, after a robust adjustment
+FAR = 5.0  # Initial rejection limit of images after a robust adjustment, in robust standard deviations
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
 
 
@@ -81,7 +81,7 @@ def snoop_collection(
     try:
         first, trial, outcome = tried(False)
     except (LostSupportError, _photocore.CollectionError):
-        # Covariances tell what has to leave because nothing determines it.
+        # Covariances show which observations must be removed because they are undetermined.
         try:
             first, trial, outcome = tried(True)
         except (LostSupportError, _photocore.CollectionError) as error:
@@ -90,7 +90,7 @@ def snoop_collection(
     result = adjust(cleaned, threads=threads, progress=progress, **options)
     placed = as_block(collection.replace(photo_parameters=result.photo_parameters))
     used = used_images(trial, outcome.out, len(collection.image_xy))
-    # The constants of a camera are no parameters that are held.
+    # Constants of a camera are not fixed parameters in this sense.
     fixed = collection.photo_sd == 0
     fixed[:, len(POSE) :] &= ~fixed[:, len(POSE) :].all(axis=0)
     any_held = bool(fixed.any() or (collection.point_sd == 0).any())
@@ -107,10 +107,10 @@ def snoop_collection(
 def started_robustly(
     collection: Collection, options: CoreOptions, *, threads: int | None
 ) -> tuple[_photocore.BlockState, Indices] | None:
-    """Adjust a collection robustly from its given values on, and return the end and the images far from it.
+    """Adjust a collection robustly; return the final state and the images far from it.
 
-    Cameras are unknown, so that no resection tells a wrong image; but Huber's loss bounds what each can do to
-    the photos, and Cauchy's from there on lets those go that disagree.
+    Cameras are unknown, so that resection cannot detect wrong images. Huber's loss limits the effect of each
+    image on the photos, and Cauchy's loss then releases the inconsistent ones.
     """
     state: _photocore.BlockState | None = None
     sizes: Floats = np.zeros(0)
@@ -131,7 +131,7 @@ def started_robustly(
 
 
 def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collection:
-    """Return a collection without what is out; what is free starts at adjusted values."""
+    """Return a collection without removed observations; free values start at adjusted ones."""
     given, core = first.collection, trial.core
     parameters, points = first.photo_parameters.copy(), core.points
     for own, values in zip(parameters, core.photos, strict=True):
@@ -153,7 +153,7 @@ def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collec
 
 
 def check(network: Collection, threads: int | None) -> Diagnosis:
-    """Check a collection as its block, from where a robust adjustment brings it."""
+    """Check a collection as a block, from the result of a robust adjustment."""
     section = Section("Start", "Values of a collection may be far off: a robust adjustment comes first.")
     try:
         adjusted = adjust(network, loss="huber", covariance=False, threads=threads)
@@ -168,9 +168,9 @@ def check(network: Collection, threads: int | None) -> Diagnosis:
 
 
 def as_block(collection: Collection) -> Block:
-    """Return the block of a collection: the same photos with a camera each, and points where rays meet.
+    """Convert a collection to a block: one camera per photo, points at ray intersections.
 
-    Positions and attitudes are fixed where all components are; other weights of them are left out.
+    Positions and attitudes are fixed if all their components are; other weights are ignored.
     """
     poses = collection.photo_parameters[:, : len(POSE)]
     attitudes = Attitudes.of("rotation_vector_to_photo", poses[:, :3])

@@ -1,4 +1,4 @@
-"""Adjustment in parts (Helmert blocking): on a Dask cluster, or one part after the other."""
+"""Partitioned adjustment (Helmert blocking): on a Dask cluster, or one part after the other."""
 
 from photogram.distributed.adjust import plan_in_parts
 from photogram.distributed.division import Division

@@ -1,4 +1,4 @@
-"""Adjustment in parts: blocks in memory, and runs, on a cluster or one part after the other."""
+"""Partitioned adjustment of blocks in memory and runs on disk, on a cluster or sequentially."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ from photogram.words import phrase
 __all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
 
 
-WHOLE = 950.0  # Bytes of an image point, with its share of its point, of a block adjusted as a whole
-PARTS_A_WORKER = 4  # So that a slow worker does not hold the rest
-LEAST_PHOTOS = 20  # Of a part: smaller ones are all border
+WHOLE = 950.0  # Bytes per image point and its share of the object point, for a block adjusted as a whole
+PARTS_A_WORKER = 4  # So that a slow worker does not delay the rest
+LEAST_PHOTOS = 20  # Minimum number of photos per part; smaller parts consist of borders only
 
 
 def adjust_in_parts(
@@ -79,46 +79,48 @@ def adjust_in_parts(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Result:
-    """Adjust a block in parts, on a cluster or one part after the other (docs/distributed.md).
+    """Adjust a block in parts, on a cluster or sequentially (docs/distributed.md).
 
-    The result is that of :func:`photogram.adjust`, to rounding. What asks for the normal equations of the
-    whole block again is not had of it: covariances between photos or points, further datums.
+    The result equals the result of :func:`photogram.adjust`, except for rounding. Functions that need the
+    normal equations of the whole block are not supported: covariances between photos or points, and other
+    datums.
 
     Parameters
     ----------
     block
-        The block.
+        Block to adjust.
     division
-        Into how many parts, on which cluster, within which memory, in which folder. A block that fits into
-        the memory as a whole is adjusted as a whole, where neither parts nor a cluster are given.
+        Number of parts, cluster, memory and folder. A block that fits into the memory is adjusted as a whole,
+        if neither parts nor a cluster are specified.
     datum, unit_variance, max_iterations, tolerance, covariance, loss, progress
-        As of :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
     threads
-        As of :func:`photogram.adjust`; on a cluster those of a worker, one when None.
+        As in :func:`photogram.adjust`; on a cluster, threads per worker (None: one).
 
     Returns
     -------
-    The result; its `status` says whether the adjustment converged.
+    The result; its `status` is `converged` if the adjustment converged.
 
     Raises
     ------
     RankError, AdjustmentError, KeyboardInterrupt
-        As of :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
     OutOfMemoryError
-        A part, or what parts have in common, takes more than the memory; says what would do.
+        If a part, or the data shared by parts, exceed the memory; the message proposes a remedy.
     InputError
-        As of :func:`photogram.adjust`; more parts than photos, photos or observations on trajectories, a
-        cluster that does not answer or whose workers cannot work together, the folder of another run.
+        As in :func:`photogram.adjust`. If there are more parts than photos, or photos or observations are on
+        trajectories. If a cluster does not respond, workers are incompatible, or the folder contains another
+        run.
     ModuleNotFoundError
-        A cluster is asked for, and dask.distributed is not installed (extra `distributed`).
+        If a cluster is requested and dask.distributed is not installed (extra `distributed`).
     """
     if max_iterations is None:
         max_iterations = iteration_limit(checked(block), tolerance)
     options = core_options(unit_variance, loss, covariance, tolerance, max_iterations)
-    core_threads(threads)  # refused here, not by a worker
+    core_threads(threads)  # rejected here, not by a worker
     block, options, row = _ready(block, options, datum)
     room = None if division.parts is not None or division.cluster is not None else division.memory_bytes
-    # A block that fits as a whole is adjusted as a whole.
+    # A block that fits into the memory is adjusted as a whole.
     if room is not None and _counted(block, 1).factor_bytes[0] + WHOLE * len(block.image_xy) <= room:
         return adjust(
             block,
@@ -143,23 +145,23 @@ def plan_in_parts(
     unit_variance: UnitVariance = "constrained",
     tolerance: float | AsPublished = 1e-5,
 ) -> PartsPlan:
-    """Plan the adjustment of a block in parts: what it takes, before anything is adjusted.
+    """Plan the adjustment of a block in parts: work, memory, traffic and time.
 
-    The parts are written; in the folder of the run, where the division has one, they wait for the adjustment.
+    The parts are written to disk. If the division has a folder, the adjustment uses these parts.
 
     Parameters
     ----------
     block, division, datum, unit_variance, tolerance
-        As of :func:`adjust_in_parts`.
+        As in :func:`adjust_in_parts`.
 
     Returns
     -------
-    The plan; its `check` refuses what does not fit.
+    The plan; its `check` rejects a plan that exceeds the memory.
 
     Raises
     ------
     InputError, AdjustmentError
-        As of :func:`adjust_in_parts`.
+        As in :func:`adjust_in_parts`.
     """
     options = core_options(unit_variance, None, tolerance=tolerance)
     block, options, row = _ready(block, options, datum)
@@ -170,9 +172,9 @@ def plan_in_parts(
 def _ready(
     block: Block, options: CoreOptions, datum: InnerConstraints | MinimumConstraints | None
 ) -> tuple[Block, CoreOptions, DatumRow | None]:
-    """Return a block whose common unknowns have values to start from; refuse what cannot be adjusted.
+    """Return a valid block with initial values of shared unknowns, options and inner constraints.
 
-    With what is to be held of it in the options, and inner constraints as the core knows them.
+    The options contain the minimum constraints; inner constraints are a row for the core.
     """
     check_cameras(checked(block))
     check_datum(datum)
@@ -185,7 +187,7 @@ def _ready(
 def _run(
     block: Block, options: CoreOptions, row: DatumRow | None, division: Division, threads: int | None
 ) -> Iterator[Run]:
-    if not math.isfinite(options.limit):  # which documents of a run have no way to write
+    if not math.isfinite(options.limit):  # the JSON files of a run cannot contain it
         raise InputError(phrase("parts.tolerance"))
     with ExitStack() as stack:
         if division.folder is None:
@@ -218,7 +220,7 @@ def _counted(block: Block, parts: int) -> Counts:
 
 
 def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None) -> str:
-    """Return what tells a block and how it is adjusted from others."""
+    """Return a hash of a block and its adjustment options."""
     digest = hashlib.sha256(repr((options, row)).encode())
     for name in IN_TABLES:
         values = getattr(block, name)
@@ -234,18 +236,18 @@ check_arguments(globals(), ["adjust_in_parts", "plan_in_parts"])
 
 @dataclass(frozen=True)
 class Run:
-    """A run whose parts lie in its folder: planned, or carried out."""
+    """A run whose parts are in its folder: planned or adjusted."""
 
-    folder: Path  # Of the run
-    manifest: Manifest  # What all nodes have in common
-    executor: Executor  # Does the tasks
-    job: Job  # What tasks are told
-    workers: int  # How many do them
-    memory: int | None  # Bytes of each; None for any number
-    held: int  # Bytes that a worker holds before it begins
+    folder: Path  # Folder of the run
+    manifest: Manifest  # Data shared by all nodes
+    executor: Executor  # Runs the tasks
+    job: Job  # Common arguments of the tasks
+    workers: int  # Number of workers
+    memory: int | None  # Bytes of each worker; None is unlimited
+    held: int  # Bytes that a worker uses before the run
 
     def plan(self, *, measured: bool = True) -> PartsPlan:
-        """Return the plan; `measured` has one part formed here, for the time that all will take."""
+        """Return the plan; with `measured`, one part is formed here to estimate the time."""
         nodes = range(len(self.manifest.tree))
         handles = [self.executor.submit(predicted, self.job, node) for node in nodes]
         predictions = [self.executor.value(each) for each in handles]
@@ -261,9 +263,9 @@ class Run:
     def adjust(
         self, progress: Callable[[Progress], None] | None = None, block: Block | None = None
     ) -> Outcome:
-        """Adjust, or go on where a run that died has ended; as :func:`photogram.adjust` raises.
+        """Adjust, or resume an interrupted run; raises as :func:`photogram.adjust`.
 
-        `block` is what was divided: it is needed where it is to be taken to a datum.
+        `block` is the whole block, which is required for a transformation to a datum.
         """
         self.plan(measured=False).check()
         options = self.manifest.options
@@ -283,17 +285,17 @@ def opened(
     division: Division,
     threads: int | None,
 ) -> Iterator[Run]:
-    """Open a run: connect to workers, and divide the block unless its parts lie there already.
+    """Open a run: connect to workers, and divide the block unless its parts already exist.
 
-    `counted` counts the work of a number of parts, `divided` writes them into the folder; the folder of the
-    division is not looked at. InputError: options that cannot be, workers that cannot work together, a folder
-    of another run.
+    `counted` counts the work for a number of parts, `divided` writes the parts to the folder. The folder of
+    the division is ignored. InputError if options are invalid, workers are incompatible, or the folder
+    contains another run.
     """
     memory = division.memory_bytes
     with ExitStack() as stack:
         executor: Executor
         if division.cluster is None:
-            # The memory is for the adjustment: what else this process holds is its own affair.
+            # The memory limit applies to the adjustment, not to other data of this process.
             workers, executor, held, others = 1, Serial(folder), 0, resident_memory() or 0
         else:
             client = stack.enter_context(connected(division.cluster, division.workers, memory))
@@ -310,7 +312,7 @@ def opened(
             room = None if memory is None else int(SHARE * memory) - held
             parts = division.parts_of(photos)
             if parts is None:
-                # Some for each worker; more if the bytes for nodes do not suffice.
+                # Some parts for each worker; more if nodes would exceed the memory.
                 largest = max(photos // LEAST_PHOTOS, 1)
                 parts = min(PARTS_A_WORKER * workers if workers > 1 else 2, largest)
                 while room is not None and 2 * parts <= largest and counted(parts).memory_bytes.max() > room:

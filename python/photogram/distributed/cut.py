@@ -1,14 +1,14 @@
-"""Nested dissection of the photos of a block by place, and the work of each node of the tree, counted.
+"""Nested dissection of the photos of a block by position, and the work per node of the tree.
 
-Photos, and whatever else stays in the normal equations, are the vertices of a graph; points and observations
-are its edges: an edge holds all vertices that it touches. The photos are halved by place again and again. Of
-the edges that reach across a cut the photos on its smaller side become the separator, so that what is left of
-every edge lies on one side: all its photos are in one part, or in separators on the way from there to the
-root (George 1973; Lipton, Rose and Tarjan 1979).
+Photos and other unknowns of the reduced normal equations are the vertices of a graph, points and observations
+are its edges. An edge contains all vertices that it touches. The photos are halved by position, recursively.
+The separator consists of the photos on the smaller side of a cut that share an edge with the other side. All
+photos of a remaining edge are then in one part, or in separators between this part and the root (George 1973;
+Lipton, Rose and Tarjan 1979).
 
-For counting, before anything is formed, a part is cut further until its pieces are as small as the fronts of
-the factorisation, whose multiply-adds, numbers and contributions are then those of dense panels: multifrontal
-elimination on the whole tree.
+To count the work in advance, parts are cut further until the pieces have the size of the fronts of the
+factorisation. Multiply-adds and memory are then computed for dense panels, as in multifrontal elimination of
+the whole tree.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-UNKNOWNS = 6  # Of the pose of a photo
-SMALLEST = 8  # Photos of a piece that is a front of its own
-FORMATION, PAIR = 200.0, 108.0  # Multiply-adds of an image point, and of two photos that share a point
+UNKNOWNS = 6  # Unknowns of the pose of a photo
+SMALLEST = 8  # Minimum number of photos of a front
+FORMATION, PAIR = 200.0, 108.0  # Multiply-adds per image point, and per pair of photos that share a point
 WORD = 8.0  # Bytes of a number
-IMAGE_BYTES = 1300.0  # Of an image point with its share of its point, as it is read, formed and handed back
+IMAGE_BYTES = 1300.0  # Peak bytes per image point, with its share of the object point
 
 
 @dataclass(frozen=True)
 class Incidence:
-    """Which (k,) vertices (k,) edges touch, in no order; an edge stands in one incidence alone.
+    """Vertices and edges that touch, as (k,) pairs in any order; each edge is in one incidence only.
 
-    Edges are counted from 0 here; `count` is how many there are.
+    Edges are numbered from 0; `count` is their number.
     """
 
     vertices: Indices
@@ -42,11 +42,11 @@ class Incidence:
 
 @dataclass(frozen=True, eq=False)
 class Tree(Valued):
-    """A binary tree over parts; its nodes are numbered so that children come before their parent.
+    """Binary tree over parts; children have smaller numbers than their parent.
 
-    Of N `parents` the root, the last node, has -1. Children of a node are in the fixed order in which their
-    contributions are added; parts have none. `spans` are (N, 2) the first part below a node and the one after
-    the last.
+    `parents` (N,) of the nodes; the root is the last node and has -1. `children` are in the fixed order in
+    which contributions are added; parts are without children. `spans` (N, 2) are the first part below a node
+    and the one after the last.
     """
 
     parents: Indices
@@ -58,19 +58,19 @@ class Tree(Valued):
 
     @property
     def root(self) -> int:
-        """The last node."""
+        """Last node."""
         return len(self.parents) - 1
 
     @property
     def levels(self) -> Indices:
-        """(N,) how far each node is from the root."""
+        """(N,) distance of each node from the root."""
         found = np.zeros(len(self.parents), dtype=np.int64)
         for node in range(self.root - 1, -1, -1):
             found[node] = found[self.parents[node]] + 1
         return found
 
     def above(self, node: int) -> list[int]:
-        """Return the nodes between one and the root, that one left out, from below."""
+        """Return the ancestors of a node, from its parent to the root."""
         found = []
         while (node := int(self.parents[node])) >= 0:
             found.append(node)
@@ -79,14 +79,14 @@ class Tree(Valued):
 
 @dataclass(frozen=True)
 class Cut:
-    """Photos in the nodes of a tree: `owners` are (V,) the node of each vertex."""
+    """Division of photos among the nodes of a tree; `owners` are (V,) nodes of the vertices."""
 
     tree: Tree
     owners: Indices
 
 
 def tree_of(parts: int) -> Tree:
-    """Return the tree over a number of parts, as even as it can be."""
+    """Return a balanced tree over a number of parts."""
     parents: list[int] = []
     children: list[tuple[int, ...]] = []
     spans: list[tuple[int, int]] = []
@@ -107,10 +107,10 @@ def tree_of(parts: int) -> Tree:
 
 
 def cut(positions: Floats, weights: Floats, incidences: Callable[[], Iterable[Incidence]], parts: int) -> Cut:
-    """Cut photos at (V, 3) positions, in one unit of length, with (V,) weights, into parts with separators.
+    """Cut (V, 3) positions of photos with (V,) weights into parts with separators.
 
-    `incidences` gives all edges, some at a time; it is called once for each level of the tree. A photo weighs
-    its image points.
+    Positions have one unit of length; a weight is the number of image points. `incidences` yields all edges
+    in batches, once per level of the tree.
     """
     tree = tree_of(parts)
     owners = np.full(len(positions), -1, dtype=np.int64)
@@ -125,7 +125,7 @@ def cut(positions: Floats, weights: Floats, incidences: Callable[[], Iterable[In
             middle = tree.spans[tree.children[node][0]][1]
             node_of[first:last] = node
             right[first:middle], right[middle:last] = 0, 1
-        # The boundary: vertices that are free yet and share an edge with one beyond the cut.
+        # Boundary: free vertices that share an edge with one beyond the cut.
         boundary, side_of = np.zeros(len(owners), dtype=bool), right[part]
         for incidence in incidences() if here else ():
             free = (owners[incidence.vertices] < 0) & (side_of[incidence.vertices] >= 0)
@@ -147,9 +147,9 @@ def cut(positions: Floats, weights: Floats, incidences: Callable[[], Iterable[In
 
 
 def homes(owners: Indices, incidence: Incidence, root: int) -> Indices:
-    """Return (edges,) the node where each edge is at home: of the vertex that is eliminated first.
+    """Return the home node (edges,) of each edge, in which its first vertex is eliminated.
 
-    An edge without vertices is at home in the root.
+    The home of an edge without vertices is the root.
     """
     found = np.full(incidence.count, root, dtype=np.int64)
     np.minimum.at(found, incidence.edges, owners[incidence.vertices])
@@ -157,7 +157,7 @@ def homes(owners: Indices, incidence: Incidence, root: int) -> Indices:
 
 
 def joined(count: int, together: Iterable[tuple[int, ...]]) -> Indices:
-    """Return (count,) the least member of the set that each of some things is in, after joining some."""
+    """Return (count,) the least member of the set of each element, after joining sets."""
     found = np.arange(count, dtype=np.int64)
 
     def least(one: int) -> int:
@@ -178,7 +178,7 @@ def joined(count: int, together: Iterable[tuple[int, ...]]) -> Indices:
 
 
 def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:
-    """Return (V,) the part of each photo: halves across the longest extent, of equal weight."""
+    """Return the part (V,) of each photo: equal weights, cut across the longest extent."""
     part = np.zeros(len(positions), dtype=np.int64)
 
     def split(node: int, rows: Indices) -> None:
@@ -190,7 +190,7 @@ def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:
         share = (tree.spans[left, 1] - first) / (last - first)
         places = positions[rows]
         axis = int(np.argmax(np.ptp(places, axis=0))) if len(rows) else 0
-        # By place, then by row: ties have one order on every machine.
+        # Sort by position, then by row, so that ties are resolved identically on every machine.
         order = rows[np.argsort(places[:, axis], kind="stable")]
         reached = np.cumsum(weights[order])
         total = reached[-1] if len(order) else 0.0
@@ -207,11 +207,11 @@ def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:
 
 @dataclass(frozen=True)
 class Counts:
-    """Counted work of each of N nodes.
+    """Work of each of N nodes.
 
-    Photos are eliminated there, image points at home there, `outer` unknowns are of nodes above that it
-    touches. Multiply-adds are of one formation with the reduction of points, one factorisation, one
-    inversion; bytes of the factor, and at the most while the node is worked on.
+    `photos` are eliminated in the node, `images` have their home there, `outer` counts unknowns of nodes
+    above that it touches. Multiply-adds are for one formation with reduction of points, one factorisation and
+    one inversion. Bytes are of the factor, and the peak of the node.
     """
 
     photos: Indices
@@ -225,17 +225,17 @@ class Counts:
 
     @property
     def contribution_bytes(self) -> Floats:
-        """(N,) bytes that go up in an iteration: U, u and the diagonal."""
+        """(N,) bytes sent up per iteration: U, u and the diagonal."""
         return np.asarray(WORD * (self.outer * (self.outer + 1) / 2 + 2 * self.outer))
 
     @property
     def cofactor_bytes(self) -> Floats:
-        """(N,) bytes that come down in the inversion."""
+        """(N,) bytes sent down in the inversion."""
         return np.asarray(WORD * self.outer * (self.outer + 1) / 2)
 
     @property
     def step_bytes(self) -> Floats:
-        """(N,) bytes that come down in an iteration."""
+        """(N,) bytes sent down per iteration."""
         return np.asarray(WORD * self.outer)
 
 
@@ -246,17 +246,17 @@ def counted_work(
     parts: int,
     unknowns: float = UNKNOWNS,
 ) -> tuple[Tree, Counts]:
-    """Count the work of a block in parts, with (P, 3) positions and (P,) image points of its photos.
+    """Count the work of a block in parts, for (P, 3) positions and (P,) image points.
 
-    `incidences` are what points tie, in a thinned block perhaps; `unknowns` are of a photo, its pose and
-    film.
+    `incidences` are the ties by points, possibly of a thinned block. `unknowns` is the number per photo, for
+    pose and film.
     """
     pieces = 1
     while len(positions) / (parts * pieces * 2) >= SMALLEST:
         pieces *= 2
     deep = cut(positions, images, incidences, parts * pieces)
     tree = tree_of(parts)
-    # The node of the coarse tree that each node of the finer one is part of
+    # Coarse node that contains each fine node
     of_span = {tuple(span): node for node, span in enumerate((tree.spans * pieces).tolist())}
     node_of = np.empty(len(deep.tree), dtype=np.int64)
     for node in range(deep.tree.root, -1, -1):
@@ -265,7 +265,7 @@ def counted_work(
     outer = outer_vertices(deep.tree, deep.owners, list(incidences()))
     inner: Floats = unknowns * np.bincount(deep.owners, minlength=len(deep.tree)).astype(np.float64)
     above = unknowns * np.array([len(each) for each in outer], dtype=float)
-    # Symmetric, dense: I^3 / 6 for the pivot, I^2 S / 2 for the panel, I S^2 / 2 for what is left.
+    # Symmetric, dense: I^3 / 6 for the pivot, I^2 S / 2 for the panel, I S^2 / 2 for the remainder.
     factor = inner**3 / 6 + inner**2 * above / 2 + inner * above**2 / 2
     numbers = inner**2 / 2 + inner * above
     contribution = above * (above + 1) / 2
@@ -292,7 +292,7 @@ def counted_work(
         outer=above[tops].astype(np.int64),
         formation=FORMATION * summed(at_home) + PAIR * summed(pairs),
         factor=summed(factor),
-        # The selected inverse takes the products of the factorisation once more, both ways.
+        # The selected inverse needs the products of the factorisation again, in both directions.
         inverse=2 * summed(factor),
         factor_bytes=factor_bytes,
         memory_bytes=factor_bytes + WORD * contribution[tops] + received + IMAGE_BYTES * summed(at_home),
@@ -301,7 +301,7 @@ def counted_work(
 
 
 def outer_vertices(tree: Tree, owners: Indices, incidences: list[Incidence]) -> list[Indices]:
-    """Return the vertices above each node that its own edges, or those below it, touch."""
+    """Return the vertices above each node that edges of the node or of its descendants touch."""
     own: list[list[Indices]] = [[] for _ in range(len(tree))]
     for each in incidences:
         home = homes(owners, each, tree.root)[each.edges]

@@ -1,4 +1,4 @@
-"""The datum that a block in parts is taken to: found of the whole, by what its nodes have come to."""
+"""Transformation of a partitioned block to its datum, from the adjusted nodes."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow
 from photogram.results.datum import refused
 
-LANES = 8  # Right-hand sides that the core reduces at a time, of points
+LANES = 8  # Right-hand sides of points that the core reduces at a time
 
 
 @dataclass(frozen=True)
 class InDatum:
-    """What nodes are told that are inverted where the block was moved to its datum.
+    """Data for the inversion of nodes after the transformation to a datum.
 
-    `common` is (d, d) the sum B^T Q B of the whole; `last` the states before and after the last step, which
-    was taken before the block was moved.
+    `common` (d, d) is the sum B^T Q B of the whole block. `last` names the states before and after the last
+    step, which precedes the transformation.
     """
 
     common: Floats
@@ -31,9 +31,9 @@ class InDatum:
 
 @dataclass(frozen=True)
 class Mover:
-    """Takes a block, as its nodes have adjusted it, to the inner constraints of a row.
+    """Transformation of an adjusted partitioned block to inner constraints.
 
-    `held` are photos with the numbers of their unknowns that are held; `middle` is what all nodes are given.
+    `held` are photos with indices of their fixed unknowns, `middle` is the origin shared by all nodes.
     """
 
     block: Block
@@ -43,11 +43,11 @@ class Mover:
     middle: tuple[float, float, float]
 
     def __call__(self, nodes: Sequence[tuple[Indices, Floats]]) -> list[dict[str, np.ndarray]]:
-        """Move it, from (N, 3) names of the unknowns of each node in the whole block, and (N,) their values.
+        """Transform values (N,) with names (N, 3) of the unknowns of each node in the whole block.
 
-        Returns of each node its `values` there, (N,), the columns `b` and `t`, (d, N), the `condition`, which
-        tells of rounding, and the unknowns `staying` in the datum. InputError: its points and photos do not
-        carry it; else as of :func:`photogram.adjust`.
+        Return for each node the new `values` (N,) and the columns `b` and `t` (d, N). Also return the
+        `condition`, a measure of rounding errors, and the unknowns `staying` in the datum. InputError if
+        points and photos do not define the datum; others as in :func:`photogram.adjust`.
         """
         names, values = (np.concatenate(each) for each in zip(*nodes, strict=True))
         network = block_network(self.block, self.options)
@@ -69,7 +69,7 @@ class Mover:
 
 
 def local_row(row: DatumRow, photos: Indices, points: Indices) -> DatumRow:
-    """Return a datum as a node knows it, with its photos and points alone."""
+    """Restrict a datum to the photos and points of a node."""
     name, of_points, of_photos, scale, attitudes, radius = row
 
     def own(rows: Indices, chosen: list[int]) -> list[int]:

@@ -1,4 +1,4 @@
-"""How a block is divided: into parts, among workers, within memory."""
+"""Division of a block into parts, among workers, within memory."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from photogram.words import phrase
 
 __all__ = ["Division", "bytes_of"]
 
-MOST = 100_000  # Workers or parts: more is a slip
+MOST = 100_000  # Maximum number of workers or parts; more is a typing error
 MOST_BYTES = 2**63
 UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12, "ki": 2**10, "mi": 2**20, "gi": 2**30}
 
 
 def bytes_of(memory: int | str) -> int:
-    """Return a number of bytes: of `4GB` (10^9), `1.5GiB` (2^30), or a number."""
+    """Convert a memory size to bytes: `4GB` (10^9), `1.5GiB` (2^30), or a number."""
     size: float
     if isinstance(memory, str):
         match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kmgt]?i?)b?\s*", memory.lower(), re.ASCII)
@@ -36,29 +36,28 @@ def bytes_of(memory: int | str) -> int:
 
 @dataclass(frozen=True, kw_only=True)
 class Division:
-    """How a block is divided, for :func:`photogram.adjust_in_parts` and the plan of it.
+    """Division of a block, for :func:`photogram.adjust_in_parts` and its plan.
 
     Attributes
     ----------
     parts
-        How many; as many as `memory` and the workers ask for when None. Without a cluster they are worked off
-        one after the other in this process.
+        Number of parts; None: as required by `memory` and the workers. Without a cluster, the parts are
+        processed sequentially in this process.
     cluster
-        Where: a `dask.distributed.Client`, the address of a scheduler, or `local` for workers on this
-        machine.
+        A `dask.distributed.Client`, the address of a scheduler, or `local` for workers on this machine.
     workers
-        Of a local cluster: how many; one for each processor when None.
+        Number of workers of a local cluster; None: one per processor.
     memory
-        Bytes that a worker, or this process, may take for parts, or text such as `4GB`. A block that fits as
-        a whole is adjusted as a whole, where neither a cluster nor a number of parts is given.
+        Memory of a worker, or of this process, for parts: bytes, or text such as `4GB`. A block that fits is
+        adjusted as a whole, if neither a cluster nor a number of parts is specified.
     folder
-        Where parts and states are kept, on a disk that all workers see; a run that died is taken up there.
-        None: a temporary folder.
+        Folder for parts and states, on a disk that all workers can access. An interrupted run is resumed
+        there. None: a temporary folder.
 
     Raises
     ------
     InputError
-        Parts or workers that are not 1 to 100,000, a memory or a folder that is none.
+        If parts or workers are not within 1 to 100,000, or the memory or folder is invalid.
     """
 
     parts: int | None = None
@@ -79,16 +78,16 @@ class Division:
 
     @property
     def memory_bytes(self) -> int | None:
-        """The memory in bytes; None where nothing bounds it."""
+        """Memory in bytes; None if unlimited."""
         return None if self.memory is None else bytes_of(self.memory)
 
     def parts_of(self, photos: int) -> int | None:
-        """Return the number of parts that is asked for; None where none is.
+        """Return the requested number of parts; None if not specified.
 
         Raises
         ------
         InputError
-            There are fewer photos.
+            If there are fewer photos than parts.
         """
         if self.parts is not None and self.parts > photos:
             raise InputError(phrase("parts.too-many", parts=self.parts, photos=photos))

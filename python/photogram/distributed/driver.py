@@ -1,8 +1,8 @@
-"""The iterations of a block that is adjusted in parts: up the tree, down again, and control of the steps.
+"""Iterations of a partitioned adjustment: up the tree, down the tree, and step control.
 
-Steps and their rules are those of one process (`crates/photocore/src/adjustment/damped.rs`): full steps, one
-that raises the sum of squares is taken back and damped, the last one is told by its length or by the rate at
-which steps fall. What is decided here rests on sums over all nodes, added in the order of their numbers.
+Steps and rules are the same as in one process (`crates/photocore/src/adjustment/damped.rs`). Full steps are
+tried first; a step that raises the sum of squares is undone and damped. The length of steps or their rate of
+decrease indicates the last one. All decisions use sums over the nodes, added in the order of their numbers.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ from photogram.network.core_arrays import CoreOptions
 from photogram.results.iteration import Iteration
 from photogram.words import phrase
 
-RULES = _photocore.step_rules()  # The constants of the rules of steps, which are those of one process
+RULES = _photocore.step_rules()  # Constants of the step rules, shared with adjustments in one process
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an adjustment in parts has come to: `converged`, `not converged` or `diverged`.
+    """Outcome of a partitioned adjustment: `converged`, `not converged` or `diverged`.
 
-    Sums of squares are weighted, of camera, ground, plates and observations beside images; `counts` are
-    observations, weighted unknowns, unknowns. Degrees of freedom and variance are those of the chosen unit
-    variance, None without degrees of freedom. `state` is the last of the nodes, `before` the one before the
-    last step; `formations` says how often the normal equations were formed.
+    Weighted sums of squares are of photos, control, image coordinates and additional observations. `counts`
+    are observations, weighted unknowns and unknowns. Degrees of freedom and variance follow the selected unit
+    variance; the variance is None without degrees of freedom. `state` is the last state of the nodes,
+    `before` the state before the last step. `formations` counts the formations of normal equations.
     """
 
     status: str
@@ -68,7 +68,7 @@ class Outcome:
 
 
 class Driver:
-    """Adjusts in parts; `mover` takes the block to a datum when it is adjusted."""
+    """Partitioned adjustment; `mover` transforms the adjusted block to a datum."""
 
     def __init__(
         self,
@@ -83,11 +83,11 @@ class Driver:
         self._walks, self._course = Walks(job, tree, executor, progress), Course()
 
     def run(self, *, resume: bool = False) -> Outcome:
-        """Adjust; with `resume` from the last complete iteration that the folder of the run has.
+        """Adjust; with `resume`, continue from the last complete iteration in the folder of the run.
 
-        RankError: the observations do not determine all unknowns. AdjustmentError: the initial values give no
-        finite sum of squares; a disk is full, a worker was lost too often: the state of the last complete
-        iteration stays.
+        RankError if the observations do not determine all unknowns. AdjustmentError if initial values give no
+        finite sum of squares, a disk is full, or a worker was lost too often. The last complete iteration
+        remains on disk.
         """
         if resume:
             self._course = Course.read(self.job.folder, self.job.source)
@@ -109,12 +109,12 @@ class Driver:
         if not course.iterations:
             course.initial = course.best = up.sum_of_squares
             if self._mover is not None:
-                # A datum that is not carried is refused before anything is adjusted.
+                # Reject an undefined datum before the adjustment.
                 self._in_datum(self._mover, course.state)
         return self._full_steps(up) if self.options.criterion == "percent" else self._damped_steps(up)
 
     def _full_steps(self, up: Up) -> Outcome:
-        """Take full steps, whatever becomes of the sum of squares (GIANT guide, section 6)."""
+        """Take full steps regardless of the sum of squares (GIANT guide, section 6)."""
         course = self._course
         while (status := self._as_published()) is None:
             change = math.sqrt(max(up.decrease, 0.0))
@@ -129,7 +129,7 @@ class Driver:
         return self._end(status, up, None)
 
     def _as_published(self) -> str | None:
-        """Return how full steps have ended, by what the last one has changed; None where they have not."""
+        """Return the status of full steps from the last change; None if not finished."""
         *_, last = sums = [each.weighted_sum_of_squares for each in self._course.iterations] or [math.nan]
         change = 100.0 * (last / sums[-2] - 1.0) if len(sums) > 1 else math.nan
         if abs(change) < self.options.limit:
@@ -139,7 +139,6 @@ class Driver:
         return "not converged" if len(self._course.iterations) >= self.options.max_iterations else None
 
     def _damped_steps(self, up: Up) -> Outcome:
-        """Take steps that lower the sum of squares."""
         course = self._course
         while len(course.iterations) < self.options.max_iterations and up.at.damping <= RULES["most_damping"]:
             change = math.sqrt(max(up.decrease, 0.0))
@@ -153,7 +152,7 @@ class Driver:
         return self._end("diverged" if lost else "not converged", up, None)
 
     def _judged(self, change: float) -> str:
-        """Return what a full step is, by its length and those before (`_photocore.judge_full_step`)."""
+        """Classify a full step by its length and former steps (`_photocore.judge_full_step`)."""
         course = self._course
         taken = [(each.damping, each.largest_change) for each in course.iterations]
         unknowns, tolerance = self._unknowns[4], self.options.limit
@@ -162,14 +161,14 @@ class Driver:
         )
 
     def _take(self, up: Up, change: float, *, chord: bool) -> tuple[Up, bool]:
-        """Take a step, and a chord after it where that pays, or take it back and go on with more damping.
+        """Take a step and possibly a chord, or undo it and increase the damping.
 
-        Returns what is formed next, and whether the sum of squares has stood still there.
+        Return the next formation, and whether the sum of squares is stationary.
         """
         course, damping = self._course, up.at.damping
         after, course.chord = self._step(up), None
         if change > RULES["far"] * math.sqrt(self._unknowns[4]):
-            # Points are intersected anew if that lowers the sum of squares.
+            # Points are intersected again if this lowers the sum of squares.
             other = self._new_state()
             sums = np.array(self._walks.all(relocated, after, other, phase="solve"))
             before, moved = sums.sum(axis=0).tolist()
@@ -183,7 +182,7 @@ class Driver:
         try:
             following = self._up(Point(after, relaxed, course.near))
         except RankError:
-            # A step that leaves something undetermined has failed.
+            # A step that leaves unknowns undetermined has failed.
             return self._refuse(damping)
         if not (negligible or following.sum_of_squares <= course.best * (1.0 + RULES["rounding"])):
             self._walks.forget(following)
@@ -195,7 +194,7 @@ class Driver:
         return following, False
 
     def _refuse(self, damping: float) -> tuple[Up, bool]:
-        """Go on from the same values with more damping, or end where the sum of squares has stood still."""
+        """Continue from the same values with more damping, or end if the sum of squares is stationary."""
         course, still = self._course, False
         if damping == 0.0:
             freedom = max(self._unknowns[0] + self._unknowns[1] - self._unknowns[2], 1)
@@ -206,7 +205,7 @@ class Driver:
         return self._up(Point(course.state, harder, course.near)), still
 
     def _accept(self, iteration: Iteration, at: Point) -> None:
-        """Keep an iteration that stands; the states before it are needed no longer."""
+        """Store an accepted iteration and delete earlier states."""
         course = self._course
         old, course.before, course.state = course.before, course.state, at.state
         course.damping, course.curved = at.damping, at.curved
@@ -218,10 +217,10 @@ class Driver:
         self._walks.tell("iteration", iteration.number, 0, iteration)
 
     def _end(self, status: str, up: Up, change: float | None) -> Outcome:
-        """Take the last step, where there is one, and finish.
+        """Take the last step, if any, and finish.
 
-        Where the iterations end without a step the cofactors are those of the equations at the values
-        reached; else of those that have given the last step, unless these have a loss's second-order term.
+        Without a last step, cofactors refer to the equations at the final values. Otherwise they refer to the
+        equations of the last step, unless these contain the second-order term of a loss.
         """
         course = self._course
         if change is not None:
@@ -240,9 +239,9 @@ class Driver:
         return self._finish(None)
 
     def _finish(self, up: Up | None) -> Outcome:
-        """Invert, and write the results: all that is left when the iterations are over.
+        """Invert and write the results after the last iteration.
 
-        Where there is a datum to go to, the normal equations are formed once more there.
+        With a datum, the normal equations are formed again in this datum.
         """
         course = self._course
         assert course.ending is not None
@@ -263,7 +262,7 @@ class Driver:
             datum = None if up.products is None else InDatum(up.products, last)
             self._walks.invert(up, after, variance, datum)
             if self.options.unit_variance == "redundancy":
-                # The nodes scale what they have found by q / r, of all but photos (docs/weights.md).
+                # The nodes scale their results by q / r, except for photos (docs/weights.md).
                 numbers = self._walks.all(redundancies, phase="invert")
                 freedom = math.fsum(share for _, *measured in numbers for share in measured)
                 variance = sum(sums[1:]) / freedom if freedom > RULES["least_redundancy"] else None
@@ -286,13 +285,13 @@ class Driver:
         )
 
     def _in_datum(self, mover: Mover, state: str) -> list[dict[str, np.ndarray]]:
-        """Return a state of all nodes as it is moved to the datum, with what takes cofactors there."""
+        """Transform a state of all nodes to the datum, with data for cofactors."""
         return mover(self._walks.all(located, state, phase="solve"))
 
     def _evaluated(self, state: str) -> tuple[float, float, float, float, float]:
-        """Return weighted sums of squares of all nodes, by kinds, and what is minimised."""
+        """Return weighted sums of squares of all nodes, by type, and the objective function."""
         found = np.array(self._walks.all(evaluated, state, phase="solve"))
-        # One after the other: NumPy's own order depends on how many there are.
+        # Add sequentially, because the order of NumPy sums depends on their length.
         camera, ground, plates, others, minimised = (sum(column) for column in found.T.tolist())
         return camera, ground, plates, others, minimised
 
@@ -305,7 +304,7 @@ class Driver:
             return freedom, 1.0
         if kind == "free":
             freedom, total = freedom - stations, total - sums[0]
-        if kind == "redundancy":  # these are known when all nodes are inverted
+        if kind == "redundancy":  # these are available after the inversion of all nodes
             return freedom, None
         return freedom, total / freedom if freedom > 0 else None
 
@@ -315,18 +314,18 @@ class Driver:
         return up
 
     def _step(self, up: Up) -> str:
-        """Solve from the root down; every node writes its state after the step. Return the name of that."""
+        """Solve from the root down and write the state after the step; return its name."""
         after = self._new_state()
         self._walks.substitute(up, lambda node, outer: self._walks.do(solved, node, up.at, after, outer))
         return after
 
     def _with_chord(self, up: Up, after: str, change: float) -> str:
-        """Return the state after a chord that follows a step; that after the step, where none is taken.
+        """Return the state after a chord, or after the step if no chord is taken.
 
         A chord is a second step with the same factors (crates/photocore/src/adjustment/corrected.rs).
         """
         walks = self._walks
-        # So little is left that it goes through here: who loses a worker has it still.
+        # The data are small enough to pass through the driver, so that they survive the loss of a worker.
         left: list[Chord | None] = walks.sums([*walks.climb(reduced_chord, up.at, after).values()], "solve")
         decreases = [each.decrease for each in left if each is not None]
         length = math.sqrt(max(sum(decreases), 0.0))

@@ -1,6 +1,6 @@
-"""Where tasks are done: one after the other in this process, or on the workers of a Dask cluster.
+"""Execution of tasks: sequentially in this process, or on the workers of a Dask cluster.
 
-Scheduling, transport and retries on a cluster are those of `distributed`.
+Scheduling, transport and retries on a cluster are done by `distributed`.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.memory import resident_memory
 from photogram.words import phrase
 
-Handle = Any  # Stands for what a task will give
+Handle = Any  # Represents the future result of a task
 Client = Any
-Future = Any  # Of `distributed`, an extra that takes long to import
+Future = Any  # Class of `distributed`, an optional package with a slow import
 SETTINGS = {
-    # A factor stays with its worker; what it takes is planned, and must not make the worker pause.
+    # A factor remains with its worker; its size is planned and must not pause the worker.
     "distributed.worker.memory.pause": False,
-    # A stolen task would have to form its factor again.
+    # A stolen task would need to form its factor again.
     "distributed.scheduler.work-stealing": False,
-    # Arrow's own pool keeps what tables have taken.
+    # The own pool of Arrow would retain the memory of tables.
     "distributed.nanny.environ.ARROW_DEFAULT_MEMORY_POOL": "system",
-}  # Of clusters that are started here
+}  # Settings of local clusters
 LOOPBACK = "127.0.0.1"
-ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)  # Other texts make Dask look for files
+ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)  # Dask reads other texts as file names
 
 
 class Serial:
-    """Does every task at once, in this process; what tasks give is kept on disk, in the `directory`.
+    """Sequential execution in this process; results are stored on disk, in `directory`.
 
-    Handles among the arguments of a task, and in lists among these, are replaced by what they stand for.
+    Handles in the arguments of a task, also in lists, are replaced by their results.
     """
 
     def __init__(self, directory: Path | None = None) -> None:
@@ -50,7 +50,7 @@ class Serial:
         self._failed: dict[int, Exception] = {}
 
     def submit(self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0) -> int:
-        """Do a task."""
+        """Run a task."""
         del near, cost
         self._count += 1
         own = _Handle(self._count)
@@ -67,29 +67,29 @@ class Serial:
         return own
 
     def places(self) -> list[str]:
-        """Return the one place that there is."""
+        """Return the only location."""
         return [""]
 
     def first(self, handles: Collection[int]) -> int:
-        """Return the task that was done first."""
+        """Return the task that finished first."""
         return min(handles)
 
     def value(self, handle: int) -> Any:
-        """Return what a task has given."""
+        """Return the result of a task."""
         if handle in self._failed:
             raise self._failed[handle]
-        # Only this process has written here, into a folder that is its user's alone.
+        # Only this process writes here, in a private folder of the user.
         with open(self._path(handle), "rb") as file:
             return pickle.load(file)
 
     def forget(self, handles: Collection[int]) -> None:
-        """Remove what tasks have given."""
+        """Delete the results of tasks."""
         for each in handles:
             self._path(each).unlink(missing_ok=True)
             self._failed.pop(each, None)
 
     def stop(self) -> None:
-        """Remove everything."""
+        """Delete all results."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _path(self, number: int) -> Path:
@@ -104,14 +104,14 @@ class Serial:
 
 
 class _Handle(int):
-    """The number of a task."""
+    """Number of a task."""
 
 
 class Workers:
-    """Has tasks done by the workers of a cluster, by a client that is connected to its scheduler.
+    """Execution by the workers of a cluster, through a client of its scheduler.
 
-    Lost results are computed again by Dask itself: tasks are functions of what they are given. Where a task
-    asks for a factor that was lost with a worker, the driver has it formed again.
+    Dask recomputes lost results, because tasks depend on their arguments only. If a task needs a factor that
+    was lost with a worker, the driver has the factor formed again.
     """
 
     def __init__(self, client: Client) -> None:
@@ -122,7 +122,7 @@ class Workers:
     def submit(
         self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
     ) -> Future:
-        """Have a task done, the earlier the higher its `cost`, by the worker `near` if it has one."""
+        """Submit a task; `cost` is its priority, `near` its preferred worker."""
         self._count += 1
         found = self._client.submit(
             function,
@@ -141,11 +141,11 @@ class Workers:
         return sorted(self._client.nthreads())
 
     def first(self, handles: Collection[Future]) -> Future:
-        """Wait until one of some tasks is done."""
+        """Wait for the first finished task."""
         return next(iter(_library().wait(list(handles), return_when="FIRST_COMPLETED").done))
 
     def value(self, handle: Future) -> Any:
-        """Return what a task has given."""
+        """Return the result of a task."""
         from distributed.client import FutureCancelledError
 
         from distributed import KilledWorker
@@ -158,13 +158,13 @@ class Workers:
             raise AdjustmentError(phrase("parts.scheduler-lost", error=error)) from None
 
     def forget(self, handles: Collection[Future]) -> None:
-        """Let go of what tasks have given."""
+        """Release the results of tasks."""
         for each in handles:
             each.release()
             self._futures.discard(each)
 
     def stop(self) -> None:
-        """Give up all tasks."""
+        """Cancel all tasks."""
         futures, self._futures = list(self._futures), set()
         if futures and self._client.status == "running":
             self._client.cancel(futures, force=True)
@@ -175,10 +175,10 @@ Executor = Serial | Workers
 
 @contextmanager
 def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator[Client]:
-    """Connect to a scheduler, or start a cluster on this machine of so many workers and bytes of each.
+    """Connect to a scheduler, or start a local cluster with `workers` of `memory` bytes each.
 
-    `cluster` is a client, which is left as it is, `local`, or an address. InputError: nobody answers there.
-    ModuleNotFoundError: dask.distributed is not installed.
+    `cluster` is a client (not closed here), `local`, or an address. InputError without a response.
+    ModuleNotFoundError if dask.distributed is not installed.
     """
     import dask
 
@@ -192,12 +192,12 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
                 n_workers=workers,
                 threads_per_worker=1,
                 memory_limit=memory or "auto",
-                # Whoever reaches a scheduler or worker has it run what he likes: this machine alone.
+                # Anyone with access to a scheduler or worker can run code there: restrict it to this machine.
                 host=LOOPBACK,
                 dashboard_address=None,
-                # Any free port: the usual one may be another cluster's.
+                # Use any free port, because another cluster may use the default one.
                 scheduler_kwargs={"dashboard_address": f"{LOOPBACK}:0"},
-                # Nodes and factors are memory that Dask does not manage: it warns of them.
+                # Dask does not manage the memory of nodes and factors and would warn.
                 silence_logs=logging.ERROR,
             ) as own,
             library.Client(own) as client,
@@ -215,10 +215,10 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
 
 
 def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
-    """Count the workers, and refuse what cannot work together: versions that differ, a folder not seen.
+    """Count the workers; reject different versions and a folder that they cannot access.
 
-    Returns how many there are; the least memory of one, None where nothing bounds it; the most that one holds
-    before it begins, all that it needs being loaded.
+    Return the number of workers, the minimum memory of a worker (None: unlimited), and the maximum memory in
+    use after all modules are loaded.
     """
     versions: dict[str, str] = client.run(_version)
     if not versions:
@@ -250,14 +250,14 @@ def _version() -> str:
 
 
 def _limit(dask_worker: Any = None) -> int | None:
-    """Return the bytes that Dask lets a worker take; Dask hands it over by this name."""
+    """Return the memory limit of a worker in bytes; Dask supplies the argument by name."""
     limit: int | None = dask_worker.memory_manager.memory_limit
     return limit
 
 
 def _held() -> int:
-    """Return the bytes that a worker holds which has loaded what tasks use, and has no earlier run."""
-    # What is imported here is what takes memory; nothing is called.
+    """Return the memory of a worker after loading all modules and clearing earlier runs, bytes."""
+    # These imports only allocate their memory in advance.
     import pyarrow.parquet  # noqa: F401
 
     import photogram.distributed.nodes  # noqa: F401

@@ -1,4 +1,4 @@
-"""Files of a run: written under another name and renamed into place, so that what is there is whole."""
+"""Files of a run: written under a temporary name and renamed, so that existing files are complete."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ LOCK = "lock"
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Hold the folder of a run, which is made, as long as this process works in it.
+    """Create and lock the folder of a run while this process works there.
 
-    The lock goes with the process, however that ends. Where the file system knows none, nothing is held.
-    InputError: another process works there.
+    The lock ends with the process. File systems without locks are not protected. InputError if
+    another process works there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / LOCK
@@ -39,7 +39,7 @@ def alone(folder: Path) -> Iterator[None]:
             file.seek(0)
             by = file.readline().decode("utf-8", "replace").strip()
             raise InputError(phrase("parts.busy", process=by), file=folder)
-        # For that message alone: a disk that is full does no harm.
+        # Only for the message of another process; failure on a full disk is harmless.
         with suppress(OSError):
             file.truncate(0)
             file.write(f"process {os.getpid()} on {platform.node()}\n".encode())
@@ -47,10 +47,10 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def write_file(path: Path, content: Callable[[BinaryIO], Any]) -> None:
-    """Write a file whole or not at all; AdjustmentError where the disk is full or not to be written to.
+    """Write a file atomically; AdjustmentError if the disk is full or not writable.
 
-    Two workers may write the same file at once, where a task was given to a second one: it has the same
-    bytes, and each writes under a name of its own.
+    Two workers may write the same file if a task was repeated. The bytes are equal and temporary names
+    differ.
     """
     under = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -70,7 +70,7 @@ def write_file(path: Path, content: Callable[[BinaryIO], Any]) -> None:
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> str:
-    """Write a document of JSON with its seal, which is returned; errors as of :func:`write_file`."""
+    """Write a JSON file with a seal and return the seal; errors as in :func:`write_file`."""
     own = seal(document)
     sealed = {**document, SEAL: own}
     write_file(path, lambda file: file.write(orjson.dumps(sealed, option=orjson.OPT_INDENT_2)))
@@ -78,7 +78,7 @@ def write_json(path: Path, document: Mapping[str, Any]) -> str:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read what :func:`write_json` has written, without its seal; InputError of what is changed."""
+    """Read a file of :func:`write_json` without its seal; InputError if it was changed."""
     try:
         document = orjson.loads(path.read_bytes())
     except (OSError, orjson.JSONDecodeError) as error:
@@ -91,12 +91,12 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write arrays by their names; errors as of :func:`write_file`."""
+    """Write arrays by name; errors as in :func:`write_file`."""
     write_file(path, lambda file: np.savez(file, allow_pickle=False, **arrays))
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Read what :func:`write_arrays` has written; InputError where the file is missing or damaged."""
+    """Read a file of :func:`write_arrays`; InputError if it is missing or damaged."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             return {name: found[name] for name in found.files}

@@ -1,4 +1,4 @@
-"""The graph of a block: which photos stand for others and for common unknowns, and what ties them."""
+"""Graph of a block: vertices of photos and shared unknowns, and edges between them."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from photogram.network.observations import Observation
 
 @dataclass(frozen=True, eq=False)
 class Homes:
-    """The nodes where points, images and other observations are at home, and (P,) the `owners` of photos.
+    """Home nodes of points, images and other observations, and (P,) `owners` of photos.
 
-    A photo on a frame or trajectory belongs to the node of the photo that stands for it.
+    A photo on a frame or trajectory belongs to the node of its representing photo.
     """
 
     owners: Indices
@@ -28,7 +28,7 @@ class Homes:
 
 
 def vertices_of(block: Block) -> Indices:
-    """Return (P,) the photo that stands for each photo: its frame, or the first on its trajectory."""
+    """Return (P,) representing photos: the frame, or the first photo on the trajectory."""
     moves = bool(block.mounts or block.timed)
     rows = {name: row for row, name in enumerate(block.photo_ids)} if moves else {}
     found = np.arange(len(block.photo_ids), dtype=np.int64)
@@ -42,11 +42,11 @@ def vertices_of(block: Block) -> Indices:
 
 
 def photos_of_unknowns(block: Block) -> dict[int, str]:
-    """Return the photos with which common unknowns are handed up, by the identity of the unknowns.
+    """Return photos whose unknowns include shared unknowns, by object identity.
 
-    Those of a film go with its photo, the coefficients of a trajectory with the first photo on it. Those that
-    films of several photos have are common unknowns as any other, and so are all of films beside photos on
-    frames (halves of joined scans) or trajectories.
+    Unknowns of a film belong to its photo, coefficients of a trajectory to its first photo. Unknowns of films
+    of several photos remain shared unknowns. The same applies to all films if there are photos on frames
+    (halves of joined scans) or trajectories.
     """
     found: dict[int, set[str]] = {}
     for each in () if block.mounts or flown_by(block) else block.passages:
@@ -63,9 +63,9 @@ def photos_of_unknowns(block: Block) -> dict[int, str]:
 
 
 def alone_of(block: Block) -> dict[int, str]:
-    """Return the photos of what they alone have, by the identity of the unknowns: nodes of reseaus, too.
+    """Return the photos of unknowns that only they use, including reseau nodes.
 
-    A node of a reseau is a block by itself, which images in its cells touch; it goes where its photo goes.
+    A reseau node is a separate block that images in its cells touch; it belongs to its photo.
     """
     found: dict[int, set[str]] = {}
     for each in block.passages:
@@ -77,10 +77,10 @@ def alone_of(block: Block) -> dict[int, str]:
 
 
 def photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:
-    """Return the photos that an observation touches: by poses, or by what they alone have."""
+    """Return the photos that an observation touches, by pose or by unknowns of a single photo."""
     moment, photos, unknowns = observation.moment, observation.photos, observation.unknowns
     if moment is not None:
-        # One coefficient stands for all.
+        # One coefficient represents all.
         photos, own = (), [part[0] for part in moment.trajectory.coefficients if part]
         unknowns = (*unknowns, *own)
     others = [alone[id(each)] for each in unknowns if id(each) in alone]
@@ -88,9 +88,9 @@ def photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:
 
 
 def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
-    """Return what each point and observation touches; the edge of each point, and of each observation.
+    """Return the incidence of points and observations, and the edge of each of them.
 
-    Points that are observed together are one edge: they stay together in one node.
+    Points that are observed together are one edge, and remain in one node.
     """
     vertices = vertices_of(block)
     points = {name: row for row, name in enumerate(block.point_ids)} if block.observations else {}
@@ -115,9 +115,9 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
 
 
 def shared_cameras(block: Block) -> Indices:
-    """Return which cameras have an unknown parameter and several photos: they belong to the root.
+    """Return cameras with free or weighted parameters and several photos; they belong to the root.
 
-    So do those of photos on frames and trajectories, in whose blocks they do not stand.
+    Cameras of photos on frames and trajectories also belong to the root.
     """
     if block.photo_cameras is None:
         return np.zeros(0, dtype=np.int64)

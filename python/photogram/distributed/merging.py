@@ -1,4 +1,4 @@
-"""The result of a whole block, from what its nodes have written."""
+"""Result of a whole block, merged from the results of its nodes."""
 
 from __future__ import annotations
 
@@ -41,21 +41,21 @@ _OF_IMAGES = ("residuals", "redundancy", "standardized", "image_weights")
 
 
 class InParts(Result):
-    """A block that was adjusted in parts.
+    """Result of a partitioned adjustment.
 
-    It has what a :class:`Result` has. What asks for the normal equations of the whole block again is refused:
-    covariances between any two quantities, another datum, reliability beyond single observations.
+    It has the attributes of :class:`Result`. Methods that need the normal equations of the whole block raise
+    an error: covariances between arbitrary quantities, other datums, reliability beyond single observations.
     """
 
     WHOLE: ClassVar[bool] = False
 
     @property
     def reliability_summary(self) -> None:
-        """None: it would take a factor of all normal equations."""
+        """None, because it requires a factor of all normal equations."""
         return
 
     def covariances(self) -> Covariances:
-        """Refuse; covariances of single photos, points and unknowns are there."""
+        """Raise an error; only covariances of single photos, points and unknowns are available."""
         self._refuse()
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
@@ -65,9 +65,9 @@ class InParts(Result):
 
 
 def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InParts:
-    """Return the result of a block, in the order of its photos, points and images.
+    """Merge the results of the nodes in the order of photos, points and images of the block.
 
-    InputError: what a node has written is missing or damaged.
+    InputError if the file of a node is missing or damaged.
     """
     counts = len(block.photo_ids), len(block.point_ids), len(block.image_xy)
     found: dict[str, np.ndarray] = {}
@@ -105,7 +105,7 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
 def _rest(
     owners: Indices, block: Block, outcome: Outcome, order: list[int], details: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Return what a solution has beside arrays of photos, points and images."""
+    """Return the attributes of a solution that are not arrays of photos, points and images."""
     redundancies = [each["redundancies"] for each in details]
     sums = None if None in redundancies else tuple(map(math.fsum, zip(*redundancies, strict=True)))
     observed = dict(_all(details, "observed"))
@@ -142,7 +142,7 @@ def _rest(
         "cameras": _cameras(block, owners, details),
         "dropped": sorted((int(row), str(reason)) for row, reason in _all(details, "dropped")),
         "sums_of_squares": outcome.sums_of_squares,
-        # In the order of the groups of the whole block
+        # In the order of the observation groups of the whole block
         "adjusted_observations": [observed[row] for rows, _ in block.observation_groups for row in rows],
         "degrees_of_freedom": outcome.degrees_of_freedom,
     }
@@ -162,9 +162,9 @@ def _added(tables: Iterable[dict[str, float]]) -> dict[str, float]:
 
 
 def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> list[Any]:
-    """Return the adjusted cameras: those of several photos are the root's, others their photo's.
+    """Return the adjusted cameras, from the root if they have several photos, else from their node.
 
-    What they have of the normal equations, and their images, add up over the nodes.
+    Contributions to normal equations and image counts are added over the nodes.
     """
     if block.photo_cameras is None:
         return []
@@ -185,13 +185,13 @@ def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> li
 
 
 def _unknowns(block: Block, details: list[dict[str, Any]]) -> list[Any]:
-    """Return the adjusted common unknowns, with the observations of all nodes."""
+    """Return the adjusted shared unknowns, with the observations of all nodes."""
     found: list[Any] = []
     known: list[list[Any]] = [[] for _ in block.unknowns]
     for row, own in _all(details, "unknowns"):
         known[row].append(own)
     for given, each in zip(block.unknowns, known, strict=True):
-        # The last node that has it is the root or, of a film, that of its photo.
+        # The last node with an unknown is the root or, for a film, the node of its photo.
         change, cofactors, redundancy = _of_home(
             [(own[0], own[3], own[5]) for own in each], len(each) - 1, given.deviations, None
         )
@@ -204,10 +204,10 @@ def _unknowns(block: Block, details: list[dict[str, Any]]) -> list[Any]:
 def _of_home(
     rows: list[Any], home: int, deviations: Floats, covariance: Floats | None
 ) -> tuple[list[float], list[float], list[float]]:
-    """Return values, cofactors and redundancy numbers of what several nodes know.
+    """Return values, cofactors and redundancy numbers of an unknown of several nodes.
 
-    A node where nothing observes it has no cofactors of it to show, the home itself perhaps: then they are
-    those of another, and the redundancy numbers of its own weights those of R = I - Q P.
+    A node without observations of it cannot provide cofactors. They are then taken from another node, and the
+    redundancy numbers of weights are computed from R = I - Q P.
     """
     values, cofactors, redundancy = rows[home]
     if np.isfinite(np.array(cofactors, dtype=float)).all():

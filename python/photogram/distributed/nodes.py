@@ -1,4 +1,4 @@
-"""The nodes of a block in the core, from their parts on disk, and what becomes of them."""
+"""Nodes of a block in the core: creation from parts on disk, and storage of results."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ OUTCOME = "outcome.json"
 
 
 class CoreEngine:
-    """Nodes of the core."""
+    """Access to the nodes of the core."""
 
     def node(self, run: Path, number: int) -> _photocore.Node:
-        """Return a node; InputError of a damaged part, else as :func:`photogram.adjust` raises."""
+        """Return a node; InputError for a damaged part, others as in :func:`photogram.adjust`."""
         manifest = read_manifest(run)
         part = read_node(run, manifest, number)
         own = len(part.block.unknowns)
-        # What is held is told below.
+        # Fixed unknowns are specified below.
         options = replace(manifest.options, minimum=None)
         network = block_network(part.block, options, part.common[own:])
         rows = [
@@ -60,16 +60,16 @@ class CoreEngine:
             raise named(part.block, *error.args, unknowns=part.common) from None
 
     def stations(self, run: Path, number: int) -> int:
-        """Return how many weighted unknowns of photos and cameras are at home in a node."""
+        """Return the number of weighted unknowns of photos and cameras in a node."""
         return read_manifest(run).weighted[number]
 
     def failure(self, run: Path, number: int, undetermined: Any) -> Exception:
-        """Return what a node leaves undetermined as an error, with names."""
+        """Convert undetermined unknowns of a node to an error with names."""
         part = read_node(run, read_manifest(run), number)
         return named(part.block, *undetermined, unknowns=part.common)
 
     def keep(self, run: Path, number: int, solution: BlockSolution, variance: float | None) -> None:
-        """Write the result of a node as a folder that :func:`photogram.read_result` reads."""
+        """Write the result of a node to a folder for :func:`photogram.read_result`."""
         manifest = read_manifest(run)
         part = read_node(run, manifest, number)
         folder = result_folder(run, number)
@@ -80,7 +80,7 @@ class CoreEngine:
         datum = datum_of(part.block, solution, row, held=manifest.held)
         freedom = solution.degrees_of_freedom
         _write(folder, _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], freedom))
-        # What tables have no place for; rows are those of the whole block.
+        # Data without a table; rows refer to the whole block.
         places = [int(part.observations[row]) for rows, _ in part.block.observation_groups for row in rows]
         observed = zip(places, solution.adjusted_observations, strict=True)
         outcome = {
@@ -98,11 +98,11 @@ class CoreEngine:
             "operations": solution.operations,
             "seconds": solution.seconds,
         }
-        # The last of its files: with it the node is done.
+        # This file is written last and marks the node as finished.
         write_json(folder / OUTCOME, Encoder().value(outcome))
 
     def unknowns(self, run: Path, number: int, node: _photocore.Node) -> Indices:
-        """Return (N, 3) what the unknowns of a node belong to, rows being those of the whole block."""
+        """Return (N, 3) owners of the unknowns of a node, as rows of the whole block."""
         part, names = read_node(run, read_manifest(run), number), node.unknown_names
         cameras = np.arange(len(part.block.cameras))
         for kind, rows in enumerate((part.photos, cameras, part.unknowns, part.points)):
@@ -111,12 +111,12 @@ class CoreEngine:
         return names
 
     def redundancies(self, run: Path, number: int) -> tuple[float, float, float, float]:
-        """Return sums of redundancy numbers, by kinds, of what was written of a node."""
+        """Return the sums of redundancy numbers by type from the results of a node."""
         camera, ground, plates, others = read_outcome(result_folder(run, number))["redundancies"]
         return camera, ground, plates, others
 
     def settle(self, run: Path, number: int, variance: float | None) -> None:
-        """Scale what was written of a node by a variance of unit weight that is known since."""
+        """Scale the results of a node by the variance of unit weight of the whole block."""
         folder = result_folder(run, number)
         found = read_block_result(folder, read_summary(folder))
         scale = 1.0 if variance is None else variance
@@ -135,22 +135,22 @@ def _write(folder: Path, result: Result) -> None:
 
 
 def read_outcome(folder: Path) -> dict[str, Any]:
-    """Return what the tables of a node have no place for; InputError where it is missing or damaged."""
+    """Read the data of a node without a table; InputError if missing or damaged."""
     path = folder / OUTCOME
     found: dict[str, Any] = Decoder([], path).value(read_json(path))
     return found
 
 
 class _OfNode(Result):
-    """The result of a node: its own normal equations are not those of the block, and are not formed again."""
+    """Result of a node; it cannot form the normal equations of the block."""
 
     WHOLE: ClassVar[bool] = False
 
 
 class _Scaled:
-    """What the core found of a node, with the variance of unit weight of the whole.
+    """Core solution of a node with the variance of unit weight of the whole block.
 
-    The history of photos is not that of one node, and its block does not observe all unknowns that it has.
+    It excludes the history of photos, and unknowns that the block of the node does not observe.
     """
 
     def __init__(self, part: Part, solution: BlockSolution, variance: float | None) -> None:

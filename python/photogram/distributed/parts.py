@@ -1,4 +1,4 @@
-"""What a node of the tree has of a block: a block of its own on disk, as tables in Parquet."""
+"""Part of a node: a block on disk, as tables in Parquet."""
 
 from __future__ import annotations
 
@@ -27,19 +27,18 @@ TABLES: dict[str, tuple[str, ...]] = {
     "photos": PHOTOS,
     "points": ("point_positions", "point_sd"),
     "images": IMAGES,
-}  # The arrays of a block that have a row for each photo, point or image
+}  # Arrays with a row for each photo, point or image
 SETTINGS = "part.json"
 IN_TABLES = ("photo_ids", "point_ids", *(name for each in TABLES.values() for name in each))
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What a node has of a block: a block of its own, and which things of the whole block these are.
+    """Part of a node: a block, and its rows in the whole block.
 
-    Its photos are its own and those of nodes above that its observations or those of nodes below touch;
-    points, images and other observations are at home here; its cameras are all of the whole block. `owners`
-    are (P,) the node that each photo belongs to: this one or one above it. Rows of common unknowns that are
-    known here stand in `unknowns`, these themselves in `common`.
+    Photos are its own and photos of nodes above that its observations or nodes below touch. Points, images
+    and other observations have their home here; cameras are complete. `owners` (P,) are the nodes of the
+    photos, this one or one above. `unknowns` are the rows of the shared unknowns `common`.
     """
 
     node: int
@@ -55,28 +54,28 @@ class Part:
 
 @dataclass(frozen=True)
 class Names:
-    """Blocks of unknowns that belong to nodes above, as rows of the whole block, ascending."""
+    """Blocks of unknowns of nodes above, as ascending rows of the whole block."""
 
     photos: list[int] = field(default_factory=list)
     cameras: list[int] = field(default_factory=list)
     unknowns: list[int] = field(default_factory=list)
 
     def union(self, other: Names) -> Names:
-        """Return these and others."""
+        """Return the union of two sets of names."""
         return Names(*(sorted({*one, *two}) for one, two in zip(self.rows, other.rows, strict=True)))
 
     @property
     def rows(self) -> tuple[list[int], list[int], list[int]]:
-        """Photos, cameras and unknowns."""
+        """Rows of photos, cameras and unknowns."""
         return self.photos, self.cameras, self.unknowns
 
 
 @dataclass(frozen=True, eq=False)
 class AtHome:
-    """The n points, m images and other observations of the whole block that are at home in a node, by rows.
+    """Points (n), images (m) and other observations at home in a node, as rows of the whole block.
 
-    Names, positions and sd of points, and coordinates and sd of images, are as of a block; `image_photos` are
-    photos of the whole block, `image_points` points of these.
+    Other arrays are as in a block. `image_photos` are rows of photos of the whole block, `image_points` are
+    rows of these points.
     """
 
     points: Indices
@@ -92,7 +91,7 @@ class AtHome:
 
 
 def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
-    """Return what a node has of a block; nodes below hand up `below`."""
+    """Return the part of a node; nodes below contribute the names `below`."""
     images = np.flatnonzero(homes.images == node)
     points = np.flatnonzero(homes.points == node)
     new_points = np.full(len(homes.points), -1, dtype=np.int64)
@@ -113,9 +112,9 @@ def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
 
 
 def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, below: Names) -> Part:
-    """Return what a node has, from what is at home there and what nodes below hand up.
+    """Assemble a part from its points and observations and the names of nodes below.
 
-    The block may be without points and images; `owners` are (P,) the nodes of all its photos.
+    The block may exclude points and images; `owners` are (P,) the nodes of all its photos.
     """
     own = [block.observations[row] for row in at_home.observations.tolist()]
     touched = owners == node
@@ -126,7 +125,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         alone = alone_of(block) if own else {}
         for each in own:
             touched[[rows[name] for name in photos_of(each, alone)]] = True
-        # With photos that stand for photos on frames and trajectories
+        # Include photos that represent others on frames and trajectories
         touched[vertices_of(block)[np.flatnonzero(touched)]] = True
     photos = np.flatnonzero(touched)
     names = [block.photo_ids[row] for row in photos]
@@ -143,7 +142,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         point_ids=at_home.names,
         point_positions=at_home.point_positions,
         point_sd=at_home.point_sd,
-        point_check_sd=None,  # the whole block has them
+        point_check_sd=None,  # stored in the whole block
         image_photos=new_photos[at_home.image_photos],
         image_points=at_home.image_points,
         image_xy=at_home.image_xy,
@@ -154,7 +153,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         passages=[each for each in block.passages if isinstance(each, Scan) and each.photo in present],
     )
     whole = {id(each): row for row, each in enumerate(block.unknowns)}
-    # Those of the block come first: in this order it knows them.
+    # Unknowns of the block are first, in the order of the block.
     unknowns = [whole[id(each)] for each in reduced.unknowns]
     unknowns += sorted(set(below.unknowns) - set(unknowns))
     return Part(
@@ -179,15 +178,14 @@ def names_above(
     *,
     root: bool,
 ) -> Names:
-    """Return what a part hands up: photos of nodes above with what they alone have, and what is of the root.
+    """Return names of unknowns that a part passes to nodes above; empty for the root.
 
-    Of the whole block: `shared` are the cameras that have unknown parameters and several photos,
-    `of_unknowns` is from :func:`photos_of_unknowns`, `alone` from :func:`alone_of`. The root hands nothing
-    up.
+    `shared` are the shared cameras of the whole block, `of_unknowns` is from :func:`photos_of_unknowns`,
+    `alone` from :func:`alone_of`.
     """
     if root:
         return Names()
-    # A photo for which another stands has no unknowns of its own.
+    # Photos that are represented by others add no unknowns.
     free = vertices_of(part.block) == np.arange(len(part.photos))
     photos = part.photos[(part.owners != part.node) & free]
     cameras = part.block.photo_cameras
@@ -202,7 +200,7 @@ def names_above(
 
 
 def write_part(folder: Path, part: Part) -> str:
-    """Write the tables of a node into a folder, its settings last; return their seal, that of all."""
+    """Write the tables of a part and then its settings; return the seal of all files."""
     block, seals = part.block, Seals()
     for table, fields in TABLES.items():
         columns = []
@@ -224,14 +222,14 @@ def write_part(folder: Path, part: Part) -> str:
         "observations": part.observations.tolist(),
         "unknowns": part.unknowns.tolist(),
         "block": encoder.fields(block, IN_TABLES),
-        # After the block, whose unknowns are the same objects.
+        # After the block, which contains the same unknown objects.
         "common": encoder.value(list(part.common)),
     }
     return write_json(folder / SETTINGS, document)
 
 
 def read_part(folder: Path, sealed: str) -> Part:
-    """Read what :func:`write_part` has written and sealed; InputError of another part, or damage."""
+    """Read a part from a folder; InputError if it is another part or damaged."""
     document = read_json(folder / SETTINGS)
     if seal(document) != sealed:
         raise InputError(phrase("parts.other-node"), file=folder / SETTINGS)

@@ -1,4 +1,4 @@
-"""The plan of an adjustment in parts: work, memory, traffic and time of the nodes, before any is formed."""
+"""Plan of a partitioned adjustment: work, memory, traffic and time of the nodes."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ __all__ = ["PartsPlan", "Rates", "Times", "measured_rates", "scheduled"]
 
 
 IMAGE = 200.0  # Multiply-adds of the formation of an image point
-BANDWIDTH = 1e9  # Bytes a second between workers: 10 Gbit Ethernet
-ITERATIONS = 4  # Formations of an adjustment from usual initial values
-SHARE = 0.8  # Of the memory of a worker that nodes may fill: messages under way take the rest
+BANDWIDTH = 1e9  # Bytes per second between workers: 10 Gbit Ethernet
+ITERATIONS = 4  # Formations of an adjustment from typical initial values
+SHARE = 0.8  # Part of the memory of a worker for nodes; messages use the rest
 
 
 @dataclass(frozen=True)
 class PartsPlan:
-    """What an adjustment in parts takes.
+    """Resources of a partitioned adjustment.
 
     Attributes
     ----------
     tree
-        The tree.
+        Tree of the nodes.
     predictions
-        Of each node: `_photocore.Node.prediction`.
+        Prediction of each node: `_photocore.Node.prediction`.
     photos
-        At home in each node.
+        Number of photos at home in each node.
     workers
-        How many.
+        Number of workers.
     memory
-        Bytes of each; None where nothing bounds them.
+        Bytes of each worker; None if unlimited.
     rates
-        What a worker does in a second; None where that was not measured.
+        Speed of a worker; None if not measured.
     held
-        Bytes that a worker holds before it begins: Python and libraries.
+        Bytes that a worker uses before the run: Python and libraries.
     """
 
     tree: Tree
@@ -62,27 +62,27 @@ class PartsPlan:
 
     @property
     def largest(self) -> float:
-        """Bytes of the node that takes most, at the most."""
+        """Peak bytes of the largest node."""
         return float(self.of("memory_bytes").max())
 
     @property
     def room(self) -> float:
-        """Bytes that a worker has for nodes."""
+        """Bytes of a worker for nodes."""
         return math.inf if self.memory is None else SHARE * self.memory - self.held
 
     @property
     def bytes_up(self) -> float:
-        """Bytes that all nodes leave to their parents in an iteration."""
+        """Bytes sent from all nodes to their parents per iteration."""
         return float(self.of("contribution_bytes").sum())
 
     @property
     def bytes_down(self) -> float:
-        """Bytes of the steps that go down in an iteration."""
+        """Bytes of the steps sent down per iteration."""
         return float(self.of("step_bytes").sum())
 
     @property
     def bytes_inverted(self) -> float:
-        """Bytes of cofactors that go down in the inversion."""
+        """Bytes of cofactors sent down in the inversion."""
         return float(self.of("cofactor_bytes").sum())
 
     @property
@@ -93,7 +93,7 @@ class PartsPlan:
         formation = IMAGE * self.of("images") + self.of("reduction")
         up = formation / self.rates.formation + self.of("factor") / self.rates.factor
         inversion = formation / self.rates.formation + self.of("inverse") / self.rates.inverse
-        # Substitution takes two multiply-adds for each number of the factor, and the points once more.
+        # Substitution needs two multiply-adds per number of the factor, and processes the points again.
         down = self.of("factor_bytes") / 4 / self.rates.factor + IMAGE * self.of("images") / (
             self.rates.formation
         )
@@ -106,7 +106,7 @@ class PartsPlan:
         Raises
         ------
         OutOfMemoryError
-            A node requires more memory than a worker has; the message proposes a number of parts.
+            If a node requires more memory than a worker has; the message proposes a number of parts.
         """
         if self.memory is None or self.largest <= self.room:
             return
@@ -116,7 +116,7 @@ class PartsPlan:
         raise OutOfMemoryError(phrase("parts.node-too-large", **fields, busy=busy, advice=self._advice()))
 
     def _advice(self) -> Phrase:
-        """Return advice: the size of a part is halved by twice as many parts, a separator does not change."""
+        """Propose more parts or memory; twice as many parts halve their size, but not separators."""
         memory = self.of("memory_bytes")
         leaf = np.array([not below for below in self.tree.children])
         top = float(memory[~leaf].max(initial=0.0))
@@ -124,7 +124,7 @@ class PartsPlan:
             size = gibibytes((top + self.held) / SHARE)
             return phrase("parts.large-separator", separator=gibibytes(top), memory=size)
         parts = int(leaf.sum())
-        # What a part takes falls with its photos, but for the contributions of its borders.
+        # The memory of a part is proportional to its photos, except for contributions of its borders.
         fit = parts * 2 ** int(np.ceil(np.log2(float(memory[leaf].max()) / self.room)))
         return phrase("parts.more-parts", parts=fit, given=parts)
 
@@ -176,7 +176,7 @@ class PartsPlan:
 
 
 def measured_rates(part: _photocore.Node) -> Rates:
-    """Measure what this process does in a second, at one part, formed and inverted for nothing else."""
+    """Measure the speed of this process by forming and inverting one part."""
     prediction = part.prediction
     size = len(part.outer)
     start = time.perf_counter()
@@ -185,7 +185,7 @@ def measured_rates(part: _photocore.Node) -> Rates:
     start = time.perf_counter()
     formed.invert(np.zeros(size * (size + 1) // 2), part.initial, threads=0)
     inverting = time.perf_counter() - start
-    # The dense work has 0.4 of the multiply-adds of a product of matrices; the rest of the time is formation.
+    # Dense work achieves 0.4 of the rate of matrix products; the remaining time is formation.
     matrix = np.ones((1024, 1024))
     matrix @ matrix
     start = time.perf_counter()
@@ -200,7 +200,7 @@ def measured_rates(part: _photocore.Node) -> Rates:
 
 @dataclass(frozen=True)
 class Rates:
-    """What a worker does in a second: multiply-adds, and bytes to or from another worker."""
+    """Speed of a worker per second: multiply-adds, and bytes sent or received."""
 
     formation: float
     factor: float
@@ -210,7 +210,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds on some workers: forming and reducing, solving, inverting once; bytes moved in these."""
+    """Seconds to form, solve and invert on some workers, and bytes sent in each phase."""
 
     up: float
     down: float
@@ -220,7 +220,7 @@ class Times:
     moved_inversion: float
 
     def whole(self, iterations: int) -> float:
-        """Return the seconds of an adjustment with so many formations, and the inversion."""
+        """Return the seconds of an adjustment with a number of formations and one inversion."""
         return iterations * (self.up + self.down) + self.inversion
 
 
@@ -233,11 +233,11 @@ def scheduled(
     workers: int,
     bandwidth: float,
 ) -> Times:
-    """Work a tree off: seconds of each node up, down and in the inversion, (N,), and its `traffic` in bytes.
+    """Schedule a tree from seconds (N,) and `traffic` in bytes of each node.
 
-    A task that is ready goes to the worker that is free first; one with children to that of one of them,
-    where it can begin earlier. The way down goes where the factors are. A worker receives one message at a
-    time, of so many bytes a second.
+    A ready task is assigned to the first free worker, or to the worker of a child if it can start earlier
+    there. Tasks on the way down run where the factors are. A worker receives one message at a time, with
+    `bandwidth` bytes per second.
     """
     time, moved, placed = _up(tree, up, traffic[0], workers, bandwidth)
     step, step_moved = _down(tree, down, traffic[1], placed, workers, bandwidth)

@@ -1,4 +1,4 @@
-"""The folder of a run: the tree and who hands up what, the parts, and how far the iterations have come."""
+"""Folder of a run: the tree, shared names, the parts, and the progress of iterations."""
 
 from __future__ import annotations
 
@@ -44,14 +44,13 @@ PROGRESS = "progress.json"
 
 @dataclass(frozen=True)
 class Manifest:
-    """What all nodes of a run have in common.
+    """Data shared by all nodes of a run.
 
-    `version` is that of the package that made it, `source` tells the block from others, `outer` what each
-    node hands up, `middle` (3,) the median of the positions of all photos. `weighted` counts weighted
-    unknowns of photos, cameras and common unknowns at home in each node; so do `photos`, `points` and
-    `images`; `seals` are those of the parts. Where nothing gives a datum photos are `held`, each with the
-    number of one of its six unknowns; `datum` is what the block is taken to when it is adjusted, None for
-    what is held, or observed.
+    `version` is the version of the package, `source` the hash of the block, and `outer` the names that each
+    node passes up. `middle` (3,) is the median position of all photos. `weighted`, `photos`, `points` and
+    `images` count weighted unknowns, photos, points and images at home in each node; `seals` are the seals of
+    the parts. `held` contains photos and indices of unknowns that are fixed if nothing defines a datum.
+    `datum` is the final datum; None: no transformation.
     """
 
     version: str
@@ -70,12 +69,12 @@ class Manifest:
 
 
 def part_folder(run: Path, number: int) -> Path:
-    """Return where the part of a node is."""
+    """Return the folder of the part of a node."""
     return run / "parts" / f"{number:05d}"
 
 
 def result_folder(run: Path, number: int) -> Path:
-    """Return where what was found of a node is."""
+    """Return the folder of the result of a node."""
     return run / "results" / f"{number:05d}"
 
 
@@ -96,12 +95,12 @@ def partition(
     source: str,
     datum: DatumRow | None = None,
 ) -> Manifest:
-    """Cut a block with all poses and common unknowns into parts on disk, in a folder that is made.
+    """Cut an oriented block into parts on disk, in a new folder.
 
-    AdjustmentError: the folder cannot be written to; a datum is asked for, and the block is not free. Else as
-    of :func:`photogram.adjust`, before its first iteration.
+    AdjustmentError if the folder is not writable, or a datum is specified for a block that is not free.
+    Others as in :func:`photogram.adjust`, before its first iteration.
     """
-    # An adjustment of the whole block holds them if nothing else gives a datum.
+    # An adjustment of the whole block fixes them if nothing else defines a datum.
     held: list[tuple[int, int]] = []
     if not np.isfinite(block.point_sd[np.unique(block.image_points)]).any():
         try:
@@ -111,12 +110,12 @@ def partition(
     if datum is not None and not held:
         raise AdjustmentError(phrase("parts.not-free"))
     block = with_flights(block)
-    # A node has some of the observations of a drift only.
+    # A node has only some observations of a drift.
     block = block.replace(observations=with_epochs(block.observations))
     incidence, edges, of_observations = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
     found = cut(places_of(block), images.astype(float), lambda: [incidence], parts)
-    # Observations of common unknowns alone are at home in the root.
+    # Observations of shared unknowns without photos or points are at home in the root.
     nodes = homes(found.owners, incidence, found.tree.root)
     of_points = nodes[edges]
     owners = found.owners[vertices_of(block)]
@@ -143,9 +142,9 @@ def divided(
     held: list[tuple[int, int]],
     datum: DatumRow | None = None,
 ) -> Manifest:
-    """Write the parts of a block, one after the other: `part_at` is told what nodes below hand up.
+    """Write the parts of a block sequentially; `part_at` receives the names of nodes below.
 
-    The block may be without points and images. AdjustmentError: the folder cannot be written to.
+    The block may exclude points and images. AdjustmentError if the folder is not writable.
     """
     shared, of_unknowns, alone = shared_cameras(block), photos_of_unknowns(block), alone_of(block)
     outer: list[Names] = []
@@ -181,7 +180,7 @@ def divided(
         held,
         datum,
     )
-    # With it a partition is whole.
+    # This file completes a partition.
     document = {name: getattr(manifest, name) for name in _PLAIN}
     document["parts"] = (len(manifest.tree) + 1) // 2
     document["outer"] = [each.rows for each in manifest.outer]
@@ -197,10 +196,10 @@ def _weighted(
     alone: Mapping[int, str],
     common: Sequence[Unknown] | None,
 ) -> int:
-    """Count the weighted unknowns of photos, cameras and common unknowns that are at home in a node.
+    """Count the weighted unknowns of photos, cameras and shared unknowns in a node.
 
-    `common` are those of the whole block, in the root; None elsewhere. What photos have `alone` is at home
-    where they are.
+    `common` are the shared unknowns of the whole block for the root, None otherwise. Unknowns in `alone`
+    belong to the node of their photo.
     """
     names = {block.photo_ids[row] for row in own.tolist()}
     sd = [np.hstack([block.photo_position_sd[own], block.photo_attitude_sd[own]]).ravel()]
@@ -215,7 +214,7 @@ def _weighted(
 
 
 def read_manifest(run: Path) -> Manifest:
-    """Read what all nodes have in common; InputError of another version, or of damage."""
+    """Read the data shared by all nodes; InputError if the version differs or the file is damaged."""
     document = read_json(run / MANIFEST)
     if document.get("version") != _photocore.__version__:
         raise InputError(phrase("parts.other-version", version=_photocore.__version__), file=run / MANIFEST)
@@ -237,15 +236,15 @@ def read_manifest(run: Path) -> Manifest:
 
 
 def read_node(run: Path, manifest: Manifest, number: int) -> Part:
-    """Read the part of a node; InputError where it is missing, damaged, of another node or run."""
+    """Read the part of a node; InputError if it is missing, damaged, or of another node or run."""
     return read_part(part_folder(run, number), manifest.seals[number])
 
 
 def with_flights(block: Block) -> Block:
-    """Return a block whose photos are on the same trajectories, at the same times, whatever it is without.
+    """Return a block with explicit trajectories and times, which do not depend on its other data.
 
-    A photo that moves by itself is on a trajectory that is given; a scanner has a time, the middle of all its
-    images; coefficients are smooth by observations alone, each of which is at home in one node.
+    A photo with its own motion has a given trajectory, a scanner has the mean time of all its images.
+    Smoothness is represented by observations only, each at home in one node.
     """
     if not flown_by(block):
         return block
@@ -272,7 +271,7 @@ def _told(observation: Observation, trajectories: dict[int, Trajectory]) -> Obse
 
 
 def _unsmoothed(trajectory: Trajectory) -> Trajectory:
-    """Return a trajectory with the same coefficients, of which it says nothing together."""
+    """Return a trajectory with the same coefficients but without their joint observations."""
     changes: dict[str, Any] = {
         name: replace(basis, smooth=None, correlation=None)
         for name in ("position", "rotation")
@@ -283,11 +282,11 @@ def _unsmoothed(trajectory: Trajectory) -> Trajectory:
 
 @dataclass
 class Course:
-    """How far the iterations have come.
+    """Progress of the iterations.
 
-    `curved`: whether the second-order term of a loss is taken in at the state; `near`: whether from there on.
-    `chord`: the length of the chord that followed the last step, where one did. `ending`, when they are over:
-    the status, the state whose equations give cofactors, and the state reached.
+    `curved`: the state includes the second-order term of a loss. `near`: later states will include it.
+    `chord`: length of the chord after the last step, if any. `ending`, after the last iteration: the status,
+    the state whose equations give cofactors, and the final state.
     """
 
     state: str = "0"
@@ -305,7 +304,7 @@ class Course:
     iterations: list[Iteration] = field(default_factory=list)
 
     def write(self, run: Path, source: str) -> None:
-        """Write it into the folder of the run of that source."""
+        """Write the progress to the folder of a run, with the hash of its block."""
         document = {name: each for name, each in vars(self).items() if name != "iterations"}
         document["iterations"] = [asdict(each) for each in self.iterations]
         document["source"] = source
@@ -313,9 +312,9 @@ class Course:
 
     @classmethod
     def read(cls, run: Path, source: str) -> Course:
-        """Return what the folder of the run has; the beginning where it has nothing.
+        """Read the progress of a run; the initial state without a file.
 
-        InputError: it is damaged, or the progress of another run.
+        InputError if the file is damaged or of another run.
         """
         if not (run / PROGRESS).is_file():
             return cls()

@@ -1,4 +1,4 @@
-"""What a process keeps of its tasks: nodes and factors, as many as its memory holds."""
+"""Cache of nodes and factors in a process, limited by its memory."""
 
 from __future__ import annotations
 
@@ -11,41 +11,41 @@ from photogram.memory import give_back, resident_memory
 
 
 class Shelf:
-    """The nodes and factors that a process keeps."""
+    """Cache of the nodes and factors of a process."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
         self._kept: OrderedDict[tuple[Any, ...], tuple[Any, float]] = OrderedDict()
 
     def get(self, key: tuple[Any, ...]) -> Any:
-        """Return what is kept under a key; None where nothing is."""
+        """Return the object of a key; None if absent."""
         if key not in self._kept:
             return None
         self._kept.move_to_end(key)
         return self._kept[key][0]
 
     def put(self, key: tuple[Any, ...], value: object, size: float) -> None:
-        """Keep something of so many bytes."""
+        """Store an object and its size in bytes."""
         self._kept[key] = value, size
         self._kept.move_to_end(key)
 
     def take(self, key: tuple[Any, ...]) -> Any:
-        """Return what is kept under a key, and keep it no longer."""
+        """Return and remove the object of a key."""
         return self._kept.pop(key, (None, 0.0))[0]
 
     def make_room(self, needed: float, memory: int | None, spared: tuple[Any, ...]) -> None:
-        """Give up so much that a process which may hold `memory` bytes can take `needed` more.
+        """Remove objects until `needed` bytes fit into the limit of `memory` bytes.
 
-        What the process holds is asked of the system: messages and what Dask keeps are in it. `spared` are
-        run and node that the room is for.
+        The used memory is requested from the system, so that it includes messages and objects of Dask.
+        `spared` is the run and node that needs the memory.
         """
         if memory is None:
             return
         held = resident_memory()
         over = (sum(size for _, size in self._kept.values()) if held is None else held) + needed - memory
         given_up = False
-        # Nodes, which are read again, are given up before factors. Of each what was used last goes first:
-        # walks over the tree come round, so that it is asked for last.
+        # Nodes can be read again and are removed before factors. The most recently used is removed first,
+        # because tree walks are cyclic and need it last.
         others = [key for key in reversed(self._kept) if key[1:3] != spared]
         for key in sorted(others, key=lambda key: key[0] != "node"):
             if over <= 0:
@@ -56,16 +56,16 @@ class Shelf:
             give_back()
 
     def drop(self, of: Callable[[tuple[Any, ...]], bool]) -> None:
-        """Give up what some keys stand for."""
+        """Remove the objects of some keys."""
         for key in [key for key in self._kept if of(key)]:
             del self._kept[key]
 
     def clear(self) -> None:
-        """Give up everything."""
+        """Remove all objects."""
         self._kept.clear()
 
     def clear_unless_used(self) -> None:
-        """Give up what an earlier run has left, unless a task is at work here: it needs what it has."""
+        """Remove the objects of earlier runs, unless a task is running and needs them."""
         if self.lock.acquire(blocking=False):
             try:
                 self.clear()
@@ -74,4 +74,4 @@ class Shelf:
                 self.lock.release()
 
 
-shelf = Shelf()  # Of this process. Its lock lets one task work at a time: memory is planned for that
+shelf = Shelf()  # Cache of this process; its lock admits one task at a time, as assumed by the memory plan

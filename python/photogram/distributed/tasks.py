@@ -1,8 +1,8 @@
-"""What is done of a node, wherever it is done: functions of the folder of a run and of what they are given.
+"""Tasks for single nodes, as functions of the folder of a run and further arguments.
 
-A worker keeps nodes and factors on a shelf of its own. What is not there any more is made again: a node from
-its part, the state from its file. A factor also takes what the children have left, which only the driver can
-ask for: a task that misses one says so (:class:`Lost`).
+A worker caches nodes and factors. A missing node is read from its part, a missing state from its file. A
+missing factor also needs the contributions of the children, which only the driver can request. The task then
+returns :class:`Lost`.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from photogram._photocore import ContributionRow, FormedNode, Node
     from photogram.distributed.nodes import CoreEngine
 
-GIVEN = "0"  # The state that the nodes themselves give
+GIVEN = "0"  # Initial state, defined by the nodes
 
 
 @dataclass(frozen=True)
 class Lost:
-    """What a task gives whose node, of this number, has lost its factor: it has to be formed again.
+    """Result of a task whose node `number` has lost its factor, which must be formed again.
 
-    No error, which Dask would log as a failure.
+    It is not an exception, because Dask would log a failure.
     """
 
     number: int
@@ -45,12 +45,12 @@ class Lost:
 
 @dataclass(frozen=True)
 class Job:
-    """What all tasks of a run are told.
+    """Arguments shared by all tasks of a run.
 
-    Its folder is on a disk that all workers see; every worker has the version of the package on the machine
-    that drives. `threads` are of each task, 0 for all processors, `memory` the bytes that a process may hold,
-    None for any number; `source` tells the block and its options from others; `columns` are how many
-    right-hand sides the datum takes that the block is moved to at the end, 0 without one.
+    The folder is on a disk that all workers can access; workers have the same package version as the driver.
+    `threads` per task, 0 for all processors. `memory` is the limit of a process in bytes, None if unlimited.
+    `source` is the hash of block and options. `columns` is the number of right-hand sides of the final datum,
+    0 without one.
     """
 
     folder: Path
@@ -64,7 +64,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Point:
-    """Where normal equations are formed: a state of all nodes, the damping, a loss's second order."""
+    """Formation point of normal equations: state of all nodes, damping, second order of a loss."""
 
     state: str
     damping: float = 0.0
@@ -73,19 +73,19 @@ class Point:
 
 @dataclass(frozen=True)
 class Formed:
-    """What the driver wants to know of a node that was formed."""
+    """Summary of a formed node for the driver."""
 
     sum_of_squares: float
     decrease: float
     place: str
-    products: Floats | None = None  # (d, d) its share in B^T Q B, where there is a datum to go to
+    products: Floats | None = None  # Part (d, d) of B^T Q B, if there is a final datum
 
 
 @dataclass(frozen=True, eq=False)
 class Contribution:
-    """What a node leaves to its parent, and what the driver wants to know.
+    """Contribution of a node to its parent, and summary for the driver.
 
-    `columns`: (d, S) what it leaves of right-hand sides for a datum, where there is one to go to.
+    `columns` (d, S): remaining right-hand sides of a final datum, if any.
     """
 
     row: ContributionRow
@@ -95,7 +95,7 @@ class Contribution:
 
 @dataclass(frozen=True, eq=False)
 class Chord:
-    """(S,) what a node leaves of the right-hand side of a chord, and what it lowers the sum of squares by."""
+    """Remaining right-hand side (S,) of a node for a chord, and its decrease of the sum of squares."""
 
     left: Floats
     decrease: float
@@ -103,26 +103,26 @@ class Chord:
 
 @dataclass(frozen=True, eq=False)
 class Inverted:
-    """The cofactors that the children of a node go on with, in their order, and W = Q B of a datum."""
+    """Cofactors for the children of a node, in their order, and W = Q B of a datum."""
 
     children: list[Floats]
     columns: list[Floats] | None = None
 
 
 def state_path(folder: Path, number: int, state: str) -> Path:
-    """Return where a state of a node is kept."""
+    """Return the file of a state of a node."""
     return folder / "states" / f"{number:05d}" / f"{state}.npz"
 
 
 def formed(job: Job, number: int, at: Point, contributions: Sequence[Contribution]) -> Contribution:
-    """Form a node at a state and eliminate what is at home there; its factor stays on the shelf.
+    """Form a node at a state and eliminate its own unknowns; the factor is cached.
 
-    RankError: its observations leave something undetermined.
+    RankError if its observations leave unknowns undetermined.
     """
     with shelf.lock:
         node = _node(job, number)
         prediction = _prediction(job, node)
-        # A factor at another state is of no use any more.
+        # Factors at other states are obsolete.
         shelf.drop(lambda key: key[0] == "factor" and key[1:3] == (job.folder, number))
         shelf.make_room(
             prediction["memory_bytes"] - prediction["node_bytes"], job.memory, (job.folder, number)
@@ -141,14 +141,14 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
         columns = products = None
         if "b" in state:
             below = [each.columns for each in contributions if each.columns is not None]
-            # B of what is at home here, and what the children have left.
+            # B of the own unknowns, and of the contributions of children.
             rights = state["b"].copy()
             rights[:, node.outer] = 0.0
             for rows, left in zip(node.children, below, strict=True):
                 rights[:, rows] += left
             columns, products = found.reduce(_plain(rights), threads=job.threads)
             columns = columns.reshape(len(rights), -1)
-            # A node may have nothing to eliminate.
+            # A node may be without own unknowns.
             products = products.reshape(len(rights), -1) if rights.size else np.zeros((len(rights),) * 2)
         told = Formed(found.sum_of_squares, found.decrease, _place(), products)
         shelf.put(_factor_key(job, number, at), found, prediction["factor_bytes"])
@@ -156,14 +156,14 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
 
 
 def about(contribution: Contribution) -> Formed:
-    """Return what the driver wants to know, without the matrix."""
+    """Return the summary of a contribution, without its matrix."""
     return contribution.formed
 
 
 def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[Floats] | Lost:
-    """Solve a node for its step, given that of the outer unknowns, and write the state after it.
+    """Solve a node for its step from the outer step, and write the new state.
 
-    Returns the steps of what each child is over; or that its factor is lost.
+    Return the steps of the outer unknowns of each child, or the loss of the factor.
     """
     with shelf.lock:
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
@@ -176,10 +176,10 @@ def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[
 def reduced_chord(
     job: Job, number: int, at: Point, after: str, below: Sequence[Chord | None]
 ) -> Chord | None:
-    """Reduce the right-hand side that the equations of a node have after a step; its factor is of before.
+    """Reduce the right-hand side of a node at a state after the step, with the factor before it.
 
-    `after` is the state after the step, `below` what the children have left. None where a factor is lost, or
-    has not kept what this takes: no chord is worth another one.
+    `after` is the state after the step, `below` are the contributions of the children. Return None if a
+    factor is missing or cannot be used for a chord; a chord does not justify a new factor.
     """
     left = [each.left for each in below if each is not None]
     with shelf.lock:
@@ -200,22 +200,22 @@ def solved_chord(
     further: str,
     below: Sequence[Chord | None],
 ) -> list[Floats] | Lost:
-    """Solve a node for a chord, given that of the outer unknowns, and write the state `further` after it.
+    """Solve a node for a chord from the outer chord, and write the state `further`.
 
-    Returns the chords of what each child is over; or that its factor is lost. Else as :func:`reduced_chord`.
+    Return the chords of the outer unknowns of each child, or the loss of the factor.
     """
     with shelf.lock:
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
         if factor is None:
             return Lost(number)
-        if not factor.has_chord:  # it was formed again since
+        if not factor.has_chord:  # it was formed again meanwhile
             reduced_chord(job, number, at, after, below)
         chord = factor.solve_chord(_plain(outer), threads=job.threads)
         return _advanced(job, number, after, chord, further)
 
 
 def _advanced(job: Job, number: int, state: str, step: Floats, after: str) -> list[Floats]:
-    """Write the state after a step of a node from another; return the steps of what each child is over."""
+    """Write the state of a node after a step; return the steps of each child."""
     node = _node(job, number)
     reached = node.advance(_state(job, node, number, state), step)
     write_state(job, number, after, {"values": reached})
@@ -223,7 +223,7 @@ def _advanced(job: Job, number: int, state: str, step: Floats, after: str) -> li
 
 
 def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, float]:
-    """Write the state with points where their rays meet; return what is minimised at both."""
+    """Write the state with points at their ray intersections; return both objective functions."""
     with shelf.lock:
         node = _node(job, number)
         before = _state(job, node, number, state)
@@ -234,7 +234,7 @@ def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, flo
 
 
 def evaluated(job: Job, number: int, state: str) -> tuple[float, ...]:
-    """Return the weighted sums of squares of a node at a state, by kinds, and what is minimised there."""
+    """Return weighted sums of squares of a node by type, and the objective function."""
     with shelf.lock:
         node = _node(job, number)
         return tuple(node.objective(_state(job, node, number, state), threads=job.threads))
@@ -250,11 +250,11 @@ def inverted(
     place: int,
     datum: InDatum | None = None,
 ) -> Inverted | Lost:
-    """Invert a node, and write what has become of its observations and unknowns; or say which factor is lost.
+    """Invert a node and write its results; return data for the children, or a lost factor.
 
-    The factor at a point is used up. `after` is the state reached, `variance` that of unit weight of the
-    whole, `above` what the parent has handed down, None for the root, `place` which of its children this is.
-    Where the block was moved to a datum, `datum` takes cofactors there.
+    The factor is removed. `after` is the final state, `variance` the variance of unit weight of the whole
+    block. `above` is from the parent (None for the root), and `place` is the index among its children.
+    `datum` transforms the cofactors to a final datum.
     """
     if isinstance(above, Lost):
         return above
@@ -285,12 +285,12 @@ def inverted(
 
 
 def lost(found: object) -> Lost | None:
-    """Return what a task has given where it is a factor that is lost, and nothing of all else."""
+    """Return the result if it is a lost factor, else None."""
     return found if isinstance(found, Lost) else None
 
 
 def finished(job: Job, number: int, before: str, after: str, variance: float | None) -> None:
-    """Write what has become of a node, without cofactors."""
+    """Write the results of a node without cofactors."""
     with shelf.lock:
         node = _node(job, number)
         states = [_state(job, node, number, each) for each in (after, before)]
@@ -298,21 +298,21 @@ def finished(job: Job, number: int, before: str, after: str, variance: float | N
 
 
 def redundancies(job: Job, number: int) -> tuple[float, float, float, float]:
-    """Return the sums of redundancy numbers, by kinds, that a node has written."""
+    """Return the sums of redundancy numbers of a node by type."""
     return job.engine.redundancies(job.folder, number)
 
 
 def settled(job: Job, number: int, variance: float | None) -> None:
-    """Scale what has become of a node by a variance of unit weight that is known since."""
+    """Scale the results of a node by the final variance of unit weight."""
     with shelf.lock:
         job.engine.settle(job.folder, number, variance)
 
 
 def counted(job: Job, number: int) -> tuple[int, int, int, int, int, int]:
-    """Return how many observations and unknowns are at home in a node.
+    """Return the numbers of observations and unknowns at home in a node.
 
-    Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
-    unknowns, fixed ones too; 1 where its last steps may fall slowly, so that a chord pays.
+    Order: observations, weighted unknowns, unknowns that are not fixed, weighted unknowns of photos and
+    cameras, all unknowns, and 1 if its last steps may decrease slowly, so that a chord is useful.
     """
     with shelf.lock:
         node = _node(job, number)
@@ -321,20 +321,20 @@ def counted(job: Job, number: int) -> tuple[int, int, int, int, int, int]:
 
 
 def located(job: Job, number: int, state: str) -> tuple[Indices, Floats]:
-    """Return (N, 3) what the unknowns of a node belong to in the whole block, and (N,) a state of them."""
+    """Return (N, 3) owners of the unknowns of a node in the whole block, and (N,) values."""
     with shelf.lock:
         node = _node(job, number)
         return job.engine.unknowns(job.folder, number, node), _state(job, node, number, state)
 
 
 def predicted(job: Job, number: int) -> dict[str, float]:
-    """Return what work and memory a node takes."""
+    """Return the predicted work and memory of a node."""
     with shelf.lock:
         return _prediction(job, _node(job, number))
 
 
 def _prediction(job: Job, node: Node) -> dict[str, float]:
-    """Return what work and memory a node takes, with its columns for a datum."""
+    """Return the predicted work and memory of a node, with columns of a datum."""
     if not job.columns:
         return dict(node.prediction)
     size = len(node.initial)
@@ -346,12 +346,12 @@ def _prediction(job: Job, node: Node) -> dict[str, float]:
 
 
 def _plain(values: Floats) -> Floats:
-    """Return an array as the core takes it: what comes over the wire may stand at any address."""
+    """Return an aligned array for the core; received arrays may be unaligned."""
     return np.require(values, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
 
 
 def _place() -> str:
-    """Return the address of the worker that this is; empty where it is none."""
+    """Return the address of this worker; empty outside of a worker."""
     distributed = sys.modules.get("distributed")
     try:
         return "" if distributed is None else str(distributed.get_worker().address)
@@ -366,7 +366,7 @@ def _node(job: Job, number: int) -> Node:
     found: Node | None = shelf.get(key)
     if found is None:
         found = job.engine.node(job.folder, number)
-        # Tables were read for it.
+        # Release the memory of the tables.
         give_back()
         shelf.make_room(0.0, job.memory, (job.folder, number))
         shelf.put(key, found, found.prediction["node_bytes"])
@@ -382,7 +382,7 @@ def _state(job: Job, node: Node, number: int, state: str) -> Floats:
 
 
 def _arrays(job: Job, node: Node, number: int, state: str) -> dict[str, np.ndarray]:
-    """Return the `values` of a state and, where it was moved to a datum, what takes cofactors there."""
+    """Return the `values` of a state, and cofactor data if it was transformed to a datum."""
     if state == GIVEN:
         return {"values": node.initial}
     path = state_path(job.folder, number, state)
@@ -394,14 +394,14 @@ def _arrays(job: Job, node: Node, number: int, state: str) -> dict[str, np.ndarr
 
 
 def write_state(job: Job, number: int, state: str, arrays: dict[str, np.ndarray]) -> None:
-    """Write a state of a node: its `values`, and what belongs to them."""
+    """Write a state of a node: `values` and related arrays."""
     path = state_path(job.folder, number, state)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_arrays(path, {**arrays, "seal": np.array(_seal(job, number, state, arrays))})
 
 
 def _seal(job: Job, number: int, state: str, arrays: dict[str, np.ndarray]) -> str:
-    """Return what binds arrays to the run, node and step that they belong to."""
+    """Return a hash of arrays with their run, node and step."""
     digest = hashlib.sha256(f"{job.source} {number} {state}".encode())
     for name, values in sorted(arrays.items()):
         digest.update(f" {name} {values.dtype.str} {values.shape}".encode())

@@ -1,6 +1,6 @@
-"""Walks over the tree of a block in parts: up to form and eliminate, down to solve and invert.
+"""Walks over the tree of a partitioned block: up to form and eliminate, down to solve and invert.
 
-What a walk adds up it adds in the order of the numbers of the nodes, whoever has been faster.
+Sums are added in the order of the node numbers, independent of the order of arrival.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 from photogram.words import phrase
 
-ATTEMPTS = 20  # So often is a node formed again that a worker has taken with it
+ATTEMPTS = 20  # Maximum number of formations of a node after losses of workers
 
 
 @dataclass
 class Up:
-    """Normal equations that are formed: what every node leaves, and the sums."""
+    """Formed normal equations: contributions of all nodes, and sums."""
 
     at: Point
     contributions: dict[int, Handle]
     sum_of_squares: float
     decrease: float
-    products: Floats | None  # B^T Q B, where the block was moved to a datum
+    products: Floats | None  # B^T Q B, if the block was transformed to a datum
 
 
 class LostFactorError(PhotogramError):
-    """The factor of a node is lost: it has to be formed again."""
+    """Lost factor of a node, which must be formed again."""
 
     def __init__(self, number: int) -> None:
         super().__init__(f"the factor of node {number} is lost")
@@ -45,7 +45,7 @@ class LostFactorError(PhotogramError):
 
 
 class Walks:
-    """Walks over the tree of the nodes: `job` is what tasks are told, `progress` is told of parts done."""
+    """Walks over the nodes of a tree; `job` is passed to tasks, `progress` is called."""
 
     def __init__(
         self,
@@ -56,19 +56,19 @@ class Walks:
     ) -> None:
         self.job, self.tree, self.executor = job, tree, executor
         self._progress = progress
-        # Neighbours to one worker: less is sent. Later, where nodes were last: they need not be read again.
+        # Neighbours share a worker to reduce traffic. Later, nodes remain with their workers.
         places, parts = executor.places(), int(tree.spans[:, 1].max())
         self._places = [places[first * len(places) // parts] for first in tree.spans[:, 0].tolist()]
         self.nodes = range(len(tree))
-        # Deep nodes first: what waits for them waits longest.
+        # Deep nodes first, because the longest chains depend on them.
         self._costs = tree.levels.tolist()
 
     def all(self, function: Callable[..., Any], *given: Any, phase: str) -> list[Any]:
-        """Return what a task gives of each node."""
+        """Run a task for each node and return the results."""
         return self.sums([self.do(function, node, *given) for node in self.nodes], phase)
 
     def climb(self, function: Callable[..., Any], *given: Any) -> dict[int, Handle]:
-        """Do a task of every node, children before parents: it is given what those of its children leave."""
+        """Run a task for every node, children first; it receives the results of the children."""
         handles: dict[int, Handle] = {}
         for node in self.nodes:
             below = [handles[child] for child in self.tree.children[node]]
@@ -95,7 +95,7 @@ class Walks:
         )
 
     def substitute(self, up: Up, task: Callable[[int, Floats], Handle]) -> None:
-        """Do a task of every node that takes what outer unknowns are, and gives those of its children."""
+        """Run a task for every node that uses outer unknowns and returns those for its children."""
         wanted: dict[int, Floats] = {self.tree.root: np.zeros(0)}
 
         def then(node: int, handle: Handle) -> None:
@@ -105,10 +105,10 @@ class Walks:
         self._down(up, lambda node: task(node, wanted[node]), then, "solve")
 
     def invert(self, up: Up, after: str, variance: float | None, datum: InDatum | None) -> None:
-        """Invert from the root down; every node writes what has become of it.
+        """Invert from the root down; every node writes its results.
 
-        What a node has handed down, and what its children have left, stays until all below it is done: they
-        are needed again where a worker is lost.
+        The results of a node and the contributions of its children remain until all descendants are finished.
+        They are needed again if a worker is lost.
         """
         done: dict[int, Handle] = {}
         left = [1 + sum(1 for other in self.nodes if node in self.tree.above(other)) for node in self.nodes]
@@ -120,7 +120,7 @@ class Walks:
             return self.do(inverted, node, up.at, after, variance, above, place, datum)
 
         def then(node: int, handle: Handle) -> None:
-            # Cofactors stay where they are: this asks only whether they are there.
+            # Cofactors remain with the workers; this only tests whether they exist.
             self.found(self.executor.submit(lost, handle))
             if node in done:
                 self.executor.forget([done[node]])
@@ -139,11 +139,11 @@ class Walks:
     def _down(
         self, up: Up, task: Callable[[int], Handle], then: Callable[[int, Handle], None], phase: str
     ) -> None:
-        """Do a task of every node, parents before children.
+        """Run a task for every node, parents before children.
 
-        A node whose factor was lost with its worker is formed again from what its children have left. What a
-        parent has handed down may be lost too, and Dask cannot make it again without that factor: then the
-        parent goes first, and what waits for it after it.
+        A node whose factor was lost is formed again from the contributions of its children. If the result of
+        a parent is also lost, Dask cannot recompute it without that factor. The parent is then processed
+        first, and dependent nodes after it.
         """
         parents = self.tree.parents.tolist()
         waiting: dict[Handle, tuple[int, int]] = {}
@@ -197,19 +197,19 @@ class Walks:
                 begin(each)
 
     def do(self, function: Callable[..., Any], node: int, *given: Any) -> Handle:
-        """Have a task of a node done, where it was last."""
+        """Submit a task for a node to its last worker."""
         near, cost = self._places[node], self._costs[node]
         return self.executor.submit(function, self.job, node, *given, near=near, cost=cost)
 
     def found(self, handle: Handle) -> Any:
-        """Return what a task has given that needs a factor; raises LostFactorError."""
+        """Return the result of a task that needs a factor; LostFactorError if it is lost."""
         found = self.executor.value(handle)
         if isinstance(found, Lost):
             raise LostFactorError(found.number)
         return found
 
     def sums(self, handles: list[Handle], phase: str) -> list[Any]:
-        """Return what tasks of all nodes give, in the order of the nodes, however they arrive."""
+        """Return the results of tasks of all nodes, in the order of the nodes."""
         waiting = dict(zip(handles, self.nodes, strict=True))
         found: dict[int, Any] = {}
         while waiting:
@@ -220,26 +220,26 @@ class Walks:
         return [found[node] for node in self.nodes]
 
     def forget(self, up: Up) -> None:
-        """Give normal equations up."""
+        """Release normal equations."""
         self.executor.forget(list(up.contributions.values()))
 
     def remove(self, state: str) -> None:
-        """Remove a state of all nodes."""
+        """Delete a state of all nodes."""
         for node in self.nodes:
             state_path(self.job.folder, node, state).unlink(missing_ok=True)
 
     def tell(self, phase: str, done: int, total: int, iteration: Iteration | None = None) -> None:
-        """Tell of parts done."""
+        """Call `progress`."""
         if self._progress is not None:
             self._progress(Progress(phase, done, total, iteration))
 
 
 class Reforming:
-    """Nodes that are formed again, one at a time on each worker.
+    """Repeated formation of nodes, one at a time per worker.
 
-    A factor that waits for its task is the first that a worker gives up for another: the next one is formed
-    there when the task is over. `form` has a node formed, and returns the handle of what tells that it is;
-    `places` are the workers of the nodes.
+    A worker removes a waiting factor first if it needs memory, so that the next node is formed only after the
+    task. `form` has a node formed and returns the handle of its completion; `places` are the workers of the
+    nodes.
     """
 
     def __init__(self, form: Callable[[int], Handle], places: list[str]) -> None:
@@ -249,7 +249,7 @@ class Reforming:
         self.handles: dict[Handle, int] = {}
 
     def begin(self, node: int) -> None:
-        """Have a node formed, at once where its worker forms no other one."""
+        """Form a node, immediately if its worker is not forming another one."""
         place = self._places[node]
         if place in self._busy.values():
             self._queues[place].append(node)
@@ -257,7 +257,7 @@ class Reforming:
             self._start(node, place)
 
     def over(self, node: int) -> None:
-        """Have the next one formed where the task of a node, which was formed again perhaps, is over."""
+        """Form the next node after the task of a reformed node is finished."""
         place = self._busy.pop(node, None)
         if place is not None and self._queues[place]:
             self._start(self._queues[place].popleft(), place)

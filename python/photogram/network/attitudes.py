@@ -1,9 +1,9 @@
-"""Attitudes in every representation, with their covariances.
+"""Attitudes of photos in all common representations, with covariances.
 
-An attitude is a matrix A whose columns are the photo's axes in object space: x to the right, y up, z back
-towards the viewer; the camera looks along -z. Whatever numbers a file or a user has for it, they come in by
-:meth:`Attitudes.of`, and go out by :meth:`Attitudes.values` and :meth:`Attitudes.covariances`.
-`docs/conventions.md` has the equations, and a figure for each convention.
+An attitude is a matrix A whose columns are the photo's axes in object space: x right, y up, z back
+towards the viewer. The camera looks along -z. :meth:`Attitudes.of` reads any representation,
+:meth:`Attitudes.values` and :meth:`Attitudes.covariances` convert to any. `docs/conventions.md`
+contains the equations and a diagram of each convention.
 """
 
 from __future__ import annotations
@@ -44,21 +44,21 @@ Representation = Literal[
 Mounting = Literal["top forward", "top right", "top back", "top left"]
 
 _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])  # F: vision axes from photo axes
-_ORTHONORMAL = 1e-6  # What the product of a matrix with its transpose may differ from the identity by
-_LEAST_LENGTH = 1e-100  # Of a quaternion: the square of a shorter one is not a number to divide by
+_ORTHONORMAL = 1e-6  # Tolerance of the elements of A A' - I
+_LEAST_LENGTH = 1e-100  # Minimum length of a quaternion; the square of a smaller one underflows
 
 
 @dataclass(frozen=True, eq=False)
 class Attitudes:
-    """Attitudes of n photos, whatever they were given as.
+    """Attitudes of n photos, independent of the input representation.
 
     Parameters
     ----------
     matrices
         A, (n, 3, 3), photo to object: columns are the photo's axes.
     step_covariances
-        (n, 3, 3) of the rotation step rho about the photo's own axes, A Exp(rho), rad^2; None where they are
-        not known.
+        (n, 3, 3) covariances of the rotation step rho about the photo's own axes, A Exp(rho), rad^2. None if
+        unknown.
 
     Examples
     --------
@@ -92,44 +92,44 @@ class Attitudes:
         *,
         mounting: Mounting | ArrayLike = "top forward",
     ) -> Attitudes:
-        """Attitudes from numbers.
+        """Create attitudes from the numbers of a representation.
 
         Parameters
         ----------
         representation
-            What the numbers are (specified in `docs/conventions.md`); angles in radians:
+            Meaning of the numbers, specified in `docs/conventions.md`; angles in radians:
 
             - "omega_phi_kappa": A = (Mz(kappa) My(phi) Mx(omega))', ground to photo; with
               "_photo_to_ground" A is the product itself;
             - "phi_omega_kappa": A = (Mz(kappa) Mx(omega) My(phi))', in the order phi, omega, kappa;
             - "azimuth_tilt_swing": azimuth of the direction of view clockwise from +Y, tilt from the
               nadir, swing clockwise from the photo's +y to the nadir point;
-            - "yaw_pitch_roll": of an aircraft; yaw clockwise from north, nose up, right wing down; object
+            - "yaw_pitch_roll": yaw of an aircraft clockwise from north, nose up, right wing down; object
               axes are east, north, up;
             - "quaternion": w, x, y, z of A; with "_to_vision" of F A' (COLMAP);
             - "rotation_vector": of A; with "_to_photo" of A' (Bundler, BAL), with "_to_vision" of F A'
               (OpenCV);
             - "matrix": A; with "_to_photo" A', with "_to_vision" F A' (COLMAP, OpenCV), with "_from_vision"
-              A F (Metashape): F turns photo axes into vision axes, x right, y down, z forward.
+              A F (Metashape). F maps photo axes to vision axes, x right, y down, z forward.
         values
-            (n, 3), of quaternions (n, 4), of matrices (n, 3, 3). Quaternions may have any length but zero.
+            (n, 3), quaternions (n, 4), matrices (n, 3, 3). Quaternions may have any length except zero.
         covariances
-            Of the numbers, (n, k, k); of matrices those of the rotation step, (n, 3, 3).
+            (n, k, k) covariances of the numbers; for matrices (n, 3, 3) covariances of the rotation step.
         mounting
-            Of yaw, pitch, roll: how a camera that looks at the nadir has the top of its pictures, or the
-            boresight matrix (3, 3), photo axes from body axes (forward, right, down).
+            For yaw, pitch, roll: direction of the top of the image of a nadir camera, or the boresight
+            matrix (3, 3), photo axes from body axes (forward, right, down).
 
         Raises
         ------
         InputError
-            Other shapes, numbers that are not finite, a matrix that is not orthonormal or mirrored, a
-            quaternion of length zero.
+            If shapes are wrong, numbers are not finite, a matrix is not orthonormal or is mirrored, or a
+            quaternion has length zero.
         """
         one_of("representation", representation, get_args(Representation))
         if representation.startswith("matrix"):
             matrices = shaped("values", values, (length("values", values), 3, 3))
             _check_orthonormal(matrices)
-            # One step of Newton's method for the nearest orthonormal matrix: files hold few digits.
+            # One Newton step to the nearest orthonormal matrix, because files contain few digits.
             matrices = matrices @ (3.0 * np.eye(3) - matrices.transpose(0, 2, 1) @ matrices) / 2.0
             matrices = _FROM[representation](matrices)
             return cls(matrices, None if covariances is None else numbers("covariances", covariances))
@@ -140,7 +140,7 @@ class Attitudes:
             short = np.flatnonzero(np.hypot.reduce(rows, axis=1) < _LEAST_LENGTH)
             if short.size:
                 raise InputError(phrase("attitude.quaternion", row=int(short[0])))
-        # The partials are of the rotation step by the numbers.
+        # Partial derivatives of the rotation step with respect to the numbers.
         matrices, partials = _photocore.attitudes_from_numbers(representation, rows, boresight)
         if covariances is None:
             return cls(matrices)
@@ -151,10 +151,10 @@ class Attitudes:
     def values(
         self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
     ) -> Floats:
-        """Return the numbers of a representation: (n, 3), of quaternions (n, 4), of matrices (n, 3, 3).
+        """Return the numbers of a representation: (n, 3), quaternions (n, 4), matrices (n, 3, 3).
 
-        Where two angles turn about one axis (phi of +-90 degrees, a vertical photo's azimuth and swing), one
-        of them is zero. Of quaternions w is not negative. Arguments are those of :meth:`of`.
+        If two rotation axes coincide (phi of +-90 degrees, azimuth and swing of a vertical photo), one of the
+        angles is zero. Quaternions have w >= 0. Arguments as in :meth:`of`.
         """
         one_of("representation", representation, get_args(Representation))
         if representation == "matrix_to_vision":
@@ -166,14 +166,14 @@ class Attitudes:
     def covariances(
         self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
     ) -> Floats:
-        """Covariances of these numbers, (n, k, k); NaN where two angles turn about one axis.
+        """Return the covariances of :meth:`values`, (n, k, k); NaN if two rotation axes coincide.
 
-        Of matrices: that of the rotation step, (n, 3, 3). Arguments are those of :meth:`of`.
+        For matrices, the covariances (n, 3, 3) refer to the rotation step. Arguments as in :meth:`of`.
 
         Raises
         ------
         InputError
-            Attitudes without covariances.
+            If the covariances of the attitudes are missing.
         """
         one_of("representation", representation, get_args(Representation))
         own = self.step_covariances
@@ -187,17 +187,17 @@ class Attitudes:
     def standard_deviations(
         self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
     ) -> Floats:
-        """Roots of the diagonals of :meth:`covariances`, (n, k)."""
+        """Return the standard deviations, (n, k): roots of the diagonals of :meth:`covariances`."""
         covariances = self.covariances(representation, mounting=mounting)
         return np.asarray(np.sqrt(np.einsum("nii->ni", covariances)))
 
     def translations(self, positions: ArrayLike) -> Floats:
-        """Return t = -R C, (n, 3), of projection centres C: with R = F A' the pose of COLMAP and OpenCV."""
+        """Return t = -R C, (n, 3), for projection centres C; R = F A' as in COLMAP and OpenCV."""
         centres = shaped("positions", positions, (len(self), 3))
         return np.asarray(-np.einsum("nij,nj->ni", self.values("matrix_to_vision"), centres))
 
     def positions(self, translations: ArrayLike) -> Floats:
-        """Projection centres C = -R' t, (n, 3), the inverse of :meth:`translations`."""
+        """Return projection centres C = -R' t, (n, 3), the inverse of :meth:`translations`."""
         shifts = shaped("translations", translations, (len(self), 3))
         return np.asarray(-np.einsum("nji,nj->ni", self.values("matrix_to_vision"), shifts))
 

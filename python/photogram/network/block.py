@@ -1,4 +1,4 @@
-"""The block: photographs, points and image observations, as arrays or as tables."""
+"""Block of photos, points and image observations, built from arrays or tables."""
 
 from __future__ import annotations
 
@@ -46,91 +46,93 @@ from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.methods import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
-_NUMBERS: Any = None  # Names that are not given
-_ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
+_NUMBERS: Any = None  # Default for names that are not specified
+_ANGLES = 1e6  # Radians; larger angles do not have the digits that an attitude needs
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Block(Valued, Brief):
-    """A block of photographs with its measurements and everything known beforehand.
+    """Block of photographs with observations and prior information.
 
     P photos, n points, m image observations. Positions are X, Y, Z in the linear unit of the object space
-    when `spheroid` is None (rectangular space), else longitude (rad, east positive), latitude (rad) and
-    height (linear unit).
+    if `spheroid` is None (rectangular space). Otherwise they are longitude (rad, east positive), latitude
+    (rad) and height (linear unit).
 
-    Arrays are copied and cannot be written: a block, and a result made from it, stay what they are.
-    :meth:`replace` makes another block. Where numbers may be missing they are NaN, or masked.
+    Arrays are copied and read-only, so that a block and its results do not change. :meth:`replace` creates
+    a changed block. Missing numbers are NaN, or masked.
 
     Parameters
     ----------
     photo_ids
-        P names, all different: strings that print, or whole numbers. None: 0, 1, 2 ...
+        P unique names: printable strings, or whole numbers. None: 0, 1, 2 ...
     photo_positions, photo_attitudes
         (P, 3) initial positions, and omega, phi, kappa in radians: M = M_kappa M_phi M_omega (GIANT guide,
-        section 5). Components whose standard deviation is 0 stay at these values. NaN where unknown:
-        :func:`photogram.first_values` finds them.
+        section 5). Components with standard deviation 0 are fixed at these values. NaN if unknown:
+        :func:`photogram.first_values` computes them.
     principal_distances
-        (P,) in millimetres; negative for the positive (diapositive) plane, positive for the negative plane:
-        cameras that are known and free of distortion, image coordinates counted from the principal point.
-        None where there are `cameras`.
+        (P,) in millimetres; negative for the positive (diapositive) plane, positive for the negative plane.
+        The cameras are fixed and free of distortion. Image coordinates refer to the principal point. None if
+        `cameras` are specified.
     point_ids
-        n names, all different; None: 0, 1, 2 ...
+        n unique names; None: 0, 1, 2 ...
     point_positions
-        (n, 3); NaN where unknown: intersected from the initial rays.
+        (n, 3); NaN if unknown: intersected from the initial rays.
     image_photos, image_points
-        (m,) indices into photos and points. A photo has one image of a point: repeated pointings are averaged
-        before.
+        (m,) indices of photos and points. A photo observes a point at most once; average repeated
+        measurements first.
     image_xy, image_sd
         (m, 2) image coordinates and their standard deviations in millimetres, or in the unit of the cameras;
-        `image_sd` may be a number.
+        `image_sd` may be one number.
     photo_position_sd, photo_attitude_sd
         (P, 3) standard deviations of the observed values, in their units: infinite (free, the default), 0
         (fixed) or between (weighted).
     point_sd
-        (n, 3): finite for held components of control, 0 to fix them, infinite (the default) for pass points
-        and unheld components. An unheld component with a finite position is a check on the adjustment.
+        (n, 3): finite for components of control points (0 fixes them), infinite (the default) for pass
+        points and free components. A free component with a finite position is a check on the adjustment.
     point_check_sd
-        (n, 3) standard deviations of the given coordinates of check points: no part of the adjustment, but of
-        what differences are tested against. NaN where unknown (None: everywhere): as of control.
+        (n, 3) standard deviations of the given coordinates of check points. They do not affect the
+        adjustment, only tests of differences. NaN if unknown (None: all): the median of control is assumed.
     spheroid
         None for rectangular space, else the ellipsoid of geographic space.
     photo_to_ground
-        The sense of the attitude angles: False (ground-to-photo) turns object vectors into photo vectors.
+        Direction of the attitude angles: False (ground-to-photo) rotates object vectors into photo vectors.
     title
         One line for the report.
     linear_unit
-        The linear unit of the object space, for the report; "m" or "ft" where there is refraction.
+        Linear unit of the object space, for the report; must be "m" or "ft" if there is refraction.
     refraction
-        What bends the rays, applied in every iteration; None for image coordinates that are free of it.
+        Refraction model, applied in every iteration; None for image coordinates without refraction.
     photo_positions_observed, photo_attitudes_observed
-        (P, 3) observed values of the weighted components, as of GNSS and inertial measurements: the
-        adjustment starts at the initial values and weights these. Whole turns of angles do not matter. NaN,
-        or any number, where a component is free; the fixed value where it is fixed. None: the initial values.
+        (P, 3) observed values of the weighted components, e.g. GNSS and inertial measurements. The
+        adjustment starts at the initial values. Angles may differ by full circles. NaN or any number for
+        free components, the fixed value for fixed ones. None: the initial values.
     observations
-        What else was observed: distances, differences of coordinates, heights, positions and attitudes of
+        Additional observations: distances, differences of coordinates, heights, positions and attitudes of
         photos, relative poses, control with full covariance (:mod:`photogram.network`).
     cameras
-        Cameras with distortion, or with unknown parameters, all of one image unit; in place of
+        Cameras with distortion or unknown parameters, all of one image unit. They replace
         `principal_distances`.
     photo_cameras
-        (P,) which camera each photo has: an index, or its name; photos with the same one share its unknowns.
-        One for all photos; None where there is one camera, or one for each photo.
+        (P,) camera of each photo: an index, or its name. Photos of one camera share its unknowns. One value
+        applies to all photos. None if there is one camera, or one for each photo.
     mounts
-        Which photos are on a frame with others, and in which pose (:class:`photogram.network.Mount`).
+        Photos mounted on a common frame, with relative poses (:class:`photogram.network.Mount`).
     timed
         Photos on trajectories: rolling shutters, line scanners (:class:`photogram.network.Timed`).
     passages
-        What images pass beside pose, point and camera: boards that bend (:class:`photogram.network.Figure`).
+        Image transformations in addition to pose, point and camera, e.g. boards that bend
+        (:class:`photogram.network.Figure`).
     frame
-        Where on the earth the coordinates are, for maps and other systems; the adjustment does not ask.
+        Reference frame of the coordinates, for maps and transformations; not used by the adjustment.
 
     Raises
     ------
     InputError
-        Arrays of the wrong shape or type, values that are not finite or masked, indices out of range, names
-        that repeat, are empty or are no names, a point with two images on a photo; refraction in a linear
-        unit whose length is not known; observations of points or photos that are not there; both
-        principal distances and cameras, or neither.
+        If an array has a wrong shape or type, a value is not finite or is masked, or an index is invalid.
+        If a name is repeated, empty or not printable, or a photo observes a point twice.
+        If refraction is combined with a linear unit of unknown length.
+        If an observation refers to an unknown point or photo.
+        If both or neither of principal distances and cameras are specified.
     """
 
     photo_ids: list[str] = _NUMBERS
@@ -162,9 +164,9 @@ class Block(Valued, Brief):
     frame: Frame = field(default_factory=Frame)
     point_check_sd: Floats | None = None
     rejected_points = frozenset[str]()
-    """Names of points whose image observations were all rejected; no field, but every copy has them."""
+    """Points whose image observations were all rejected; copied with the block, but not a field."""
     if TYPE_CHECKING:
-        # What checkers of types are told: more can be given than what the fields then hold.
+        # Signature for type checkers: arguments accept more types than the fields.
         def __init__(
             self,
             *,
@@ -205,7 +207,7 @@ class Block(Valued, Brief):
         object.__setattr__(self, name, value)
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what the block is in a few lines, as its `repr` and notebooks show it."""
+        """Return a short summary of the block, as shown by its `repr` and in notebooks."""
         held, known = np.isfinite(self.point_sd).any(axis=1), np.isfinite(self.point_positions).any(axis=1)
         counts = {"control": held.sum(), "with known coordinates": (known & ~held).sum()}
         kinds_of_points = ", ".join(f"{count:,} {name}" for name, count in counts.items())
@@ -222,7 +224,7 @@ class Block(Valued, Brief):
             ("unit", self.linear_unit),
         ]
         if kinds:
-            # A kind of smoothness says how many coefficients of what it is of.
+            # The label of smoothness observations contains the number of coefficients.
             named = (f"{count} {name.replace(', ', ' of ')}" for name, count in kinds.items())
             rows.append(("observations", ", ".join(named)))
         if self.mounts:
@@ -240,24 +242,24 @@ class Block(Valued, Brief):
 
     @property
     def trajectories(self) -> list[Trajectory]:
-        """The trajectory of each of `timed`: what it is given, or its own."""
+        """Trajectory of each entry of `timed`: the given one, or its own."""
         own: list[Trajectory] = vars(self)["_trajectories"]
         return own
 
     @property
     def all_trajectories(self) -> list[Trajectory]:
-        """Those of photos, then those of records, each once."""
+        """Trajectories of photos, then of observations, each once."""
         return all_trajectories(self.trajectories, self.observations)
 
     @property
     def all_passages(self) -> list[Passage]:
-        """What images pass: `passages`, then the splines of cameras with unknown knots."""
+        """Image transformations: `passages`, then the splines of cameras with unknown knots."""
         splined = [(row, each.knot_unknowns) for row, each in enumerate(self.cameras) if each.knot_unknowns]
         return [*self.passages, *(Knots(row, knots) for row, knots in splined)]
 
     @cached_property
     def unknowns(self) -> list[Unknown]:
-        """What observations, and photos on frames or trajectories, have in common, in order."""
+        """Unknowns shared by observations, mounted photos and trajectories, in order."""
         of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
         sensors = [mount.sensor for mount in self.mounts]
         sensors += [each.sensor for each in self.timed if each.sensor is not None]
@@ -269,29 +271,29 @@ class Block(Valued, Brief):
 
     @cached_property
     def observation_groups(self) -> list[tuple[list[int], Group]]:
-        """The observations kind by kind: their rows, and what the core takes."""
+        """Observations by type: their rows, and their arrays for the core."""
         return observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
     @property
     def image_unit(self) -> str:
-        """What image coordinates are measured in, `mm` or `px`; of scanned films what readings are."""
+        """Unit of image coordinates, `mm` or `px`; for scanned films, the unit of readings."""
         if self.passages and reads_pixels(self.passages):
             return "px"
         return str(self.cameras[0].unit) if self.cameras else "mm"
 
     @property
     def camera_names(self) -> list[str]:
-        """What reports call the cameras: their names, numbers for those without."""
+        """Camera names in reports; unnamed cameras are numbered."""
         return [each.name or f"camera {row}" for row, each in enumerate(self.cameras, 1)]
 
     def camera_scales(self) -> Floats:
-        """Return (P,) principal distances without sign, in the unit of image coordinates."""
+        """Return (P,) absolute principal distances in the unit of image coordinates."""
         if self.principal_distances is not None:
             return np.abs(self.principal_distances)
         return np.array([each.scale for each in self.cameras])[self.photo_cameras]
 
     def core_cameras(self) -> tuple[list[CameraRow], Indices]:
-        """Return the different cameras as the core takes them, and (P,) which one each photo has."""
+        """Return the different cameras as rows for the core, and (P,) the row of each photo."""
         if self.photo_cameras is not None:
             return camera_rows(self.cameras), self.photo_cameras
         distances = self.known_distances("the adjustment").tolist()
@@ -300,12 +302,12 @@ class Block(Valued, Brief):
         return rows, np.array([places[distance] for distance in distances], dtype=np.int64)
 
     def known_distances(self, what: str) -> Floats:
-        """Return (P,) principal distances of cameras that are known and free of distortion, millimetres.
+        """Return (P,) principal distances of fixed cameras without distortion, millimetres.
 
         Raises
         ------
         InputError
-            There are others, which `what` does not take.
+            If there are other cameras, which `what` does not support.
         """
         if self.principal_distances is not None:
             return self.principal_distances
@@ -331,35 +333,35 @@ class Block(Valued, Brief):
         linear_unit: str = "m",
         refraction: Refraction | None = None,
     ) -> Block:
-        """Build a block from tables: pandas or polars data frames, or any mapping of column names to columns.
+        """Build a block from tables: data frames (pandas, polars) or mappings of names to columns.
 
         Parameters
         ----------
         photos
-            `photo` (without it 0, 1, 2 ...); `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` when
-            a spheroid is given); `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm` or,
-            with cameras, `camera` (index or name), and before any of the six names `sd_` (same units) and
-            `observed_`, the observed value where it is not the initial one.
+            `photo` (default 0, 1, 2 ...); `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` if a
+            spheroid is given); `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm` or,
+            with cameras, `camera` (index or name). The six names may have the prefixes `sd_` (same units) and
+            `observed_` (observed value, if it differs from the initial one).
         images
             `photo`, `point`, `x_mm`, `y_mm`. Optional: `sd_x_mm`, `sd_y_mm`. With cameras in pixels all four
             end in `_px`.
         points
-            Control and check points: `point` and the three coordinates as for photos; NaN where unknown.
-            Optional: `sd_` columns; without them, or where they are infinite or NaN, components are not held.
-            Image points without a row here are pass points.
+            Control and check points: `point` and the three coordinates as for photos; NaN if unknown.
+            Optional: `sd_` columns. Components are free if their standard deviation is missing, infinite or
+            NaN. Image points without a row here are pass points.
         principal_distance
-            Millimetres, signed, for all photos, when the column is not there.
+            Millimetres, signed, for all photos, if the column is missing.
         cameras
-            As in the class, in place of principal distances.
+            As in the class; replaces principal distances.
         image_sd
-            For image coordinates without a column of their own: 0.010 mm when None, which pixels are not.
+            Standard deviation of image coordinates without `sd_` columns. None: 0.010 mm (not for pixels).
         spheroid, photo_to_ground, title, linear_unit, refraction
             As in the class.
 
         Raises
         ------
         InputError
-            A column that is missing, a photo that `photos` does not name, or whatever the class refuses.
+            If a column is missing, an image refers to an unknown photo, or the class rejects a value.
         """
         return cls(
             **table_arguments(photos, images, points, principal_distance, cameras, image_sd, spheroid),
@@ -371,14 +373,14 @@ class Block(Valued, Brief):
         )
 
     def replace(self, **changes: Any) -> Self:
-        """Return a block with some fields replaced, checked anew; the arrays of the others are shared.
+        """Return a validated block with some fields replaced; other arrays are shared.
 
-        With another number of points `point_check_sd` is not kept, unless it is replaced too.
+        `point_check_sd` is dropped if the number of points changes, unless it is replaced as well.
 
         Raises
         ------
         InputError
-            A name that is no field, or whatever the class refuses.
+            If a name is not a field, or the class rejects a value.
         """
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         if unknown := sorted(changes.keys() - values.keys()):
@@ -391,12 +393,12 @@ class Block(Valued, Brief):
         return own
 
     def with_fixed_photos(self) -> Self:
-        """Return the block with positions and attitudes that stay as they are: every point by itself.
+        """Return the block with fixed photo poses, so that points are independent.
 
         Raises
         ------
         InputError
-            Photos or observations on trajectories.
+            If photos or observations are on trajectories.
         """
         refuse_trajectories(self, "fixed photos")
         return self.replace(
@@ -407,13 +409,13 @@ class Block(Valued, Brief):
         )
 
     def in_frame(self, frame: Frame) -> Self:
-        """Return the block with another frame; the coordinates are the same."""
+        """Return the block with another reference frame; the coordinates do not change."""
         own = copy.copy(self)
         own._set("frame", frame)
         return own
 
     def kept(self) -> Self:
-        """Return the block as a result keeps it: with lists of names of its own, the arrays shared."""
+        """Return a copy for a result, with its own lists of names and shared arrays."""
         own = copy.copy(self)
         own._set("photo_ids", list(self.photo_ids))
         own._set("point_ids", list(self.point_ids))
@@ -421,13 +423,13 @@ class Block(Valued, Brief):
 
 
 def _span(values: Floats) -> str:
-    """Return a number that stands for all, or the least and the largest."""
+    """Format the range of some values; a single number if they are equal."""
     low, high = (float(values.min()), float(values.max())) if values.size else (math.nan, math.nan)
     return f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
 
 
 def flown_by(block: Block) -> Phrase | None:
-    """Return the message on the first photo or observation that is on a trajectory."""
+    """Return the message about the first photo or observation on a trajectory."""
     if block.timed:
         return phrase("block.moving.photo", photo=block.timed[0].photo)
     records = moments(block.observations)
@@ -435,7 +437,7 @@ def flown_by(block: Block) -> Phrase | None:
 
 
 def of_images_alone(block: Block, what: str) -> Block:
-    """Return a block with images only; refuse others for a function that does not support them."""
+    """Return a block with image observations only; reject others."""
     refuse_trajectories(block, what)
     refuse_passages(block, what)
     if block.observations:
@@ -446,19 +448,19 @@ def of_images_alone(block: Block, what: str) -> Block:
 
 
 def refuse_trajectories(block: Block, what: str) -> None:
-    """Refuse a block with photos or observations on trajectories."""
+    """Reject a block with photos or observations on trajectories."""
     if moving := flown_by(block):
         raise unsupported(what, "trajectories", reason=moving)
 
 
 def refuse_passages(block: Block, what: str, *, but: type[Passage] | tuple[()] = ()) -> None:
-    """Refuse a block whose images depend on more than pose, point and camera, `but` on objects of a kind."""
+    """Reject image transformations that are not of the type `but`."""
     if passages := [each for each in block.all_passages if not isinstance(each, but)]:
         raise unsupported(what, "passage", kind=passages[0].KIND)
 
 
 def checked(block: Block) -> Block:
-    """Return a block whose photos have positions and attitudes; refuse all else, by name."""
+    """Return a block in which all photo poses are known; reject all others by name."""
     require_block(block)
     if (unknown := ~known_poses(block)).any():
         photos = [block.photo_ids[row] for row in np.flatnonzero(unknown)]
@@ -467,11 +469,11 @@ def checked(block: Block) -> Block:
 
 
 def require_block(block: object) -> None:
-    """Refuse an argument that is not a block."""
+    """Reject an argument that is not a block."""
     if not isinstance(block, Block):
         raise kind_error("block", "a Block", block)
 
 
 def position_columns(block: Block) -> tuple[str, str, str]:
-    """Names of the three columns of positions in tables."""
+    """Return the names of the three columns of positions in tables."""
     return GEOGRAPHIC_COLUMNS if block.geographic else RECTANGULAR_COLUMNS

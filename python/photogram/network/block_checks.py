@@ -1,4 +1,4 @@
-"""Checks of a block: arrays with their rules, and parts that must agree with each other."""
+"""Validation of blocks: rules for arrays, and consistency of their parts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram import Block
 
-_ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
+_ANGLES = 1e6  # Radians; larger angles do not have the digits that an attitude needs
 RULES: dict[str, Callable[[Floats], Bools]] = {
     "finite": np.isfinite,
     "not-infinite": lambda values: ~np.isinf(values),
@@ -128,7 +128,7 @@ def _check_observed(block: Block) -> None:
 
 
 def _check_repeated(block: Block) -> None:
-    """Refuse a second image of a point on a photo: it would count as an independent observation."""
+    """Reject repeated image observations, which would count as independent."""
     again = repeated_pairs(block.image_photos, block.image_points, len(block.point_ids))
     if again.size:
         second = int(again[0])
@@ -161,7 +161,7 @@ def _check_observations(block: Block) -> None:
     block._set("passages", checked_passages(block.passages, block.point_ids, block.photo_ids))
     block._set("observations", with_smoothness(block.observations, block.trajectories))
     block._set("observations", with_knots(block.observations, block.cameras))
-    _ = block.observation_groups  # refuses observations of other points and photos
+    _ = block.observation_groups  # rejects observations of other points and photos
     figures = {
         name: each.title for each in block.passages if isinstance(each, Figure) for name in each.points
     }
@@ -174,7 +174,7 @@ def _check_observations(block: Block) -> None:
 
 
 def _check_free_poses(block: Block, photos: list[str], rule: str) -> None:
-    """Refuse standard deviations of poses that are no unknowns."""
+    """Reject standard deviations of poses that are not unknowns."""
     if photos:
         rows = np.isin(block.photo_ids, photos)[:, np.newaxis]
         for name in ("photo_position_sd", "photo_attitude_sd"):
@@ -207,9 +207,9 @@ def _check_timed(block: Block) -> None:
 
 
 def _check_motions(block: Block) -> None:
-    """Refuse motions of photos at rest, and observed poses of scanners without a time."""
+    """Reject motions of photos at rest, and observed poses of scanners without a time."""
     sensors = {each.photo: each.sensor for each in block.timed}
-    # The middle of the images of a scanner changes if one is left out.
+    # The mean time of a scanner's images changes if one image is removed.
     without_time = {each.photo for each in block.timed if each.lines is not None and each.time is None}
     for each in block.observations:
         if each.moment is not None:
@@ -225,7 +225,7 @@ def _check_motions(block: Block) -> None:
 
 
 def known_poses(block: Block) -> Bools:
-    """Return (P,) photos with positions and attitudes."""
+    """Return (P,) whether the pose of each photo is known."""
     poses = np.hstack([block.photo_positions, block.photo_attitudes])
     return np.asarray(np.isfinite(poses).all(axis=1))
 

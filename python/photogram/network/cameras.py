@@ -1,4 +1,4 @@
-"""Cameras: a model with its parameters, known, weighted or unknown, shared by photos."""
+"""Cameras: a model with fixed, weighted or free parameters, shared by photos."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
 
 Weights = Literal["corrected", "measured"]
-"""Of a backward camera: what the standard deviations of images are those of."""
+"""Residual space of a backward camera: corrected or measured image coordinates."""
 
-_MEASURED = "_measured"  # What the core calls backward cameras whose residuals lie in the measured image
+_MEASURED = "_measured"  # Suffix in the core for backward cameras with residuals in the measured image
 
-ImageUnit = Literal["mm", "px"]  # What image coordinates are measured in
+ImageUnit = Literal["mm", "px"]  # Unit of image coordinates
 
 CameraRow = tuple[str, list[float], list[float], list[float] | None, list[float] | None]
-"""Model, parameters, their standard deviations, the covariance matrix of those that are weighted, row by row,
-where these are correlated, and the knots, where there are any: as the core takes a camera."""
+"""Core row of a camera: model, parameters, standard deviations, covariance matrix of the weighted parameters
+row by row (None if uncorrelated), and knots (None without knots)."""
 
 _SPLINE = ("order", "nx", "ny", "fov_x_deg")
 _GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta", "hx", "hy", *_SPLINE})
-"""Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras. Where w and h
-are given, cx and cy are counted from the middle of the picture, and may be missing."""
+"""Required parameters; all others default to 0. With w and h, cx and cy are counted from the image centre and
+may be missing."""
 
 
 @cache
@@ -53,51 +53,50 @@ def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str, str]]:
 
 @cache
 def _names() -> tuple[str, ...]:
-    """Return the models; not those that are a model with weights of its own."""
+    """Return the model names, without variants for weights."""
     return tuple(name for name in _photocore.CAMERAS if not name.endswith(_MEASURED))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Camera(Valued, Brief):
-    """A camera of one photo or of many.
+    """Camera model with parameters, shared by one photo or many.
 
     Parameters
     ----------
     model
-        The name of its model (`docs/cameras.md`): `perspective`, `brown`, `opencv`, ...
+        Name of the model (`docs/cameras.md`): `perspective`, `brown`, `opencv`, ...
     parameters
-        Values by the model's names; lens terms, principal points `xp`, `yp` and `r0` that are missing are 0.
-        Lengths are in the unit of image coordinates, the rest as the model says.
+        Values by parameter name; missing lens terms, principal points `xp`, `yp` and `r0` are 0. Lengths are
+        in the unit of image coordinates, other units depend on the model.
     sd
-        Standard deviations by the same names, or one for all that may be unknown: infinite (free: the value
-        is where the adjustment starts from), 0 (held; so are all that are missing) or between (weighted: the
-        value is an observation).
+        Standard deviations by parameter name, or one for all parameters that may be unknown. Infinite: free,
+        the value is the initial one. 0 or missing: fixed. Between: weighted, the value is an observation.
     name
-        For reports; a block numbers cameras without one.
+        Name in reports; a block numbers cameras without a name.
     unit
-        Of image coordinates, `mm` or `px`. None: `px` where the model has a focal length `f` or `fx`, `mm`
-        where it has a principal distance `c`.
+        Unit of image coordinates, `mm` or `px`. None: `px` for models with a focal length `f` or `fx`, `mm`
+        for models with a principal distance `c`.
     covariance
-        Names of parameters that were observed together, as by a calibration of its own, and their (w, w)
-        covariance matrix; they need not stand in `sd`.
+        Names of jointly observed parameters, e.g. from a separate calibration, and their (w, w) covariance
+        matrix. The names may be missing in `sd`.
     weights
-        Of a backward model. `corrected`: standard deviations of images are those of the corrected position,
-        where residuals are. `measured`: they are those of what was measured, and residuals are what was
-        measured less the image of the point. Forward models are `measured` by nature, and take the default.
+        Residual space of a backward model. `corrected`: standard deviations and residuals refer to corrected
+        positions. `measured`: they refer to measured positions, and residuals are measured minus computed.
+        Forward models are always `measured` and accept the default only.
     knots
-        Of `splined_stereographic`: (ny, nx, 2) displacements dx, dy at the knots, rows by rows, in units of
+        For `splined_stereographic`: (ny, nx, 2) displacements dx, dy at the knots, row by row, in units of
         the stereographic image; None for 0.
     knot_sd
-        Their standard deviations along and across the radius from the middle, as those of parameters: one
-        for all, (2,), or (ny, nx, 2) radial and tangential.
+        Standard deviations of the knots along and across the radius from the centre: one for all, (2,), or
+        (ny, nx, 2) radial and tangential.
 
     Raises
     ------
     InputError
-        A model or a parameter that there is not, a principal distance that is missing or zero, values that
-        are not finite, negative standard deviations, a constant of the model that is not held, a matrix
-        that is not symmetric and positive definite or contradicts `sd`, knots of another shape or of a model
-        without them.
+        If the model or a parameter does not exist, or a principal distance is missing or zero.
+        If a value is not finite, a standard deviation is negative, or a constant of the model is not fixed.
+        If a matrix is not symmetric positive definite or contradicts `sd`.
+        If knots have another shape or do not belong to the model.
     """
 
     model: str
@@ -144,7 +143,7 @@ class Camera(Valued, Brief):
         object.__setattr__(self, name, value)
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what the camera is in a few lines, as its `repr` and notebooks show it."""
+        """Return a short summary of the camera, as shown by its `repr` and in notebooks."""
         title = f"Camera {self.name}: {self.model}" if self.name else f"Camera: {self.model}"
         rows = []
         for name, value, sd in zip(self.names, self.values, self.deviations, strict=True):
@@ -160,38 +159,38 @@ class Camera(Valued, Brief):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The k parameters of the model, in their order."""
+        """Names of the k parameters, in the order of the model."""
         return tuple(name for name, _ in self._facts[1])
 
     @property
     def knot_names(self) -> tuple[str, ...]:
-        """`dx_i_j`, `dy_i_j` of each knot, row by row, i along columns from 0; none without knots."""
+        """Names `dx_i_j`, `dy_i_j` of the knots, row by row, column i from 0; may be empty."""
         return knot_names(self.knots)
 
     @cached_property
     def knot_unknowns(self) -> tuple[Knot, ...]:
-        """The knots as unknowns of a block, row by row; none where they are held."""
+        """Knots as unknowns of a block, row by row; empty if they are fixed."""
         return knot_unknowns(self.title, self.knots, self.knot_sd)
 
     @property
     def powers(self) -> dict[str, int]:
-        """Which power of the unit of image coordinates each parameter has."""
+        """Power of the unit of image coordinates in the unit of each parameter."""
         return dict(self._facts[1])
 
     @property
     def constants(self) -> frozenset[str]:
-        """Parameters that are never unknown."""
+        """Parameters that are always fixed."""
         names, count = self.names, self._facts[2]
         return frozenset(names[len(names) - count :])
 
     @property
     def direction(self) -> str:
-        """What lens terms are functions of: `forward` ideal coordinates, `backward` measured ones."""
+        """Argument of the lens terms: ideal coordinates (`forward`) or measured (`backward`)."""
         return self._facts[3]
 
     @property
     def image_y(self) -> str:
-        """Where image coordinates count to: `down` as rows of pixels, or `up`."""
+        """Direction in which image y increases: `down` as pixel rows, or `up`."""
         return self._facts[4]
 
     @property
@@ -200,12 +199,12 @@ class Camera(Valued, Brief):
 
     @property
     def values(self) -> Floats:
-        """(k,) the parameters in the order of the model."""
+        """(k,) parameter values in the order of the model."""
         return np.array([self.parameters[name] for name in self.names])
 
     @property
     def deviations(self) -> Floats:
-        """(k,) their standard deviations: infinite free, 0 held."""
+        """(k,) standard deviations in the order of the model: infinite is free, 0 is fixed."""
         return np.array([self._sd[name] for name in self.names])
 
     @property
@@ -214,29 +213,29 @@ class Camera(Valued, Brief):
 
     @property
     def is_held(self) -> bool:
-        """Whether all parameters are known."""
+        """Whether all parameters and knots are fixed."""
         return not self.deviations.any() and not np.any(self.knot_sd)
 
     @property
     def scale(self) -> float:
-        """What a small angle near the axis is multiplied by: the principal distance, without sign."""
+        """Image scale near the axis: the absolute principal distance."""
         for name in ("c", "f", "fx"):
             if name in self.parameters:
                 return abs(self.parameters[name])
         return abs(self.parameters["w"]) / math.tau
 
     def unit_of(self, name: str) -> str:
-        """Return the unit of a parameter; nothing for a plain number."""
+        """Return the unit of a parameter; empty for a dimensionless number."""
         power = dict(self._facts[1])[name]
         return "" if power == 0 else f"{self.unit}" if power == 1 else f"{self.unit}^{power}"
 
     @property
     def title(self) -> str:
-        """What reports call it."""
+        """Name of the camera in reports."""
         return self.name or self.model
 
     def replace(self, **changes: Any) -> Self:
-        """Return the camera with some fields replaced, checked anew."""
+        """Return a validated camera with some fields replaced."""
         return replace(self, **changes)
 
     def _named(self, what: str, given: object) -> dict[str, float]:
@@ -299,7 +298,7 @@ class Camera(Valued, Brief):
 
     @property
     def prior_covariance(self) -> Floats | None:
-        """Covariance matrix of all weighted parameters, in their order; None where none are correlated."""
+        """Covariance matrix of all weighted parameters, in order; None if uncorrelated."""
         if self.covariance is None:
             return None
         names, matrix = self.covariance
@@ -311,28 +310,28 @@ class Camera(Valued, Brief):
         return whole
 
     def project(self, u: ArrayLike) -> Floats:
-        """Return the images of directions.
+        """Project directions into the image.
 
         Parameters
         ----------
         u
             (n, 3) points or directions in the axes of the photo: x right, y up, z back towards the viewer;
-            what is visible has u3 < 0. Only the direction counts.
+            visible points have u3 < 0. Only the direction counts.
 
         Returns
         -------
-        (n, 2) image coordinates in the unit of the camera; NaN or infinite where there are none.
+        (n, 2) image coordinates in the unit of the camera; NaN or infinite if undefined.
 
         Raises
         ------
         InputError
-            Another shape, or what is no number.
+            If the shape is wrong or a value is not a number.
         """
         given = shaped("u", u, (len(np.atleast_1d(np.asarray(u))), 3), missing=True)
         return _photocore.camera_images(self.model, self.values, given, self.knots)
 
     def rays(self, xy: ArrayLike) -> Floats:
-        """Return the directions of image positions.
+        """Compute the directions of image positions.
 
         Parameters
         ----------
@@ -341,18 +340,18 @@ class Camera(Valued, Brief):
 
         Returns
         -------
-        (n, 3) unit vectors in the axes of the photo, in front of it; NaN where no direction has the image.
+        (n, 3) unit vectors in the axes of the photo, in front of it; NaN if no direction has the image.
 
         Raises
         ------
         InputError
-            Another shape, or what is no number.
+            If the shape is wrong or a value is not a number.
         """
         given = shaped("xy", xy, (len(np.atleast_1d(np.asarray(xy))), 2), missing=True)
         return _photocore.camera_rays(self.model, self.values, given, self.knots)
 
     def partials(self, u: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Return the images of directions with their partials.
+        """Project directions into the image, with partial derivatives.
 
         Parameters
         ----------
@@ -361,14 +360,14 @@ class Camera(Valued, Brief):
 
         Returns
         -------
-        (n, 2) images, (n, 2, 3) partials by u, and (n, 2, k) by the parameters, behind them those by the
-        knots, in the order of `names` and `knot_names`; not finite where there are none. Those by constants
-        are 0 or without meaning.
+        (n, 2) images, (n, 2, 3) partial derivatives by u, and (n, 2, k) by the parameters and then the
+        knots, in the order of `names` and `knot_names`. Undefined values are not finite. Derivatives by
+        constants are 0 or meaningless.
 
         Raises
         ------
         InputError
-            Another shape, or what is no number.
+            If the shape is wrong or a value is not a number.
         """
         given = shaped("u", u, (len(np.atleast_1d(np.asarray(u))), 3), missing=True)
         images, by_u, own = _photocore.camera_partials(self.model, self.values, given, self.knots)
@@ -383,7 +382,7 @@ class Camera(Valued, Brief):
 
 
 def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> Floats:
-    """Return (m, 2) images of (m, 3) directions, as for :meth:`Camera.project`, each by its camera's row."""
+    """Project (m, 3) directions, each with the camera of its row; (m, 2) as :meth:`Camera.project`."""
     images = np.full((len(directions), 2), np.nan)
     for row, camera in enumerate(cameras):
         own = which == row
@@ -392,7 +391,7 @@ def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> 
 
 
 def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:
-    """Return cameras as the core takes them."""
+    """Convert cameras to rows for the core."""
     return [
         (
             each.model + (_MEASURED if each.weights == "measured" else ""),
@@ -406,6 +405,6 @@ def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:
 
 
 def rays_of_row(row: CameraRow, xy: Floats) -> Floats:
-    """Return (n, 3) the directions of image positions (n, 2), as :meth:`Camera.rays` has them."""
+    """Compute (n, 3) directions of image positions (n, 2), as :meth:`Camera.rays`."""
     model, parameters, _, _, knots = row
     return _photocore.camera_rays(model, np.array(parameters), xy, None if knots is None else np.array(knots))

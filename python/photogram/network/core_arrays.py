@@ -1,4 +1,4 @@
-"""A block as the core takes it."""
+"""Conversion of a block to the arrays of the core."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from photogram.network.unknowns import Unknown
 CoreNetwork = _photocore.BlockNetwork | _photocore.CollectionNetwork
 
 TimedRow = tuple[int, int, float, int | None, int | None]
-"""Indices of a photo and a trajectory, the time there, indices of rate and offset among the unknowns."""
+"""Indices of photo and trajectory, time, and indices of the unknown rate and offset."""
 
 
 @dataclass(frozen=True)
 class CoreOptions:
-    """How the core adjusts a network: the options of :func:`photogram.adjust` as it knows them.
+    """Options of :func:`photogram.adjust` for the core.
 
-    The criterion of a collection is `decrease`: the fraction by which a step must lower what is minimised.
-    With `points_given` points start from their given coordinates where these are known, not from the
-    intersection of their rays: of a block that starts where another adjustment has ended.
+    The criterion of a collection is `decrease`: the minimum relative decrease of the objective function in a
+    step. `points_given` starts points at their given coordinates, if known, instead of the intersection of
+    their rays. It is used for a block that continues another adjustment.
     """
 
     criterion: str
@@ -48,10 +48,9 @@ class CoreOptions:
 def block_network(
     block: Block, options: CoreOptions, further: Sequence[Unknown] = ()
 ) -> _photocore.BlockNetwork:
-    """Return a block as the core adjusts it, and answers questions about it afterwards.
+    """Create the core network that adjusts a block and evaluates it afterwards.
 
-    `further` are common unknowns of a larger block, of which this one is a part that does not observe them;
-    they stand behind its own.
+    `further` are shared unknowns of a larger block that this part does not observe. They follow its own.
     """
     unknowns = [*block.unknowns, *further]
     flown, image_xy, records = _flown(block, unknowns)
@@ -59,7 +58,7 @@ def block_network(
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
     known = np.zeros_like(records)
     if len(records):
-        # They have a camera of their own, and are known but for their trajectory.
+        # Records have a camera of their own, and only their trajectory is unknown.
         cameras = [*cameras, ("perspective", [-1.0], [0.0], None, None)]
         photo_cameras = np.append(photo_cameras, np.full(len(records), len(cameras) - 1))
     return _photocore.block_network(
@@ -92,10 +91,9 @@ def block_network(
 
 
 def _flown(block: Block, unknowns: Sequence[Unknown]) -> tuple[dict[str, Any], Floats, Floats]:
-    """Return what the core is given of the trajectories of a block, whose common unknowns are these.
+    """Return trajectory arguments, focal-plane images (m, 2) and record positions (r, 3).
 
-    Its arguments; (m, 2) image coordinates in the focal plane; (r, 3) where records are about. These follow
-    the photos of the block.
+    Records follow the photos of the block.
     """
     records = moments(block.observations)
     if not block.timed and not records:
@@ -119,7 +117,7 @@ def _flown(block: Block, unknowns: Sequence[Unknown]) -> tuple[dict[str, Any], F
 
 
 def _about(block: Block, moment: Moment) -> Floats:
-    """Return where a record is about, in the object space: the core asks for no more than a place."""
+    """Return an approximate position of a record in object space, which is all the core needs."""
     if block.geographic:
         return np.nanmean(block.photo_positions, axis=0) if len(block.photo_ids) else np.zeros(3)
     table = moment.trajectory.table
@@ -127,12 +125,11 @@ def _about(block: Block, moment: Moment) -> Floats:
 
 
 def _and(photos: Floats, records: Floats) -> Floats:
-    """Return rows of photos, then those of records."""
     return np.vstack([photos, records]) if len(records) else photos
 
 
 def fits_anywhere(block: Block) -> bool:
-    """Whether a block is so small that asking how much memory there is would take longer than it needs.
+    """Return whether a block is too small for a useful check of the available memory.
 
     A full factor of 100 photos takes 3 MB, and 10,000 image points with all their results 10 MB.
     """

@@ -1,4 +1,4 @@
-"""Datums of free networks: what is held, or what stays nearest to its given place (docs/datum.md)."""
+"""Datums of free networks: minimum and inner constraints (docs/datum.md)."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ __all__ = [
 ]
 
 DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
-"""`inner` or `relative`, points, photos, whether scale counts, photos whose attitudes count, the radius."""
+"""`inner` or `relative`, points, photos, use of scale, photos with attitudes, radius."""
 
 
 @dataclass(frozen=True)
 class InnerConstraints:
-    """Chosen points and photos together are as near as they come to their given places (Meissl 1969).
+    """Inner constraints: minimal distance of selected points and photos from given positions.
 
-    Of all datums that the same points and photos carry, this one gives them the least sum of variances. What
-    has no given place is compared with the place where it started from.
+    Of all datums defined by the same points and photos, this one has the least sum of variances (Meissl
+    1969). If a given position is missing, the initial one is used.
 
     Parameters
     ----------
     points
-        Names of points; None for all that take part.
+        Names of points; None for all that are adjusted.
     photos
-        Names of photos, whose positions count; None for all. None that are on trajectories.
+        Names of photos whose positions count; None for all. Photos on trajectories are not allowed.
     scale
-        Whether scale is taken from them, too, where nothing else gives one. Otherwise it stays as it is held.
+        Whether these points and photos also define the scale, if nothing else does. Default True.
     attitudes
-        Names of photos whose attitudes count: a turn about an axis of the photo, times `radius`; None for
-        all.
+        Names of photos whose attitudes count: a rotation about an axis of the photo, times `radius`. None
+        for all.
     radius
-        What makes turns in radians comparable with shifts, in the linear unit. None: the root mean square
-        distance of all points and photos from their middle.
+        Factor that makes rotations in radians comparable with translations, in the linear unit. None: the
+        root mean square distance of all points and photos from their centre.
 
     Raises
     ------
     InputError
-        Names that are none, a radius that is not positive.
+        If a name is invalid or the radius is not positive.
     """
 
     points: Sequence[str] | None = None
@@ -71,21 +71,21 @@ class InnerConstraints:
 
 @dataclass(frozen=True)
 class MinimumConstraints:
-    """What is held at its initial values where nothing else gives a datum.
+    """Minimum constraints: initial values that are fixed if nothing else defines a datum.
 
     Parameters
     ----------
     photo
-        The photo whose position and attitude are held; None for the one with most images. Of one on a
-        trajectory these are the coefficients about its time: of polynomials the first, of splines the next.
+        Photo whose position and attitude are fixed; None for the photo with most observations. On a
+        trajectory, coefficients near its time are fixed: the first of a polynomial, the nearest of a spline.
     coordinate
-        Photo and name of its coordinate (`X`, `Y`, `Z`, or `longitude`, `latitude`, `height`), held for the
-        scale; None for the one in which a photo is farthest from the first.
+        Photo and name of its coordinate (`X`, `Y`, `Z`, or `longitude`, `latitude`, `height`), fixed to
+        define the scale. None: the coordinate in which a photo is farthest from the first.
 
     Raises
     ------
     InputError
-        A coordinate without a photo to hold, or one that is no pair of names.
+        If a coordinate is specified without a photo, or is not a pair of names.
     """
 
     photo: str | None = None
@@ -103,13 +103,13 @@ class MinimumConstraints:
 
 
 def check_datum(datum: object) -> None:
-    """Refuse an argument that is not a datum."""
+    """Reject an argument that is not a datum."""
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise kind_error("datum", "InnerConstraints, MinimumConstraints or None", datum)
 
 
 def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
-    """Return inner constraints as the core knows them; InputError of what is not in the block."""
+    """Convert inner constraints to a row for the core; InputError if a name is not in the block."""
     points, photos = _indices(block, "point", datum.points), _indices(block, "photo", datum.photos)
     attitudes = _indices(block, "photo", datum.attitudes)
     flown = {each.photo for each in block.timed}
@@ -119,9 +119,9 @@ def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
 
 
 def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int, int] | None] | None:
-    """Return what is to be held as the core knows it; None where it is left to the core.
+    """Convert minimum constraints to indices for the core; None if the core selects them.
 
-    InputError: a photo or coordinate that is not there.
+    InputError if a photo or coordinate does not exist.
     """
     if datum.photo is None:
         return None
@@ -139,7 +139,7 @@ def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int
 
 
 def _indices(block: Block, kind: str, wanted: Sequence[str] | None) -> list[int]:
-    """Return the rows of photos or points, of all where none are named."""
+    """Return the rows of named photos or points; all rows if `wanted` is None."""
     ids = block.photo_ids if kind == "photo" else block.point_ids
     if wanted is None:
         return list(range(len(ids)))

@@ -1,4 +1,4 @@
-"""Where the rays of a block's images come from: directions in the axes of the photos."""
+"""Directions of image rays in the axes of the photos."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from photogram.network.motion import focal_images, scanners
 from photogram.network.subset import image_rows, kept_images
 from photogram.words import phrase
 
-_SIDE = -0.02  # u3 of unit directions that are seen well in front of the camera
-_SMALL = 1e-6  # Radians off the axis, where no lens distorts
+_SIDE = -0.02  # Maximum u3 of unit directions that are clearly in front of the camera
+_SMALL = 1e-6  # Radians off the axis with negligible distortion
 
 
 def image_directions(block: Block) -> Floats:
-    """(m, 3) unit directions of the images of a block in the axes of their photos; NaN where there is none.
+    """Return (m, 3) unit directions of the images of a block; NaN if undefined.
 
-    Of photos that move these are the axes at the time of the image. x to the right, y up, z back: the camera
-    looks along -z. Refraction is left out.
+    The axes of a moving photo refer to the time of the image: x right, y up, z back. The camera looks along
+    -z. Refraction is ignored.
     """
     cameras, photo_cameras = block.core_cameras()
     of_images = photo_cameras[block.image_photos]
@@ -33,18 +33,18 @@ def image_directions(block: Block) -> Floats:
 
 
 def without_lenses(block: Block) -> Block:
-    """Return a block as cameras without distortion would have seen it, in the unit of its images.
+    """Convert a block to cameras without distortion, in the unit of its images.
 
-    A block that has principal distances is returned as it is. Where most images have no direction (they may
-    be in another unit) lenses are left out, and cameras are everywhere what they are near the axis; else
-    images without a direction in front of the camera are left out. So are those of scanners, which are no
-    pictures with one pose, and nothing moves.
+    A block with principal distances is returned unchanged. If most directions are undefined (e.g. in another
+    unit), lenses are ignored and cameras are linear. Otherwise images without a direction in front of the
+    camera are removed. Scanner images are always removed, because they have varying poses. Trajectories are
+    removed as well.
     """
     return seen_without_lenses(block)[0]
 
 
 def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
-    """Return the block of :func:`without_lenses`, and (m,) which of the images it has."""
+    """Return the block of :func:`without_lenses`, and (m,) the images that it contains."""
     pictured: Bools = ~scanners(block)[block.image_photos]
     if not block.cameras or block.photo_cameras is None:
         plain = block.replace(timed=()) if block.timed else block
@@ -52,7 +52,7 @@ def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
     directions = image_directions(block)
     seen = (directions[:, 2] < _SIDE) & pictured
     if 2 * np.count_nonzero(seen) < np.count_nonzero(pictured):
-        # The tangents -u1/u3, -u2/u3 as if cameras were everywhere what they are near the axis.
+        # Tangents -u1/u3, -u2/u3 of cameras that have their scale near the axis everywhere.
         tangents, seen = np.empty_like(block.image_xy), pictured
         image_cameras = block.photo_cameras[block.image_photos]
         for row, camera in enumerate(block.cameras):
@@ -76,6 +76,6 @@ def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
 
 
 def direction_deviations(block: Block) -> Floats:
-    """(m,) standard deviations of these directions, radians: those of images over the principal distance."""
+    """Return (m,) standard deviations of directions, radians: image sd / principal distance."""
     deviations = np.sqrt((block.image_sd**2).mean(axis=1)) / block.camera_scales()[block.image_photos]
     return np.asarray(deviations)

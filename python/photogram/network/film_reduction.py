@@ -1,4 +1,4 @@
-"""Scanned films: readings brought back to the frame of the camera, and the form of six numbers."""
+"""Reduction of film readings to the camera frame, and the affine form of films."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from photogram.network.block import Block
 from photogram.network.films import Film, FilmNumbers, Scan
 from photogram.network.observations import Fiducial
 
-FEWEST = 4  # Marks of an affine fit that has something to be judged by
-FIT = 5e-4  # Parts of their extent to which marks fit: 0.1 mm of a film of 23 cm; others are wrong
-_PLACES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])  # Readings of these say what an affine map is
+FEWEST = 4  # Minimum number of marks for an affine fit with redundancy
+FIT = 5e-4  # Maximum misfit of marks relative to their extent: 0.1 mm of a film of 23 cm
+_PLACES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])  # Readings here determine an affine map
 _DIFFERENCES = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
 
 
@@ -26,14 +26,14 @@ def is_scanned(block: Block) -> bool:
 
 
 def camera_unit(block: Block) -> str:
-    """Return the unit of images in the frame of their cameras: that of films is mm, whatever readings are."""
+    """Return the unit of image coordinates in the camera frame: mm for films."""
     return "mm" if is_scanned(block) else block.image_unit
 
 
 def camera_images(block: Block) -> Floats:
-    """Return (m, 2) images in the frame of their cameras, films as they are given; of others as they are.
+    """Return (m, 2) images in the camera frame, with the given parameters of films.
 
-    NaN where a film has no place for a reading.
+    NaN for a reading outside the film model. Images of other photos are unchanged.
     """
     rows = {name: row for row, name in enumerate(block.photo_ids)}
     found = block.image_xy
@@ -46,7 +46,7 @@ def camera_images(block: Block) -> Floats:
 
 
 def _to_marks(block: Block, images: Floats) -> Floats:
-    """Return (m, 2) images, those of each photo changed as an affine map changes its marks."""
+    """Correct the images of each photo by an affine map fitted to its marks; (m, 2)."""
     read: dict[str, list[Fiducial]] = {}
     for each in block.observations:
         if isinstance(each, Fiducial):
@@ -73,10 +73,10 @@ def _with_one(xy: Floats) -> Floats:
 
 
 def as_seen(block: Block) -> Block:
-    """Return a block whose images are those of its cameras: without films and marks.
+    """Convert a block with films to images in the camera frame, without films and marks.
 
-    Films are as they are given, but for an affine change that brings four marks or more of a photo to their
-    places. What looks at rays alone takes it: other errors of films are small against what it looks for.
+    The given film parameters are used, and an affine correction if a photo has four marks or more. Other film
+    errors are negligible for functions that use rays only.
     """
     if not is_scanned(block):
         return block
@@ -98,22 +98,22 @@ def as_seen(block: Block) -> Block:
 
 @dataclass(frozen=True)
 class Affine:
-    """The form of six numbers: reading = a0 + a1 x + a2 y, x and y in the camera's frame.
+    """Affine form of a film: reading = a0 + a1 x + a2 y, x and y in the camera frame.
 
     Attributes
     ----------
     matrix
-        (2, 3) a0, a1, a2 of both coordinates of readings.
+        (2, 3) coefficients a0, a1, a2 of both reading coordinates.
     scale_x, scale_y
-        mm of the reading in a mm of the camera along each axis.
+        Millimetres of the reading per millimetre of the camera along each axis.
     between_axes
-        The angle between the images of the axes, less a right angle (radians).
+        Angle between the images of the axes minus 90 degrees (radians).
     rotation
-        The angle of the image of the x axis (radians).
+        Angle of the image of the x axis (radians).
     sd
-        (4,) standard deviations of the last four.
+        (4,) standard deviations of the preceding four attributes.
     matrix_sd
-        (2, 3) standard deviations of `matrix`, the scanner as errorless.
+        (2, 3) standard deviations of `matrix`, assuming an errorless scanner.
     """
 
     matrix: Floats
@@ -126,10 +126,10 @@ class Affine:
 
 
 def affine_form(film: Film, vectors: Sequence[Floats], cofactors: Floats) -> Affine:
-    """Return what is affine in a film as a form of six numbers; bends, patterns and curves are left out.
+    """Compute the affine form of a film; bends, patterns and curves are ignored.
 
-    `vectors` are (3,) the numbers of each of its unknowns, in their order; `cofactors` (6, 6) of t1, t2,
-    theta, m, b1, b2, m being that of the photo with its roll's.
+    `vectors` are the (3,) values of each unknown, in the order of the film. `cofactors` (6, 6) are of t1, t2,
+    theta, m, b1, b2; m includes the roll.
     """
     own = dict(zip(map(id, film.unknowns), vectors, strict=True))
     parts = [film.placement, film.size, *([] if film.roll is None else [film.roll]), film.scanner]
@@ -152,7 +152,7 @@ def affine_form(film: Film, vectors: Sequence[Floats], cofactors: Floats) -> Aff
 
 
 def _said(values: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
-    """Return scales, angle between axes and rotation, and their partials by the six of the film.
+    """Return scales, angle between axes and rotation, and partials by the six film parameters.
 
     The columns of R J (I + S) are the images of the axes.
     """
@@ -160,7 +160,7 @@ def _said(values: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
     side = -1.0 if mirrored else 1.0
     straight = np.array([[side * (1 + m + b1), side * b2], [b2, 1 + m - b1]])
     x, y = straight[:, 0], straight[:, 1]
-    # By m, b1, b2.
+    # Partial derivatives by m, b1, b2.
     by_x = np.array([[side, side, 0.0], [0.0, 0.0, 1.0]])
     by_y = np.array([[0.0, 0.0, side], [1.0, -1.0, 0.0]])
     lengths = np.hypot(*x), np.hypot(*y)

@@ -1,8 +1,8 @@
-"""Scanned films and measured plates: what their readings have in common, and what images of them pass.
+"""Scanned films and measured plates: shared unknowns and image transformation.
 
 From the camera's frame q (mm, x right, y up, seen as the positive) to a reading:
 n = q + [m + b1, b2; b2, m - b1] q + D(q); e = n + (h1 x y, h2 x y) or n/(1 + g1 x + g2 y);
-p = R(theta) J e + t; the reading is what the scanner has where p is.
+p = R(theta) J e + t; the reading is the scanner coordinate of p.
 """
 
 from __future__ import annotations
@@ -23,53 +23,53 @@ from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
 from photogram.words import phrase
 
-PATTERNS = ("none", "w1 w2", "ebner", "grid")  # By the number under which the core knows each
-MOST_SHIFTS = 200  # Unknowns of the reseau of a photo
+PATTERNS = ("none", "w1 w2", "ebner", "grid")  # In the order of their numbers in the core
+MOST_SHIFTS = 200  # Maximum number of unknowns of the reseau of a photo
 
 
 class FilmNumbers(Numbers):
-    """Those that readings of scanned films have in common."""
+    """Unknown numbers shared by readings of scanned films."""
 
 
 class FilmPlacement(FilmNumbers):
-    """Where the film of a photo lay: t1, t2 in mm, theta in radians."""
+    """Placement of the film of a photo on the scanner: t1, t2 in mm, theta in radians."""
 
     KIND: ClassVar[str] = "film placement"
 
 
 class FilmSize(FilmNumbers):
-    """How the size of the film of a photo has changed: m, b1, b2."""
+    """Size change of the film of a photo: m, b1, b2."""
 
     KIND: ClassVar[str] = "film size"
 
 
 class FilmBend(FilmNumbers):
-    """What is not affine in the film of a photo: h1, h2 or g1, g2 in 1/mm."""
+    """Non-affine deformation of the film of a photo: h1, h2 or g1, g2 in 1/mm."""
 
     KIND: ClassVar[str] = "film bend"
 
 
 class Roll(FilmNumbers):
-    """The mean change of size m of the films of a roll."""
+    """Mean size change m of the films of a roll."""
 
     KIND: ClassVar[str] = "roll"
 
 
 class Mark(FilmNumbers):
-    """The place of a fiducial mark in the frame of its camera, mm."""
+    """Position of a fiducial mark in the camera frame, mm."""
 
     KIND: ClassVar[str] = "fiducial"
 
 
 class Weights(FilmNumbers):
-    """Two weights of a pattern, mm."""
+    """Two coefficients of a deformation pattern, mm."""
 
     KIND: ClassVar[str] = "pattern"
 
 
 @dataclass(frozen=True, eq=False)
 class Scanner(FilmNumbers):
-    """Sx, Sy and alpha (radians) of a scanner or comparator."""
+    """Scales Sx, Sy and angle alpha (radians) of a scanner or comparator."""
 
     KIND: ClassVar[str] = "scanner"
 
@@ -84,18 +84,18 @@ class ScannerCurve(FilmNumbers):
 
 @dataclass(frozen=True)
 class Readings:
-    """What readings of a scanner count.
+    """Coordinate system of the readings of a scanner.
 
     Parameters
     ----------
     pitch
-        mm in a unit of readings.
+        Millimetres per unit of readings.
     origin
-        (o1, o2): the reading from which the scanner's correction counts.
+        (o1, o2): reading at the origin of the scanner correction.
     down
-        Whether the second coordinate counts down, as rows do.
+        Whether the second coordinate increases downwards, as rows do.
     half_range
-        (hx, hy) mm, of the scanner's polynomials.
+        (hx, hy) mm, half ranges of the scanner polynomials.
     """
 
     pitch: float = 1.0
@@ -112,18 +112,18 @@ class Readings:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """A systematic deformation D(q) of films: functions of the place, each with a weight.
+    """Systematic film deformation D(q): functions of the position, each with a coefficient.
 
     Parameters
     ----------
     kind
-        `w1 w2`: `w1 x y/h^2` in x, `w2 (x^2 - y^2)/h^2` in y; `ebner`: those of Ebner (1976) without the
-        linear two, of x/h and y/h; `grid`: shifts of nodes, bilinear between.
+        `w1 w2`: `w1 x y/h^2` in x, `w2 (x^2 - y^2)/h^2` in y. `ebner`: the functions of Ebner (1976) of
+        x/h and y/h, without the two linear ones. `grid`: bilinear interpolation of node shifts.
     numbers
-        h in mm; of a grid the x, y of its first node, its spacing along x and y in mm, numbers of columns and
-        of rows.
+        h in mm. For a grid: x, y of its first node, its spacing along x and y in mm, number of columns
+        and number of rows.
     weights
-        Two each: 1, 5 or, row by row, one for each node.
+        Coefficients in pairs: 1, 5 or, row by row, one for each node.
     """
 
     kind: str
@@ -146,25 +146,25 @@ class Pattern:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Reseau(Pattern):
-    """The grid of a single photo: shifts of its nodes, observed as 0, and smooth.
+    """Grid of a single photo: smooth shifts of its nodes, observed as 0.
 
     Parameters
     ----------
     photo
-        Its name.
+        Name of the photo.
     numbers
-        As of the pattern `grid`.
+        As for the pattern `grid`.
     sd
         (2,) standard deviations of a shift in x and in y, mm.
     smooth
-        That of second differences along rows and columns, mm; infinite: shifts do not know each other.
+        Standard deviation of second differences along rows and columns, mm; infinite: independent shifts.
     weights
-        The shifts of its nodes, row by row; none: they are made, free.
+        Shifts of the nodes, row by row; free shifts are created by default.
 
     Raises
     ------
     InputError
-        More unknowns than a photo should have, or deviations that are none.
+        If the photo would have too many unknowns, or standard deviations are invalid.
     """
 
     kind: str = field(default="grid", init=False)
@@ -193,13 +193,13 @@ class Reseau(Pattern):
         super().__init__("grid", own, weights or _nodes(photo, np.zeros((nodes, 2)), np.inf))
 
     def with_shifts(self, shifts: ArrayLike) -> Reseau:
-        """Return it with (n, 2) shifts of its nodes, row by row, that are errorless."""
+        """Return a reseau with (n, 2) errorless shifts of its nodes, row by row."""
         given = shaped("shifts of the reseau", shifts, (len(self.weights), 2))
         return Reseau(self.photo, self.numbers, self.sd, self.smooth, _nodes(self.photo, given, 0.0))
 
     @property
     def covariance(self) -> Floats:
-        """(2 n, 2 n) of the shifts, x and y of a node behind each other: (I/sd^2 + D' D/smooth^2)^-1."""
+        """(2 n, 2 n) covariance of shifts, x, y node by node: (I/sd^2 + D' D/smooth^2)^-1."""
         columns, rows = np.asarray(self.numbers)[4:].astype(int).tolist()
         along, across = (np.diff(np.eye(count), 2, axis=0) for count in (columns, rows))
         second = np.concatenate([np.kron(np.eye(rows), along), np.kron(across, np.eye(columns))])
@@ -216,28 +216,28 @@ def _nodes(photo: str, shifts: Floats, sd: float) -> list[Weights]:
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """The film of a photo, or a plate: what its readings are made of.
+    """Film of a photo, or a plate, with the parameters of its readings.
 
     Parameters
     ----------
     placement, size
-        Its own.
+        Unknowns of this film only.
     scanner
-        What read it, one object for all that it has read.
+        Scanner, one object for all its readings.
     readings
-        What these count.
+        Coordinate system of the readings.
     bend
-        h or, with `projective`, g; None: the film is affine.
+        Coefficients h or, with `projective`, g; None: the film is affine.
     projective
-        Whether `bend` is g.
+        Whether `bend` contains g.
     roll
-        A roll whose m is added to that of `size`; None: that is the whole of it.
+        Roll whose m is added to the m of `size`; None: `size` contains the whole change.
     curves
-        The coefficients of the scanner's polynomials, six of three, x first; or none.
+        Coefficients of the scanner polynomials, six of three, x first; may be empty.
     pattern
-        Its systematic deformation.
+        Systematic deformation of the film.
     mirrored
-        Whether it was seen from the other side.
+        Whether the film was scanned from the emulsion side (mirrored).
     """
 
     placement: FilmPlacement
@@ -265,13 +265,13 @@ class Film:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What it is made of, in the order of the core."""
+        """Unknowns of the film, in the order of the core."""
         weights = () if self.pattern is None else tuple(self.pattern.weights)
         single = (self.placement, self.size, self.bend, self.roll, self.scanner)
         return (*(each for each in single if each is not None), *self.curves, *weights)
 
     def numbers(self) -> Floats:
-        """Return what else the core takes."""
+        """Return the numbers for the core that are not unknowns."""
         own = self.readings
         bend = 0 if self.bend is None else 2 if self.projective else 1
         pattern = 0 if self.pattern is None else PATTERNS.index(self.pattern.kind)
@@ -285,14 +285,14 @@ class Film:
 
 @dataclass(frozen=True, eq=False)
 class Scan(Passage):
-    """That the images of a photo are readings of a scanned film or of a plate on a comparator.
+    """Image transformation of a photo whose images are readings of a film or plate.
 
     Parameters
     ----------
     photo
-        Its name; its camera is in mm.
+        Name of the photo; its camera is in mm.
     film
-        Its film.
+        Film of the photo.
     """
 
     KIND = "scan"
@@ -306,22 +306,22 @@ class Scan(Passage):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Those of its film."""
+        """Unknowns of the film."""
         return self.film.unknowns
 
     def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
-        """Return the row of its photo."""
+        """Return the row of the photo."""
         if self.photo not in photos:
             raise argument_error("scan", "absent", kind="photo", name=self.photo)
         return [photos[self.photo]]
 
     def numbers(self) -> Floats:
-        """Return those of its film."""
+        """Return the numbers of the film for the core."""
         return self.film.numbers()
 
 
 def reads_pixels(passages: Sequence[Passage]) -> bool:
-    """Whether the readings of scanned films are pixels: a unit of them is no millimetre."""
+    """Return whether film readings are pixels: their unit is not the millimetre."""
     return any(isinstance(each, Scan) and each.film.readings.pitch != 1.0 for each in passages)
 
 
@@ -332,7 +332,7 @@ def check_scans(
     photo_cameras: Indices | None,
     image_photos: Indices,
 ) -> None:
-    """Refuse scans of photos whose camera has no frame of marks, two of one photo, and two units."""
+    """Reject scans without a camera frame of marks, repeated photos, and mixed units."""
     scans = [each for each in passages if isinstance(each, Scan)]
     rows = {name: row for row, name in enumerate(photos)} if scans else {}
     seen: set[str] = set()

@@ -1,4 +1,4 @@
-"""The frame of a block: where on the earth its coordinates are, if that is known."""
+"""Reference frame of the coordinates of a block."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True)
 class Frame:
-    """What the coordinates of a block are.
+    """Reference frame of the coordinates of a block.
 
     Attributes
     ----------
     kind
         `cartesian`, `topocentric` (east, north, up at the origin), `geocentric` or `geographic`.
     crs
-        Coordinate reference system of the origin, or of the coordinates; empty where none is said.
+        Coordinate reference system of the origin, or of the coordinates; empty if unspecified.
     origin
         Latitude and longitude in degrees and ellipsoidal height in metres of a topocentric frame.
     ellipsoid

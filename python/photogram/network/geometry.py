@@ -36,7 +36,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Spheroid:
-    """An ellipsoid of revolution. Its linear unit is that of the heights.
+    """Ellipsoid of revolution; heights define its linear unit.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Spheroid:
     Raises
     ------
     InputError
-        Unless both are finite and 0 < b <= a.
+        If the axes are not finite, or do not satisfy 0 < b <= a.
     """
 
     a: float
@@ -68,85 +68,86 @@ class Spheroid:
 
 
 def rotation_matrix(angles: ArrayLike) -> Floats:
-    """Rotation matrices M = M_kappa M_phi M_omega, (n, 3, 3), of (n, 3) omega, phi, kappa in radians.
+    """Compute (n, 3, 3) matrices M_kappa M_phi M_omega of (n, 3) omega, phi, kappa, radians.
 
     Raises
     ------
     ValueError
-        Another shape.
+        If the shape is wrong.
     """
     return _photocore.rotation_matrix(_floats(angles))
 
 
 def rotation_angles(matrices: ArrayLike) -> Floats:
-    """Angles omega, phi, kappa in radians, (n, 3), of (n, 3, 3) rotation matrices; phi lies in [-pi/2, pi/2].
+    """Compute (n, 3) omega, phi, kappa (rad) of (n, 3, 3) matrices; phi in [-pi/2, pi/2].
 
     Raises
     ------
     ValueError
-        Another shape.
+        If the shape is wrong.
     """
     return _photocore.rotation_angles(_floats(matrices))
 
 
 def geographic_to_geocentric(positions: ArrayLike, spheroid: Spheroid) -> Floats:
-    """Geocentric X, Y, Z, (n, 3), of (n, 3) longitude (rad, east positive), latitude (rad), height.
+    """Convert (n, 3) longitude (rad, east positive), latitude (rad), height to X, Y, Z.
 
     Raises
     ------
     ValueError
-        Another shape.
+        If the shape is wrong.
     """
     return _photocore.geographic_to_geocentric(_floats(positions), spheroid.a, spheroid.b)
 
 
 def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
-    """Longitude (rad), latitude (rad) and height, (n, 3), of (n, 3) geocentric X, Y, Z.
+    """Convert (n, 3) geocentric X, Y, Z to longitude (rad), latitude (rad) and height.
 
     Raises
     ------
     ValueError
-        Another shape.
+        If the shape is wrong.
     """
     return _photocore.geocentric_to_geographic(_floats(xyz), spheroid.a, spheroid.b)
 
 
 @dataclass(frozen=True)
 class Cartesian:
-    """The cartesian axes of a block: its own when rectangular, `spheroid` being None, else geocentric."""
+    """Cartesian axes of a block: geocentric, or its own axes if `spheroid` is None."""
 
     spheroid: Spheroid | None
 
     def positions(self, positions: Floats) -> Floats:
-        """(n, 3) positions of the block in these axes; NaN where unknown."""
+        """Convert (n, 3) positions of the block to these axes; NaN if unknown."""
         if self.spheroid is None:
             return positions
         return geographic_to_geocentric(positions, self.spheroid)
 
     def from_cartesian(self, positions: Floats) -> Floats:
-        """Turn positions of these axes back into those of the block."""
+        """Convert positions in these axes to positions of the block."""
         if self.spheroid is None or not len(positions):
             return positions
         return geocentric_to_geographic(positions, self.spheroid)
 
     def from_local(self, attitudes: Floats, positions: Floats) -> Floats:
-        """(n, 3, 3) attitudes in these axes, of those in the local frames at positions of the block."""
+        """Convert (n, 3, 3) attitudes in local frames at positions of the block to these axes."""
         if self.spheroid is None:
             return attitudes
         return np.asarray(local_frames(positions).transpose(0, 2, 1) @ attitudes)
 
     def to_local(self, attitudes: Floats, positions: Floats) -> Floats:
-        """Turn attitudes of these axes back into the local frames at positions of the block."""
+        """Convert attitudes in these axes to local frames at positions of the block."""
         if self.spheroid is None:
             return attitudes
         return np.asarray(local_frames(positions) @ attitudes)
 
 
 def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
-    """Lengths of the units of the coordinates at (n, 3) positions, (n, 3), in the linear unit.
+    """Return (n, 3) lengths of the coordinate units at positions, in the linear unit.
 
-    Ones in rectangular space. In geographic space a radian of longitude is as long as the radius of the
-    parallel, one of latitude as that of the meridian's curvature, both at the height of the position.
+    They are 1 in rectangular space. In geographic space, the length for longitude is the radius of the
+    parallel. The length for latitude is the radius of curvature of the meridian. Both refer to the height of
+    the position.
     """
     values = _floats(positions)
     if spheroid is None:
@@ -159,12 +160,12 @@ def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
 
 
 def local_frames(positions: ArrayLike) -> Floats:
-    """Rows east, north, up, (n, 3, 3), of the local frames at (n, 3) longitude, latitude (rad), height.
+    """Return (n, 3, 3) local frames, rows east, north, up, at longitude, latitude (rad), height.
 
     Raises
     ------
     InputError
-        Another shape.
+        If the shape is wrong.
     """
     values = shaped("positions", positions, (length("positions", positions), 3))
     longitude, latitude = values[:, :2].T
@@ -174,7 +175,7 @@ def local_frames(positions: ArrayLike) -> Floats:
 
 
 def photo_axes(attitudes: ArrayLike, photo_to_ground: bool) -> Floats:
-    """Axes of photos, as columns, (n, 3, 3), of (n, 3) omega, phi, kappa; with a spheroid in local frames."""
+    """Return photo axes as columns, (n, 3, 3), of (n, 3) omega, phi, kappa."""
     rotations = rotation_matrix(attitudes)
     return rotations if photo_to_ground else rotations.transpose(0, 2, 1)
 
@@ -186,9 +187,9 @@ def viewing_directions(
     spheroid: Spheroid | None = None,
     photo_to_ground: bool = False,
 ) -> Floats:
-    """Directions in which photos look, the negative z axes of their frames, (n, 3) unit vectors.
+    """Return viewing directions, the negative z axes of photos, as (n, 3) unit vectors.
 
-    Arguments are those of :func:`project`; with a spheroid the directions are geocentric.
+    Arguments as in :func:`project`; with a spheroid the directions are geocentric.
     """
     directions = -photo_axes(attitudes, photo_to_ground)[:, :, 2]
     if spheroid is None:
@@ -207,12 +208,12 @@ def project(
     refraction: Refraction | None = None,
     linear_unit: str = "m",
 ) -> Floats:
-    """Project points into photos, row by row: point i into the photo of row i.
+    """Project points into photos row by row: point i into photo i.
 
     Parameters
     ----------
     points, positions
-        (n, 3) object points and projection centres: X, Y, Z, or longitude (rad), latitude (rad), height when
+        (n, 3) object points and projection centres: X, Y, Z, or longitude (rad), latitude (rad), height if
         a spheroid is given.
     attitudes
         (n, 3) omega, phi, kappa in radians; with a spheroid relative to the local vertical frame of each
@@ -222,11 +223,11 @@ def project(
     spheroid
         None for rectangular space.
     photo_to_ground
-        The sense of the angles; False is ground-to-photo.
+        Direction of the angles; False is ground-to-photo.
     refraction
-        What bends the rays; None: they are straight.
+        Refraction model; None for straight rays.
     linear_unit
-        Of the object space, "m" or "ft": refraction needs its length.
+        Linear unit of the object space, "m" or "ft"; required by refraction.
 
     Returns
     -------
@@ -235,7 +236,7 @@ def project(
     Raises
     ------
     ValueError
-        Other shapes, or different numbers of rows; refraction in another linear unit (an InputError).
+        If shapes or numbers of rows differ, or refraction has another linear unit (an InputError).
     """
     return _photocore.project(
         _floats(points),
@@ -256,29 +257,29 @@ def refraction_shift(
     spheroid: Spheroid | None = None,
     linear_unit: str = "m",
 ) -> Floats:
-    """From points to where cameras see them, row by row: point i from the position of row i.
+    """Compute the refraction displacement of points as seen by cameras, row by row.
 
     Parameters
     ----------
     points, positions
         (n, 3) object points and projection centres, as for :func:`project`.
     refraction
-        What bends the rays.
+        Refraction model.
     spheroid
         None for rectangular space.
     linear_unit
-        Of the object space, "m" or "ft".
+        Linear unit of the object space, "m" or "ft".
 
     Returns
     -------
-    (n, 3) vectors in the linear unit, along X, Y, Z or the geocentric axes: the lift dZ of the GIANT guide
-    (Appendices F and G), along the up at the camera, and the lift of the ray by Snell's law, along the up at
-    the point. Zero for points that the models leave alone.
+    (n, 3) vectors in the linear unit, along X, Y, Z or the geocentric axes. The lift dZ of the GIANT guide
+    (Appendices F and G) is along the up direction of the camera. The lift of the ray by Snell's law is along
+    the up direction of the point. Zero if no model applies.
 
     Raises
     ------
     ValueError
-        Other shapes, or different numbers of rows; another linear unit (an InputError).
+        If shapes or numbers of rows differ, or the linear unit is another one (an InputError).
     """
     return _photocore.refraction_shift(
         _floats(points),

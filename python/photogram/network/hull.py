@@ -1,4 +1,4 @@
-"""The convex hull of points in plan: its corners, its area, and what lies outside."""
+"""Convex hull of points in plan: corners, area, and points outside."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 
 MANY, DIRECTIONS = 1000, 16
-ROUNDING = 1e-9  # Of the extent of a hull: a point that is no farther outside lies on it
+ROUNDING = 1e-9  # Tolerance of points on a hull, relative to its extent
 
 
 def hull(points: Floats) -> Floats:
     """Return the (k, 2) corners of the convex hull of (n, 2) points, n at least 1, counterclockwise.
 
-    Andrew's monotone chain. Points on a line have two corners, equal points up to two equal ones.
+    Andrew's monotone chain. Points on a line have two corners; equal points may have two equal corners.
     """
     points = _outermost(points)
     order = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
@@ -33,10 +33,7 @@ def hull(points: Floats) -> Floats:
 
 
 def _outermost(points: Floats) -> Floats:
-    """Return the points that are not well within the polygon of those farthest out in some directions.
-
-    Of thousands few are left for the chain (Akl and Toussaint 1978).
-    """
+    """Discard points well inside the polygon of extreme points (Akl and Toussaint 1978)."""
     if len(points) < MANY:
         return points
     turns = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
@@ -50,13 +47,13 @@ def _outermost(points: Floats) -> Floats:
 
 
 def area(corners: Floats) -> float:
-    """Return the area within the (k, 2) corners of a hull, in the square of their unit."""
+    """Return the area of a hull with (k, 2) corners, in the square of their unit."""
     x, y = (corners - corners[0]).T
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) / 2
 
 
 def outside(points: Floats, corners: Floats) -> Bools:
-    """Return (n,) which of (n, 2) points lie outside the (k, 2) corners of a hull."""
+    """Return (n,) whether (n, 2) points are outside the (k, 2) corners of a hull."""
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
     extent = float(np.linalg.norm(np.ptp(corners, axis=0)))
@@ -66,6 +63,6 @@ def outside(points: Floats, corners: Floats) -> Bools:
     sides, corners = sides[true] / lengths[true, np.newaxis], corners[true]
     away = points[:, np.newaxis] - corners
     left = sides[:, 0] * away[..., 1] - sides[:, 1] * away[..., 0]
-    # Of a hull without area the points beyond its ends lie on both of its sides.
+    # Points beyond the ends of a hull without area are on both of its sides.
     ahead = np.einsum("nkj,kj->nk", away, sides).max(axis=1) if len(corners) == 2 else 0.0
     return np.asarray((left.min(axis=1) < -ROUNDING * extent) | (ahead > extent * (1 + ROUNDING)))

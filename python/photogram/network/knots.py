@@ -1,4 +1,4 @@
-"""Knots of splined cameras: displacements on a grid over the stereographic image, beside the parameters."""
+"""Knots of splined cameras: displacements on a grid over the stereographic image."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
 from photogram.words import phrase
 
-KNOTTED = "splined_stereographic"  # The model that has knots
-MOST = 10_000  # Knots along columns or rows, at the most
+KNOTTED = "splined_stereographic"  # The only model with knots
+MOST = 10_000  # Maximum number of knots along columns or rows
 
 
 @dataclass(frozen=True, eq=False)
 class Knot(Numbers):
-    """Displacements dx, dy at one knot of a camera, in units of the stereographic image.
+    """Unknown displacements dx, dy at a camera knot, in units of the stereographic image.
 
     Parameters
     ----------
     name
-        The camera and the knot.
+        Names of the camera and the knot.
     value
-        (2,) where the adjustment starts from.
+        (2,) initial values.
     sd
-        (2,) 0 held, infinite free or weighted by `covariance`.
+        (2,) 0 (fixed), or infinite (free or weighted by `covariance`).
     covariance
-        (2, 2) of the observation that both are 0; None without.
+        (2, 2) covariance of the observation that both are 0; None without the observation.
     """
 
     KIND = "knot"
@@ -44,7 +44,7 @@ class Knot(Numbers):
 
 @dataclass(frozen=True, eq=False)
 class Knots(Passage):
-    """Images of the camera in a row of the block pass its spline; the knots are ordered row by row."""
+    """Image transformation by the spline of a camera; knots are ordered row by row."""
 
     KIND = "knots"
 
@@ -53,16 +53,16 @@ class Knots(Passage):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """The knots."""
+        """Knots of the camera."""
         return self.knots
 
     def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
-        """Return the row of its camera."""
+        """Return the row of the camera."""
         return [self.camera]
 
 
 def knot_unknowns(camera: str, knots: Floats | None, sd: Floats | None) -> tuple[Knot, ...]:
-    """Return knots of a camera, (ny, nx, 2) with sd, as unknowns, row by row; none where all are held."""
+    """Return camera knots (ny, nx, 2) as unknowns, row by row; empty if all are fixed."""
     if knots is None or sd is None or not sd.any():
         return ()
     rows, columns, _ = knots.shape
@@ -89,7 +89,7 @@ def knot_unknowns(camera: str, knots: Floats | None, sd: Floats | None) -> tuple
 def checked_knots(
     title: str, model: str, parameters: Mapping[str, float], knots: ArrayLike | None
 ) -> Floats | None:
-    """Return (ny, nx, 2) knots; None for a model without them."""
+    """Return validated knots (ny, nx, 2); None for a model without knots."""
     where = f"knots of camera {title}"
     if model != KNOTTED:
         require(knots is None, where, "not-applicable", name="knots", other=model)
@@ -108,7 +108,7 @@ def checked_knots(
 
 
 def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Floats | None:
-    """Return (ny, nx, 2) sd of knots, radial and tangential; None for a model without them."""
+    """Return radial and tangential sd of knots, (ny, nx, 2); None for a model without knots."""
     where = f"knot_sd of camera {title}"
     sd = numbers(where, given)
     if knots is None:
@@ -123,7 +123,7 @@ def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Float
 
 
 def knot_names(knots: Floats | None) -> tuple[str, ...]:
-    """Return what knots are called, row by row: `dx_i_j`, `dy_i_j`, i along columns; none without them."""
+    """Return knot names `dx_i_j`, `dy_i_j`, row by row, i along columns; may be empty."""
     if knots is None:
         return ()
     rows, columns, _ = knots.shape
@@ -131,7 +131,7 @@ def knot_names(knots: Floats | None) -> tuple[str, ...]:
 
 
 def beyond_knots(parameters: Mapping[str, float], u: Floats) -> Bools:
-    """Return whether (n, 3) directions lie beyond the knots, where the polynomials at the edge go on."""
+    """Return whether (n, 3) directions are beyond the knots and therefore extrapolated."""
     order = parameters["order"]
     places = 2 * u[:, :2] * [1, -1] / (np.linalg.norm(u, axis=1) - u[:, 2])[:, np.newaxis]
     per_place = (parameters["nx"] - order) / (4 * math.tan(math.radians(parameters["fov_x_deg"]) / 4))

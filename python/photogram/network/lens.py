@@ -1,4 +1,4 @@
-"""Lenses that are known: from what was measured in the focal plane to what a perfect lens would show."""
+"""Fixed lens models: conversion between measured and ideal focal-plane positions."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from photogram.lazy_dataclasses import dataclass
 LensModel = Literal["radial", "transverse", "lrolrocnac", "kaguyalism", "cahvor", "radtan"]
 
 STEPS = 50
-CLOSE = 1e-14  # Of the size of a place, beyond a millimetre: where steps of the inverse end
-APART = 1e-6  # Of the same: how far from a place the slopes of the inverse are taken
+CLOSE = 1e-14  # Convergence limit of the inverse, relative to the coordinates (at least 1 mm)
+APART = 1e-6  # Step of the numerical derivatives of the inverse, relative in the same way
 
 
 @dataclass(frozen=True)
 class Lens:
-    """The distortion of a lens, known, by the names and formulas of the Community Sensor Model.
+    """Fixed distortion of a lens, with models of the Community Sensor Model.
 
     Parameters
     ----------
     model
-        With d = (x, y) in millimetres, y **down**, r = ||d||, of the measured place where it is corrected
-        (backward), of the ideal one where it is distorted (forward):
+        d = (x, y) in millimetres, y **down**, and r = ||d||. Backward models correct the measured position d,
+        forward models distort the ideal position d.
 
         `radial` (k0, k1, k2), backward: d (1 - k0 - k1 r^2 - k2 r^4).
         `transverse` (20), forward: ten coefficients of x, then ten of y, of 1, x, y, x^2, x y, y^2, x^3,
         x^2 y, x y^2, y^3.
         `lrolrocnac` (k), backward: x, y / (1 + k y^2).
-        `kaguyalism` (bx, a0 .. a3, by, b0 .. b3), backward: x + a0 + a1 r + a2 r^2 + a3 r^3 + bx, y alike.
+        `kaguyalism` (bx, a0 .. a3, by, b0 .. b3), backward: x + a0 + a1 r + a2 r^2 + a3 r^3 + bx; y with b.
         `cahvor` (k0, k1, k2, x0, y0), backward: `radial` about (x0, y0).
-        `radtan` (k1, k2, p1, p2, k3), forward: that of OpenCV, of d / focal_length.
+        `radtan` (k1, k2, p1, p2, k3), forward: the OpenCV model of d / focal_length.
     coefficients
-        Of the model, in this order.
+        Coefficients of the model, in this order.
     focal_length
-        Millimetres, of `radtan`.
+        Focal length in millimetres, for `radtan`.
 
     Raises
     ------
     InputError
-        A model that is none, other numbers of coefficients, what is not finite.
+        If the model does not exist, the number of coefficients is wrong, or a value is not finite.
     """
 
     model: LensModel
@@ -65,12 +65,12 @@ class Lens:
         require(usable, f"focal_length of the lens {self.model}", "positive", value=self.focal_length)
 
     def corrected(self, places: Floats) -> Floats:
-        """Return where a perfect lens has them, (n, 2), of (n, 2) measured places; millimetres, y up."""
+        """Convert (n, 2) measured positions to positions of a perfect lens; millimetres, y up."""
         formula = _FORMULAS[self.model]
         return self._inverse(places) if formula.forward else self._formula(places)
 
     def distorted(self, places: Floats) -> Floats:
-        """Return where they are measured, (n, 2), of (n, 2) places of a perfect lens; millimetres, y up."""
+        """Convert (n, 2) positions of a perfect lens to measured positions; millimetres, y up."""
         formula = _FORMULAS[self.model]
         return self._formula(places) if formula.forward else self._inverse(places)
 
@@ -80,7 +80,7 @@ class Lens:
         return np.column_stack([found[0], -found[1]])
 
     def _inverse(self, places: Floats) -> Floats:
-        """Return what the formula makes these of: Newton's method, slopes by differences."""
+        """Invert the formula by Newton's method with numerical derivatives."""
         found = places.copy()
         size = np.maximum(1.0, np.abs(places).max(initial=0.0))
         h = APART * size

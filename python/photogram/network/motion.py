@@ -1,8 +1,8 @@
-"""Photos and records on trajectories: which these are, where and when their images are, also for the core.
+"""Photos and records on trajectories: selection, image times and poses.
 
-A frame, and a photo with a rolling shutter, has nearly the pose that is its own at all of its images. A
-scanner has another at each line, and samples and lines for coordinates: of what takes photos for pictures
-with one pose nothing holds for it.
+A frame photo, or a rolling-shutter photo, has nearly the same pose for all its images. A scanner has a
+different pose for each line, and its coordinates are samples and lines. Functions that assume one pose per
+photo do not apply to scanners.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from photogram.network.unadjusted import Given
 
 
 def timed_photos(block: Block) -> Bools:
-    """(P,) which photos are on trajectories."""
+    """Return (P,) whether photos are on trajectories."""
     return _named(block, {each.photo for each in block.timed})
 
 
 def on_shared(block: Block) -> Bools:
-    """(P,) which photos are on a trajectory that is given: their poses only tell where they are about."""
+    """Return (P,) whether photos are on a given trajectory; their own poses are approximate."""
     return _named(block, {each.photo for each in block.timed if each.trajectory is not None})
 
 
 def scanners(block: Block) -> Bools:
-    """(P,) which photos are strips of a scanner, line by line."""
+    """Return (P,) whether photos are strips of a line scanner."""
     return _named(block, {each.photo for each in block.timed if each.lines is not None})
 
 
@@ -43,9 +43,9 @@ def _named(block: Block, names: set[str]) -> Bools:
 
 
 def focal_images(network: Given) -> Floats:
-    """(m, 2) image coordinates in the focal plane, where residuals are: of scanners those of samples.
+    """Return (m, 2) image coordinates in the focal plane, in which residuals are computed.
 
-    Of scanned films those of the camera, in whose frame films and marks are given.
+    Scanner images are converted to sample positions, film readings to the camera frame.
     """
     if not isinstance(network, Block):
         return network.image_xy
@@ -59,13 +59,13 @@ def focal_images(network: Given) -> Floats:
 
 
 def of_pictures(block: Block) -> Block:
-    """Return a block without the images of scanners: its photos are pictures, each with about one pose."""
+    """Remove the images of scanners, so that each photo has about one pose."""
     scanned = scanners(block)
     return kept_images(block, ~scanned[block.image_photos]) if scanned.any() else block
 
 
 def at_rest(block: Block) -> Block:
-    """Return what of a block is on no trajectory: photos with poses of their own, and what is of these."""
+    """Return the part of a block without trajectories: photos at rest and their observations."""
     if not flown_by(block):
         return block
     observations = [
@@ -76,7 +76,7 @@ def at_rest(block: Block) -> Block:
 
 
 def timed_images(block: Block) -> Iterator[tuple[Timed, Trajectory, int, Indices]]:
-    """Return the timed photos of a block: each with its trajectory, its index, and those of its images."""
+    """Yield timed photos with their trajectory, index and image indices."""
     if not block.timed:
         return
     rows = {name: row for row, name in enumerate(block.photo_ids)}
@@ -89,17 +89,17 @@ def timed_images(block: Block) -> Iterator[tuple[Timed, Trajectory, int, Indices
 
 
 def about(trajectory: Trajectory, time: float) -> tuple[Floats, Floats]:
-    """Return the pose of a trajectory at a time by what is given of its corrections.
+    """Return the pose of a trajectory at a time, with the given corrections.
 
-    Beyond what it reaches the pose is that of its end: (3,) X, Y, Z, geocentric where the object space is
-    geographic, and (3, 3) the axes of the photo in these.
+    The result is (3,) X, Y, Z, geocentric if the object space is geographic, and (3, 3) the axes of the
+    photo. Beyond the ends of the trajectory, the pose is constant.
     """
     places, matrices = given_poses(trajectory, np.clip([time], *trajectory.reach))
     return places[0], matrices[0]
 
 
 def given_poses(trajectory: Trajectory, times: Floats) -> tuple[Floats, Floats]:
-    """Return (n, 3) places and (n, 3, 3) axes at (n,) times that the trajectory reaches, as :func:`about`."""
+    """Return (n, 3) positions and (n, 3, 3) axes at (n,) times within reach, as :func:`about`."""
     position, rotation = (np.array([each.position for each in own]) for own in trajectory.coefficients)
     places, matrices, *_ = trajectory.flown(times, position, rotation)
     return places, matrices.reshape(-1, 3, 3)

@@ -1,4 +1,4 @@
-"""Photos on trajectories: frames, rolling shutters, line scanners; records of GNSS and inertial units."""
+"""Photos on trajectories: frames, rolling shutters, line scanners, and times of records."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ __all__ = ["LineSensor", "Lines", "Moment", "Shutter", "Timed", "checked_timed",
 Direction = Literal["down", "up", "right", "left"]
 
 STEPS = 100
-CLOSE = 1e-10  # Samples: where steps to the sample abreast of a place end
+CLOSE = 1e-10  # Convergence limit of the sample next to a position, samples
 
 
 @cache
 def _known(readout: float) -> Readout:
-    """Return a readout time that is known: one for all shutters of so many seconds."""
+    """Return a fixed readout time; one object for all shutters with the same seconds."""
     return Readout(f"{readout!r} s", readout, sd=0.0)
 
 
@@ -45,13 +45,13 @@ class Shutter:
     Parameters
     ----------
     readout
-        T, one object for all photos of a camera; or its value in seconds, known.
+        T: one object for all photos of a camera, or a fixed value in seconds.
     edges
-        Image coordinates of the edges where reading begins and ends (r = 0 and r = h): 0 and the height, in
-        pixels from the upper edge; in millimetres of a photo with y up the larger comes first.
+        Image coordinates of the edges at the start and the end of the readout (r = 0 and r = h): 0 and the
+        height in pixels from the upper edge. In millimetres with y up, the larger coordinate is first.
     direction
-        `down` and `up` read rows, `right` and `left` columns: which coordinate counts. `edges` say where it
-        begins; of `up` and `left` T is positive as well.
+        `down` and `up` read rows, `right` and `left` columns. `edges` define the start, so that T is also
+        positive for `up` and `left`.
     """
 
     readout: Readout | float
@@ -76,13 +76,13 @@ class Shutter:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """The times of the lines of a scanner: t = t_j + (line - l_j) dt_j from line l_j on.
+    """Exposure times of scan lines: t = t_j + (line - l_j) dt_j from line l_j on.
 
     Parameters
     ----------
     table
-        (k, 3) first line, time in seconds and seconds per line; lines from the upper edge (0), the middle of
-        line number k (from 0) being k + 0.5. The first and the last row go on beyond.
+        (k, 3) first line, time in seconds and seconds per line. Lines are counted from the upper edge (0);
+        the centre of line number k (from 0) is k + 0.5. The first and the last row are extrapolated.
     """
 
     table: ArrayLike
@@ -95,15 +95,15 @@ class Lines:
         object.__setattr__(self, "table", rows)
 
     def times(self, lines: ArrayLike, start: float = 0.0) -> Floats:
-        """Return the times of lines, in seconds from another: added to late times they would lose digits."""
+        """Return line times in seconds relative to `start`, which preserves the digits of late times."""
         rows, lines = np.asarray(self.table), np.asarray(lines, dtype=float)
         own = rows[np.maximum(np.searchsorted(rows[:, 0], lines, side="right") - 1, 0)]
         return np.asarray(own[..., 1] - start + (lines - own[..., 0]) * own[..., 2])
 
     def at(self, times: ArrayLike) -> Floats:
-        """Return the lines at times in seconds: what :meth:`times` makes of them."""
+        """Return the lines at times in seconds, the inverse of :meth:`times`."""
         rows, times = np.asarray(self.table), np.asarray(times, dtype=float)
-        # Rows follow each other in time as in the image, or all of them the other way.
+        # Times of the rows all increase with the lines, or all decrease.
         sense = np.sign(rows[0, 2])
         own = rows[np.maximum(np.searchsorted(sense * rows[:, 1], sense * times, side="right") - 1, 0)]
         return np.asarray(own[..., 0] + (times - own[..., 1]) / own[..., 2])
@@ -111,27 +111,27 @@ class Lines:
 
 @dataclass(frozen=True, eq=False)
 class LineSensor(Valued):
-    """Where a sample is in the focal plane: (x0, y0) + (sample - s0) (pitch_x, pitch_y), behind a lens.
+    """Focal-plane positions of samples: (x0, y0) + (sample - s0) (pitch_x, pitch_y).
 
     Parameters
     ----------
     pitch
         Millimetres from sample to sample, along x and y.
     s0
-        The sample at (x0, y0): half of all samples, from the edge of the first, where that is the middle.
+        Sample at (x0, y0), counted from the edge of the first: half of all samples for the centre.
     x0, y0
         Millimetres.
     lens
-        What is known of the lens before it: it corrects the places before the camera does, and makes a line
-        of them that is curved. None: the camera alone corrects.
+        Fixed lens model, which corrects positions before the camera does and makes the line curved. None:
+        only the camera corrects.
     bends
-        (k, 3) samples, increasing, and x, y in millimetres by which the sensors there are off the straight
-        line; those between as if they were joined straight, those beyond as the last. None: it is straight.
+        (k, 3) samples, increasing, with x and y deviations of the sensor from the straight line in
+        millimetres. Interpolation is linear, extrapolation constant. None: the line is straight.
 
     Raises
     ------
     InputError
-        A line without a pitch, a lens that is none, bends that are none.
+        If the pitch is zero, the lens is invalid, or the bends are invalid.
     """
 
     pitch: tuple[float, float]
@@ -156,12 +156,12 @@ class LineSensor(Valued):
 
     @classmethod
     def of_table(cls, table: ArrayLike, lens: Lens | None = None) -> LineSensor:
-        """Return the line that is told by (k, 3) samples, increasing, and their x, y in millimetres.
+        """Create the line sensor from (k, 3) samples, increasing, and their x, y in millimetres.
 
         Raises
         ------
         InputError
-            Fewer than two samples, what is no such table, a last sample in the place of the first.
+            If there are fewer than two samples, the shape is wrong, or samples do not increase.
         """
         rows = numbers("table of a line of sensors", table)
         if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) < 2:
@@ -175,11 +175,11 @@ class LineSensor(Valued):
 
     @property
     def is_straight(self) -> bool:
-        """Whether the places are what pitch, s0, x0 and y0 say."""
+        """Whether the sensor has neither a lens model nor bends."""
         return self.lens is None and self.bends is None
 
     def places(self, samples: Floats) -> Floats:
-        """Return (n, 2) places of samples in the focal plane, as the lens corrects them, in millimetres."""
+        """Return (n, 2) focal-plane positions of samples, corrected by the lens, in millimetres."""
         straight = np.asarray([self.x0, self.y0] + (samples[:, np.newaxis] - self.s0) * np.array(self.pitch))
         if self.bends is not None:
             known, *off = np.asarray(self.bends).T
@@ -187,9 +187,9 @@ class LineSensor(Valued):
         return straight if self.lens is None else self.lens.corrected(straight)
 
     def abreast(self, places: Floats) -> tuple[Floats, Floats]:
-        """Return the samples that are abreast of (n, 2) places, and how far these are from the line, in mm.
+        """Return the samples next to (n, 2) positions, and their distances from the line in mm.
 
-        Of a curved line the sample is that at whose place the two are apart square to the pitch.
+        On a curved line, the connection to the sample is perpendicular to the pitch.
         """
         length = float(np.hypot(*self.pitch))
         along = np.array(self.pitch) / length
@@ -211,12 +211,12 @@ _KINDS: dict[str, type] = {
     "offset": Clock,
     "rate": Readout,
 }
-"""What some fields of a timed photo are, where they are not None."""
+"""Types of some fields of a timed photo that may be None."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A time on a trajectory that an observation beside images is of."""
+    """Time on a trajectory to which an additional observation refers."""
 
     trajectory: Trajectory
     time: float
@@ -224,40 +224,40 @@ class Moment:
 
     @property
     def name(self) -> str:
-        """What reports call it."""
+        """Name of the moment in reports."""
         clock = "" if self.clock is None else f", {self.clock.name}"
         return f"{self.trajectory.name} at {self.time!r} s{clock}"
 
 
 @dataclass(frozen=True, eq=False)
 class Timed:
-    """That a photo is on a trajectory: each of its images has the pose of its own time.
+    """Assignment of a photo to a trajectory: each image has the pose at its own time.
 
     Parameters
     ----------
     photo
-        Its name. Of its own pose nothing counts but where it is about.
+        Name of the photo. Its own pose is only an approximation.
     trajectory
-        None: its own, uniform motion from its pose on, in which position and attitude of the block, and their
-        standard deviations, are those at `time`.
+        None: a trajectory of its own, uniform motion from its pose. Position and attitude in the block and
+        their standard deviations then refer to `time`.
     time
-        t_e in seconds: of a frame, or of the edge where a shutter begins. Of a scanner the time that factors
-        of its line rates count from; None: the middle of its images.
+        t_e in seconds: of a frame, or of the edge at the start of the readout. For a scanner, the origin of
+        times for the factor of line rates; None: the mean time of its images.
     shutter, lines
-        Of a camera with a rolling shutter; of a scanner, whose images have samples and lines as coordinates.
+        Rolling shutter of the camera, or line times of a scanner, whose coordinates are samples and lines.
     line_sensor
-        Of a scanner: where its samples are.
+        Focal-plane positions of the samples of a scanner.
     sensor
-        The pose of the camera on what moves on the trajectory; None: the same.
+        Pose of the camera on the moving platform; None: the platform pose.
     offset
-        Of its clock, unknown.
+        Unknown offset of the clock of the photo.
     rate
-        The factor of its line rates, unknown.
+        Unknown factor of the line rates.
     velocity, rotation_rate
-        (3,) of its own trajectory: what is given of its velocity, in the linear unit a second along X, Y, Z,
-        and of its rate about its own axes in radians a second.
+        (3,) given velocity of its own trajectory in the linear unit per second along X, Y, Z, and rotation
+        rate about its own axes in radians per second.
     sd_velocity, sd_rate
-        (3,) standard deviations of the same; infinite: free.
+        (3,) standard deviations of `velocity` and `rotation_rate`; infinite: free.
     """
 
     photo: str
@@ -296,28 +296,28 @@ class Timed:
 
     @property
     def readout(self) -> Readout | None:
-        """What the times of images are multiplied by."""
+        """Unknown that multiplies the image times."""
         shutter = self.shutter.readout if self.shutter is not None else None
         return shutter if isinstance(shutter, Readout) else self.rate
 
     @property
     def scalars(self) -> list[Unknown]:
-        """The unknowns of its times."""
+        """Unknowns of the image times."""
         return [each for each in (self.readout, self.offset) if each is not None]
 
     def times(self, xy: Floats) -> Floats:
-        """Return the (n,) times of (n, 2) images, with what is given of offset, readout and rate."""
+        """Return the (n,) times of (n, 2) images, with given values of offset, readout and rate."""
         time, scale, _ = self.images(xy)
         rate = 1.0 if self.readout is None else float(self.readout.position[0])
         return time + self.delay + rate * scale
 
     @property
     def delay(self) -> float:
-        """What is given of the offset of its clock."""
+        """Given offset of the clock, seconds."""
         return 0.0 if self.offset is None else float(self.offset.position[0])
 
     def images(self, xy: Floats) -> tuple[float, Floats, Floats]:
-        """Return its time, and of (n, 2) images their times on its scale and coordinates for the core."""
+        """Return the time, and image times and coordinates for the core, of (n, 2) images."""
         if self.lines is not None and self.line_sensor is not None:
             time, lines = self.time, xy[:, 1]
             if time is None:
@@ -329,14 +329,14 @@ class Timed:
 
 
 def checked_timed(timed: object, photos: Sequence[str]) -> tuple[Timed, ...]:
-    """Return objects of different photos of a block."""
+    """Return validated timed photos without repetition."""
     checked = instances("timed", timed, Timed)
     require_photos("timed", [each.photo for each in checked], photos)
     return checked
 
 
 def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None:
-    """Refuse photos that a block lacks, or that occur twice."""
+    """Reject repeated photos and photos that are not in the block."""
     known, seen = set(photos), set[str]()
     for photo in own:
         if photo not in known or photo in seen:
@@ -346,7 +346,7 @@ def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None
 
 
 def own_trajectories(block: Block) -> list[Trajectory]:
-    """Return the trajectory of each timed photo: the given one, or uniform motion from its pose."""
+    """Return the trajectory of each timed photo: the given one, or uniform motion."""
     rows = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
     return [
         _uniform(block, each, rows[each.photo]) if each.trajectory is None else each.trajectory
@@ -355,7 +355,7 @@ def own_trajectories(block: Block) -> list[Trajectory]:
 
 
 def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
-    """Return c_0 + (t - t_e) v and r_0 + (t - t_e) w about the pose of a photo."""
+    """Return uniform motion c_0 + (t - t_e) v and r_0 + (t - t_e) w from the pose of a photo."""
     if block.geographic:
         raise InputError(phrase("block.timed.geographic", photo=own.photo))
     sd_position, sd_attitude = block.photo_position_sd[row], block.photo_attitude_sd[row]

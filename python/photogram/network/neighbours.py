@@ -1,4 +1,4 @@
-"""The nearest of many points in a plane."""
+"""Nearest points in a plane."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from photogram.arguments.types import Floats, Indices
 
 
 def mutually_nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
-    """Return for each point its mutually nearest predicted one within a limit; else -1."""
+    """Return the mutually nearest predicted point within a limit for each point; else -1."""
     found = _photocore.nearest_points(points, predicted, limit)
     back = _photocore.nearest_points(predicted, points, limit)
     mutual = (found >= 0) & (back[found] == np.arange(len(points))) if len(predicted) else found >= 0

@@ -1,4 +1,4 @@
-"""What images pass beside pose, point and camera: a board that bends."""
+"""Image transformations in addition to pose, point and camera, e.g. boards that bend."""
 
 from __future__ import annotations
 
@@ -15,53 +15,53 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.unknowns import Numbers, Unknown
 
 PassageRow = tuple[str, list[int], list[int], Floats]
-"""Kind; indices of unknowns; of points, photos or cameras; numbers, as the core takes a passage."""
+"""Core row: type, indices of unknowns, indices of points, photos or cameras, and numbers."""
 
 
 class Bend(Numbers):
-    """The two numbers w of a figure, lengths: of a board, how far its middle is bent along x and along y."""
+    """Deflection w of a board, two lengths: at its centre along x and along y."""
 
     KIND = "bend"
 
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """What all kinds have in common."""
+    """Base class of image transformations."""
 
     KIND: ClassVar[str] = ""
-    """The name under which the core knows the kind."""
+    """Name of the type in the core."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What it steps with."""
+        """Unknowns of the transformation."""
         raise NotImplementedError
 
     def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
-        """Return the rows of the points or photos that it is of.
+        """Return the rows of the points, photos or cameras concerned.
 
         Raises
         ------
         InputError
-            One that is not there.
+            If a point or photo is not in the block.
         """
         raise NotImplementedError
 
     def numbers(self) -> Floats:
-        """Return what else the core takes."""
+        """Return the numbers for the core that are not unknowns."""
         return np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
 class Figure(Passage):
-    """Points that are given, and stand beside that by `w_1 e_1 + w_2 e_2`.
+    """Points with given positions that are displaced by `w_1 e_1 + w_2 e_2`.
 
     Parameters
     ----------
     bend
-        w, one object for all points.
+        Unknown w, one object for all points.
     points
-        n names; their given coordinates are fixed (`point_sd` 0), in rectangular space, and no observation
-        but images is of them.
+        n names. The given coordinates are fixed (`point_sd` 0) in rectangular space. The points are observed
+        in images only.
     shifts
         (n, 2, 3) e_1 and e_2 of each point, in the axes of the block.
     """
@@ -83,16 +83,16 @@ class Figure(Passage):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Title in reports and messages."""
         return f"{self.KIND} {self.bend.name}"
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What it steps with."""
+        """Unknowns of the transformation."""
         return (self.bend,)
 
     def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
-        """Return the rows of its points."""
+        """Return the rows of the points."""
         if missing := [name for name in self.points if name not in points]:
             raise argument_error(f"figure {self.bend.name}", "absent", kind="point", name=missing[0])
         return [points[name] for name in self.points]
@@ -103,7 +103,7 @@ class Figure(Passage):
 
 
 def checked_passages(passages: object, points: Sequence[str], photos: Sequence[str]) -> tuple[Passage, ...]:
-    """Return passages whose points and photos are in a block."""
+    """Return validated image transformations of points and photos in a block."""
     checked = instances("passages", passages, Passage)
     for row, each in enumerate(checked):
         if not each.KIND:
@@ -115,7 +115,7 @@ def checked_passages(passages: object, points: Sequence[str], photos: Sequence[s
 def passage_rows(
     passages: Sequence[Passage], points: Sequence[str], photos: Sequence[str], unknowns: Sequence[Unknown]
 ) -> list[PassageRow]:
-    """Return what the core takes."""
+    """Convert image transformations to rows for the core."""
     if not passages:
         return []
     rows = {id(each): row for row, each in enumerate(unknowns)}

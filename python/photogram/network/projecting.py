@@ -1,4 +1,4 @@
-"""Images of points by photos on trajectories: what a rolling shutter or a line scanner sees, and when."""
+"""Projection of points into photos on trajectories (rolling shutters and line scanners)."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from photogram.words import phrase
 
 __all__ = ["camera_of", "projected", "projected_images", "standing"]
 
-Values = Callable[[Unknown], tuple[Floats, Floats]]  # Position and rotation of a common unknown
+Values = Callable[[Unknown], tuple[Floats, Floats]]  # Position and rotation of a shared unknown
 
 STEPS = 200
-CLOSE, CLOSE_LINES = 1e-13, 1e-9  # Of a whole readout; of a line, where times have as many digits
-ROUNDED = 1e-9  # Of a whole readout: what rounding alone may change
+CLOSE, CLOSE_LINES = 1e-13, 1e-9  # Relative to the whole readout; to a line, whose times have enough digits
+ROUNDED = 1e-9  # Relative to the whole readout: largest effect of rounding
 
 
 def given(unknown: Unknown) -> tuple[Floats, Floats]:
-    """Return what is given of a common unknown."""
+    """Return the given position and rotation of a shared unknown."""
     return unknown.position, unknown.attitude
 
 
 def projected(
     own: Timed, trajectory: Trajectory, camera: Camera, points: ArrayLike, values: Values = given
 ) -> Floats:
-    """Return where points appear: the row, or the line, at whose time the photo sees them there.
+    """Project points into a moving photo: each image has the pose at its own time.
 
-    A shutter: r = f_row(t(r)), each step some hundredth of the one before. A scanner: the time at which the
-    image of the point is on the line of sensors, between the ends of what the trajectory reaches (regula
+    Rolling shutter: fixed-point iteration r = f_row(t(r)), which gains about two digits per step. Scanner:
+    time at which the image of the point is on the line of sensors, within the reach of the trajectory (regula
     falsi, Illinois).
 
-    Points are (n, 3) in the axes of the trajectory, geocentric where the object space is geographic; `values`
-    say what common unknowns are: as given, or adjusted. Images are (n, 2), of scanners samples and lines; NaN
-    of points that are never seen. InputError: a scanner on a trajectory that has one record, or with a factor
-    of line rates and no time.
+    Points are (n, 3) in the axes of the trajectory, geocentric if the object space is geographic. `values`
+    returns given or adjusted values of shared unknowns. Images are (n, 2), for scanners samples and lines;
+    NaN if a point is never seen. InputError if the trajectory of a scanner has one record, or a factor of
+    line rates requires a missing reference time.
     """
     places = shaped("points", points, (len(np.asarray(points)), 3))
 
@@ -60,7 +60,7 @@ def projected(
     )
     if own.lines is not None:
         times, samples = _crossed(own, trajectory.reach, seen, len(places))
-        # By the clock and the rates of the scanner itself.
+        # According to the clock and the rates of the scanner.
         start = float(own.time or 0.0)
         return np.column_stack([samples, own.lines.at(start + (times - offset - start) / rate)])
     times = np.full(len(places), (own.time or 0.0) + offset)
@@ -71,7 +71,7 @@ def projected(
         now = own.shutter.times(seen(times + rate * rows))
         moved = float(np.fmax.reduce(np.abs(now - rows), initial=0.0))
         rows = now
-        # Large coordinates have rows with fewer digits, which go on to change by these.
+        # Rows of large coordinates have fewer digits and continue to change by rounding.
         if moved <= CLOSE or before <= moved < ROUNDED:
             break
         before = moved
@@ -87,9 +87,9 @@ def standing(
     *,
     values: Values = given,
 ) -> Floats:
-    """Return the (n, 2) images of (n, 3) points in a camera that stands still at (n,) times; NaN behind it.
+    """Project (n, 3) points with the camera pose at (n,) times; NaN for points behind it.
 
-    Of scanners they are in the focal plane; all else is as for :func:`projected`.
+    Scanner images are in the focal plane; other arguments as in :func:`projected`.
     """
     coefficients = [np.array([values(each)[0] for each in part]) for part in trajectory.coefficients]
     at, turned, *_ = trajectory.flown(times, *coefficients)
@@ -102,9 +102,9 @@ def standing(
 
 
 def projected_images(block: Block) -> Floats:
-    """Return (m, 2) images of a block, all of whose photos are on trajectories, by what is given in it.
+    """Return (m, 2) images of a block with all photos on trajectories, from given values.
 
-    InputError: refraction, by which images on trajectories are not projected; as :func:`projected`.
+    InputError if the block has refraction, and as in :func:`projected`.
     """
     if block.refraction is not None:
         raise InputError(phrase("block.timed.refraction"))
@@ -120,7 +120,7 @@ def projected_images(block: Block) -> Floats:
 
 
 def camera_of(block: Block, photo: int) -> Camera:
-    """Return the camera of a photo as it is given: also where the block has principal distances."""
+    """Return the given camera of a photo, also for a block with principal distances."""
     if block.cameras and block.photo_cameras is not None:
         return block.cameras[int(block.photo_cameras[photo])]
     return Camera("perspective", {"c": float(block.known_distances("the projection")[photo])})
@@ -129,13 +129,13 @@ def camera_of(block: Block, photo: int) -> Camera:
 def _crossed(
     own: Timed, ends: tuple[float, float], seen: Callable[[Floats, Indices], Floats], count: int
 ) -> tuple[Floats, Floats]:
-    """Return the times at which images of points cross the line of sensors, and their samples there."""
+    """Return the times at which point images cross the line of sensors, and their samples."""
     sensor, lines = own.line_sensor, own.lines
     if sensor is None or lines is None or not np.isfinite(ends).all():
         raise InputError(phrase("block.timed.one-record", photo=own.photo))
 
     def past(times: Floats, rows: Indices) -> tuple[Floats, Floats]:
-        """Return how far the image of each point is from the line of sensors, and its sample."""
+        """Return the distance of each point image from the line of sensors, and its sample."""
         samples, apart = sensor.abreast(seen(times, rows))
         return apart, samples
 
@@ -158,7 +158,7 @@ def _crossed(
         middle = np.where(np.isfinite(middle), middle, 0.5 * (low + high))
         found, samples[rows] = past(middle, rows)
         left = found * above > 0
-        # The end that stays counts half, so that it does not stay for ever.
+        # The retained end gets half weight, so that it is replaced eventually.
         below = np.where(left, 0.5 * below, above)
         low = np.where(left, low, high)
         going = np.abs(middle - high) > close

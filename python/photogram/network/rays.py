@@ -1,4 +1,4 @@
-"""A block seen as straight rays in metric axes, and the intersection of the rays of every point by itself."""
+"""A block as straight rays in metric axes, and the intersection of the rays of each point."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from photogram.network.motion import on_shared
 PARALLEL = 1e-8  # Determinant of the mean normal matrix of parallel rays
 
 
-SMALL_FRAME = 0.01  # The radius of a frame, as a part of the principal distance, at least
+SMALL_FRAME = 0.01  # Minimum radius of the image format, relative to the principal distance
 
 
 @dataclass(frozen=True, eq=False)
 class LocalAxes:
-    """Metric axes of a block: its own when rectangular, else east, north, up amid its stations."""
+    """Metric axes of a block: its own if rectangular, else east, north, up at its centre."""
 
     block: Block
     origin: Floats
@@ -26,19 +26,19 @@ class LocalAxes:
 
     @property
     def cartesian(self) -> Cartesian:
-        """The axes of the block, geocentric where its space is geographic."""
+        """Cartesian axes of the block, geocentric if its space is geographic."""
         return Cartesian(self.block.spheroid)
 
     def positions(self, positions: Floats) -> Floats:
-        """(n, 3) positions of the block in these axes; what is unknown stays NaN."""
+        """Convert (n, 3) positions of the block to these axes; unknown ones remain NaN."""
         return (self.cartesian.positions(positions) - self.origin) @ self.frame.T
 
     def from_local(self, local: Floats) -> Floats:
-        """(n, 3) positions of the block's own kind for positions in these axes."""
+        """Convert (n, 3) positions in these axes to positions of the block."""
         return self.cartesian.from_cartesian(local @ self.frame + self.origin)
 
     def cameras(self) -> Floats:
-        """(P, 3, 3) rotations from the axes of the photos to these axes."""
+        """Return (P, 3, 3) rotations from the axes of the photos to these axes."""
         block = self.block
         turned = photo_axes(block.photo_attitudes, block.photo_to_ground)
         if block.spheroid is None:
@@ -55,7 +55,7 @@ def local_axes(block: Block) -> LocalAxes:
 
 
 def _stations(block: Block) -> Floats:
-    """Return (k, 3) places amid which a block is: stations, or known points where these are flown."""
+    """Return (k, 3) positions for the centre: stations, or known points if photos move."""
     own = ~on_shared(block) if block.timed else np.ones(len(block.photo_ids), dtype=bool)
     known = np.isfinite(block.point_positions).all(axis=1)
     if own.any():
@@ -64,17 +64,17 @@ def _stations(block: Block) -> Floats:
 
 
 def frame_radius(block: Block) -> float:
-    """Return how far from the centre images reach, millimetres."""
+    """Return the distance of the images from the centre (95 % quantile), millimetres."""
     reach = float(np.quantile(np.hypot(block.image_xy[:, 0], block.image_xy[:, 1]), 0.95))
     return max(reach, SMALL_FRAME * float(np.abs(block.known_distances("checks")).min()))
 
 
 @dataclass(frozen=True, eq=False)
 class Intersection:
-    """Every point where its rays meet, whichever side of the cameras that is.
+    """Intersections of the rays of each point, in front of or behind the cameras.
 
-    Positions are (n, 3) in the metric axes, NaN with fewer than two rays, or parallel ones; residuals (m, 2)
-    observed minus computed, millimetres; `in_front` (m,) whether the point lies in front of the camera.
+    Positions (n, 3) are in the metric axes, NaN for fewer than two rays or parallel rays. Residuals (m, 2)
+    are observed minus computed, millimetres. `in_front` (m,) is True if the point is in front of the camera.
     """
 
     positions: Floats
@@ -89,10 +89,10 @@ class Intersection:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """The rays of a block: from the projection centres through the image points that are `used`, (m,).
+    """Rays from the projection centres through the image points that are `used`, (m,).
 
-    In its metric axes: (P, 3) projection centres, (P, 3, 3) rotations from the photos. `unit` is what the
-    image coordinates of the block are called in reports.
+    Projection centres (P, 3) and rotations from the photos (P, 3, 3) refer to the metric axes. `unit` is the
+    unit of image coordinates in reports.
     """
 
     block: Block
@@ -104,17 +104,17 @@ class Rays:
 
     @classmethod
     def of(cls, block: Block, used: Bools | None = None, unit: str = "mm") -> Rays:
-        """Return the rays of a block from its initial stations."""
+        """Create the rays of a block from its initial poses."""
         axes = local_axes(block)
         used = np.ones(len(block.image_xy), dtype=bool) if used is None else used
         return cls(block, axes, axes.positions(block.photo_positions), axes.cameras(), used, unit)
 
     def without(self, images: Bools) -> Rays:
-        """Return the rays with some images left out."""
+        """Return the rays without some images."""
         return replace(self, used=self.used & ~images)
 
     def directions(self) -> Floats:
-        """(m, 3) unit vectors towards the ground: the photo looks along its negative z axis."""
+        """Return (m, 3) unit vectors towards the ground; photos look along their negative z axis."""
         block = self.block
         distances = block.known_distances("checks")[block.image_photos]
         inner = np.column_stack([block.image_xy, distances]) * -np.sign(distances)[:, np.newaxis]
@@ -128,11 +128,11 @@ class Rays:
         return across, np.einsum("mij,mj->mi", across, centres)
 
     def intersect(self) -> Intersection:
-        """Intersect the rays of every point: least squares of the distances from the lines."""
+        """Intersect the rays of each point by least squares of the distances from the lines."""
         return self.at(meet(*self.totals()))
 
     def totals(self) -> tuple[Floats, Floats, Floats]:
-        """Sum the equations of the rays of each point: (n, 3, 3), (n, 3), and their number (n,)."""
+        """Sum the equations of the rays of each point: (n, 3, 3), (n, 3) and ray counts (n,)."""
         across, right = self.equations()
         points, count = self.block.image_points, len(self.block.point_ids)
         used = self.used.astype(np.float64)
@@ -145,14 +145,14 @@ class Rays:
         return normal, constant, total(np.ones(len(points)))
 
     def at(self, positions: Floats) -> Intersection:
-        """Return the residuals of all images for points at given (n, 3) positions in the metric axes."""
+        """Return the residuals of all images for given (n, 3) positions in the metric axes."""
         residuals, in_front = self.residuals(positions[self.block.image_points])
         return Intersection(positions, residuals, in_front)
 
     def residuals(self, positions: Floats, rows: Indices | None = None) -> tuple[Floats, Bools]:
-        """Return residuals of images, observed minus computed in mm, and whether positions are in front.
+        """Return image residuals, observed minus computed in mm, and whether points are in front.
 
-        `positions` are (k, 3), one for each image in the metric axes.
+        `positions` are (k, 3), one per image, in the metric axes.
         """
         block = self.block
         which: Indices | slice = slice(None) if rows is None else rows
@@ -163,7 +163,7 @@ class Rays:
         return block.image_xy[which] - inner[:, :2] * scale[:, np.newaxis], inner[:, 2] < 0
 
     def partials(self, positions: Floats, rows: Indices) -> Floats:
-        """(k, 2, 3) partials of some images with respect to (k, 3) the positions of their points."""
+        """Return (k, 2, 3) partial derivatives of images with respect to (k, 3) point positions."""
         photos = self.block.image_photos[rows]
         turned = self.cameras[photos].transpose(0, 2, 1)
         inner = np.einsum("kij,kj->ki", turned, positions - self.centres[photos])
@@ -180,7 +180,7 @@ def meet_rays(points: Indices, count: int, centres: Floats, directions: Floats) 
     `points`, `centres` and unit `directions` have a row for each ray.
     """
     across = np.eye(3) - directions[:, :, np.newaxis] * directions[:, np.newaxis]
-    # Geocentric coordinates are large: positions are counted from a place nearby.
+    # Subtract a nearby position, because geocentric coordinates are large.
     origin = np.median(centres, axis=0) if len(centres) else np.zeros(3)
     normal, constant = np.zeros((count, 3, 3)), np.zeros((count, 3))
     np.add.at(normal, points, across)
@@ -189,7 +189,7 @@ def meet_rays(points: Indices, count: int, centres: Floats, directions: Floats) 
 
 
 def meet(normal: Floats, constant: Floats, rays: Floats) -> Floats:
-    """Solve (k, 3, 3) normal equations of `rays` rays each; NaN where they do not determine a position."""
+    """Solve (k, 3, 3) normal equations of `rays` rays each; NaN if a position is undetermined."""
     determined = rays >= 1.5
     determined &= np.linalg.det(normal) > PARALLEL * np.maximum(rays, 1) ** 3
     positions = np.full(constant.shape, np.nan)

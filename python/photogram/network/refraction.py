@@ -1,4 +1,4 @@
-"""Refraction in air and water: which models bend the rays of a block."""
+"""Refraction models for air and water."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ METRES_PER_UNIT = {"m": 1.0, "ft": 0.3048}  # Linear units whose length is known
 
 @dataclass(frozen=True)
 class Refraction:
-    """What bends the rays between points and cameras (`docs/refraction.md`).
+    """Refraction models of the rays between points and cameras (`docs/refraction.md`).
 
     Parameters
     ----------
     air
         "giant": K = 13 (H - h) [1 - 0.02 (2 H + h)] microradians, H and h in km, for cameras up to 9,000 m
         (GIANT guide, Appendix F). "standard": horizontal layers of the U.S. Standard Atmosphere 1976, at any
-        height (after Saastamoinen 1974). None: none.
+        height (after Saastamoinen 1974). None: air is ignored.
     water
-        For points below the water level. "giant": the guide's Appendix G. "snell": the ray itself, by Snell's
-        law at a level surface. None: none.
+        For points below the water level. "giant": Appendix G of the guide. "snell": the exact ray by Snell's
+        law at a level surface. None: water is ignored.
     water_level
         Height of the water in the linear unit of the block: above the ellipsoid, or Z.
     refractive_index
-        Of the water relative to air.
+        Refractive index of the water relative to air.
 
     Raises
     ------
     InputError
-        A model that is not there, a level that is not finite, an index that is not finite and at least 1.
+        If a model does not exist, the level is not finite, or the index is not finite and at least 1.
     """
 
     air: Air | None = None
@@ -60,7 +60,7 @@ class Refraction:
         require(good, "refractive_index", "least", low=1, value=self.refractive_index)
 
     def phrase(self, linear_unit: str) -> Phrase:
-        """Return the models of refraction as a message."""
+        """Return the refraction models as a message."""
         parts = [Phrase(f"refraction.air.{self.air}")] if self.air else []
         if self.water:
             fields = {"level": self.water_level, "unit": linear_unit, "index": self.refractive_index}
@@ -68,23 +68,23 @@ class Refraction:
         return Phrase("refraction", {"parts": parts}) if parts else Phrase("assume.no_refraction")
 
     def describe(self, linear_unit: str) -> str:
-        """Return what is in force, in a line."""
+        """Return the refraction models in one line."""
         return str(self.phrase(linear_unit))
 
     def row(self, linear_unit: str) -> RefractionRow:
-        """Return what the core takes: models, level, index, metres in the linear unit.
+        """Return the row for the core: models, level, index, metres per linear unit.
 
         Raises
         ------
         InputError
-            A unit whose length is not known.
+            If the length of the unit is unknown.
         """
         metres = metres_per_unit(linear_unit)
         return self.air, self.water, self.water_level, self.refractive_index, metres
 
 
 def metres_per_unit(linear_unit: str) -> float:
-    """Return the length of a linear unit in metres: the models of the air know metres only."""
+    """Return the length of a linear unit in metres, for the models of air."""
     known = linear_unit in METRES_PER_UNIT
     require(known, "linear_unit with refraction", "choice", names=list(METRES_PER_UNIT), value=linear_unit)
     return METRES_PER_UNIT[linear_unit]

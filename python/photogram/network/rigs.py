@@ -1,4 +1,4 @@
-"""Rigs: photos that were taken together by cameras on one frame."""
+"""Rigs: photos taken simultaneously by cameras on one frame."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from photogram.words import phrase
 __all__ = ["Mount", "MountRow", "checked_mounts", "mount_rows"]
 
 MountRow = tuple[int, int, int]
-"""Indices of a photo, of the photo that stands for its frame, and of its sensor among the unknowns."""
+"""Indices of a photo, of the photo that represents its frame, and of its sensor among the unknowns."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """That a photo was taken by a sensor on a frame: A = A_f A_s, C = C_f + A_f c.
+    """Mount of a photo: its sensor is fixed on a frame, A = A_f A_s, C = C_f + A_f c.
 
-    Its pose has no unknowns of its own: of what the block gives for it nothing counts but where it is about.
+    The pose of the photo follows from frame and sensor; its pose in the block is only an approximation.
 
     Parameters
     ----------
     photo
-        Its name.
+        Name of the photo.
     frame
-        The name of the photo that stands for the frame: that of the first sensor. It may have no images.
+        Name of the photo that represents the frame: the photo of the first sensor. It may be without images.
     sensor
-        The pose of the sensor in the frame, one object for all photos that it took.
+        Pose of the sensor in the frame, one object for all its photos.
     """
 
     photo: str
@@ -45,7 +45,7 @@ class Mount:
 
 
 def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
-    """Return mounts that agree with each other and with the photos of a block."""
+    """Return validated mounts that are consistent with each other and with a block."""
     checked = instances("mounts", mounts, Mount)
     frames = {each.frame for each in checked}
     require_photos("mounts", [each.photo for each in checked], photos)
@@ -58,7 +58,7 @@ def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
 def mount_rows(
     mounts: Sequence[Mount], timed: Sequence[Timed], photos: Sequence[str], unknowns: Sequence[Unknown]
 ) -> list[MountRow]:
-    """Return what the core takes; where a frame is on a trajectory, the photo stands for it itself."""
+    """Convert mounts to rows for the core; on a trajectory, a photo represents its own frame."""
     on_frames = [(each.photo, each.frame, each.sensor) for each in mounts]
     on_frames += [(each.photo, each.photo, each.sensor) for each in timed if each.sensor is not None]
     places = {name: row for row, name in enumerate(photos)} if on_frames else {}

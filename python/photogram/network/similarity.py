@@ -1,4 +1,4 @@
-"""The similarity between two sets of points, in closed form (S. Umeyama, IEEE PAMI 13, 1991)."""
+"""Similarity transformation between two sets of points, in closed form (S. Umeyama, IEEE PAMI 13, 1991)."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-LINE = 1e-9  # Points spread less across a line than this, as a part of along it, lie on the line
+LINE = 1e-9  # Points with a smaller ratio of extents across and along a line are collinear
 
 
 def turn_and_scale(model: Floats, targets: Floats) -> tuple[float, Floats, Floats]:
-    """Return the scale and rotation that bring points closest to others about their means, unweighted.
+    """Return scale and rotation of the unweighted best fit about the means, and singular values.
 
-    And the singular values of the sum of products: of points on a line the second is about zero, and the
-    rotation is one of many. All are zero where the points are too large to be multiplied.
+    The second singular value of the sum of products is about 0 for collinear points, and the rotation is
+    arbitrary. All singular values are 0 if products overflow.
     """
     a, b = model - model.mean(axis=0), targets - targets.mean(axis=0)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -27,9 +27,9 @@ def turn_and_scale(model: Floats, targets: Floats) -> tuple[float, Floats, Float
 
 
 def similarity(model: Floats, targets: Floats) -> tuple[float, Floats, Floats, float]:
-    """Return scale, rotation, shift and rms misfit of the similarity between points.
+    """Return scale, rotation, translation and rms misfit of the similarity between points.
 
-    The misfit is infinite where the points do not determine it.
+    The misfit is infinite if the points do not determine the transformation.
     """
     scale, turn, sizes = turn_and_scale(model, targets)
     if sizes[1] < LINE * sizes[0] or not sizes[0] > 0:

@@ -1,4 +1,4 @@
-"""What cameras take of the ground of a simulated block: frames, then other cameras in their place."""
+"""Images of the simulated ground by frame cameras, and by other cameras that replace them."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from photogram.words import phrase
 
 @dataclass(frozen=True)
 class Taken:
-    """What cameras have taken of the ground: P photos with true poses, m images of points without errors.
+    """Images of the ground: P photos with true poses, m errorless image observations.
 
-    Poses of scanners are those in the middle of their images, which are samples and lines; `per_error` are
-    (m, 2, 2) image coordinates by millimetres in the focal plane, None: these are the same. `true` and
-    `given` are further arguments of the block: as they truly are, and as they are known.
+    The pose of a scanner refers to the mean time of its images, which are samples and lines. `per_error` (m,
+    2, 2) converts millimetres in the focal plane to image coordinates; None: no conversion. `true` and
+    `given` are further arguments of the block: true values, and values known to the adjustment.
     """
 
     photo_ids: list[str]
@@ -41,7 +41,7 @@ class Taken:
     given: dict[str, Any] = field(default_factory=dict)
 
     def in_images(self, errors: Floats, images: Indices) -> Floats:
-        """Return errors in image coordinates, of (k, 2) in the focal plane and the rows of their images."""
+        """Convert errors (k, 2) in the focal plane to image coordinates of the given image rows."""
         if self.per_error is None:
             return errors
         return np.asarray(np.einsum("mij,mj->mi", self.per_error[images], errors))
@@ -57,10 +57,9 @@ def photograph(
     photo_to_ground: bool,
     refraction: Refraction | None,
 ) -> Taken:
-    """Take the ground, (n, 3) points of a grid, by frames of one side, in the unit of the principal distance.
+    """Project (n, 3) grid points into square frames, in the unit of the principal distance.
 
-    `poses` are (P, 3) positions and attitudes of the photos. Returned are images of points that are seen at
-    least twice.
+    `poses` are (P, 3) positions and attitudes of the photos. Points with fewer than two images are removed.
     """
     found = []
     positions, attitudes = poses
@@ -88,7 +87,7 @@ def seen_side(
     height: float,
     half_angle: float,
 ) -> float:
-    """Return the side of the part of the frame whose images remain in it during the readout."""
+    """Return the side of the part of the frame that images do not leave during the readout."""
     if motion is None:
         return frame_size
     side = frame_size - 2 * abs(principal_distance) * motion.margin(height, half_angle)
@@ -100,13 +99,12 @@ def seen_side(
 def photographed(
     truth: Block, block: Block, cameras: Sequence[Camera], start_cameras: Sequence[Camera] | None
 ) -> tuple[Block, Block]:
-    """Let cameras take the photos of a simulated block in turn; return truth and block with cameras.
+    """Assign cameras cyclically to the photos of a simulated block; return truth and block.
 
-    The two have one principal distance. The errors of image coordinates and their standard deviations are
-    those of the block, as angles near the axis: in the unit of a camera they grow with its principal
-    distance. With `start_cameras` the block starts, and what is unknown of them is so there; None: they are
-    known. InputError: what are no cameras of one unit, another number of them to start with, a point that no
-    image shows.
+    Truth and block must have the same principal distance. Errors and standard deviations of image coordinates
+    are converted as angles near the axis. They are therefore proportional to the principal distance of a
+    camera. `start_cameras` define the initial values and unknowns of the block; None: cameras are fixed.
+    InputError if cameras have different units, numbers of cameras differ, or a point is not in any image.
     """
     start = cameras if start_cameras is None else checked_cameras(start_cameras)
     if len(start) != len(cameras) or start[0].unit != cameras[0].unit:
@@ -115,7 +113,7 @@ def photographed(
     photo_cameras = np.arange(len(truth.photo_ids)) % len(cameras)
     of_images = photo_cameras[truth.image_photos]
     directions = np.column_stack([truth.image_xy, np.full(len(truth.image_xy), distance)])
-    # The camera looks along -z, whatever the sign of the principal distance.
+    # The camera looks along -z for both signs of the principal distance.
     images = images_of(cameras, of_images, -np.sign(distance) * directions)
     if not np.isfinite(images).all():
         name = cameras[of_images[np.flatnonzero(~np.isfinite(images).all(axis=1))[0]]].title

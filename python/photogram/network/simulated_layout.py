@@ -1,9 +1,9 @@
-"""The layout of simulated blocks: strips over gentle relief, a grid of points below them, where control is.
+"""Layout of simulated blocks: strips over gentle relief, a ground grid, and control points.
 
-The block is laid out in a plane: x along the strips, y across them, z up, the origin in its centre on the
-mean terrain. Ground points stand on a grid locked to the photographs, a column under every projection centre
-and a row in the middle of every side overlap, so that neighbouring photographs and strips are tied, and so
-that the points a photograph may see are known beforehand.
+The block is laid out in a plane: x along the strips, y across, z up, origin at the centre on the mean
+terrain. The grid of ground points is locked to the photographs: a column below each projection centre, and a
+row in the centre of each side overlap. Neighbouring photographs and strips are therefore connected, and the
+visible points of a photograph are predictable.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from photogram.network import geometry
 from photogram.network.geometry import Spheroid
 from photogram.words import phrase
 
-_FAR_MORE = 10.0  # Times as many points as were asked for are too many
-_AT_ONCE = 2**22  # Pairs of photo and point that may see each other, that are looked at together
+_FAR_MORE = 10.0  # Maximum ratio of generated to requested points
+_AT_ONCE = 2**22  # Maximum number of pairs of photo and point that are processed together
 _CANDIDATE_BYTES, _IMAGE_BYTES = 300, 240
-"""Memory for such a pair, and for an image of the block, at the peak."""
-_JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
+"""Peak memory in bytes for such a pair, and for an image observation."""
+_JITTER = 0.15  # maximum shift in grid cells: points in the centre of an overlap remain in the overlap
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The plan of the flight: metres, counts and the point grid."""
+    """Flight plan and point grid; lengths in metres."""
 
     strips: int
     photos_per_strip: int
@@ -39,21 +39,21 @@ class Layout:
     separation: float  # of neighbouring strips
     columns_per_base: int
     rows_per_strip: int
-    reach: float  # how far from the point below it a photograph may see, in x or y
+    reach: float  # maximum distance in x or y of a visible point from the point below the photograph
 
     @property
     def length(self) -> float:
-        """Of a strip, from the first photograph to the last."""
+        """Length of a strip, from the first photograph to the last."""
         return (self.photos_per_strip - 1) * self.base
 
     @property
     def width(self) -> float:
-        """From the first strip to the last."""
+        """Distance from the first strip to the last."""
         return (self.strips - 1) * self.separation
 
     @property
     def cell(self) -> tuple[float, float]:
-        """From column to column and from row to row of the grid."""
+        """Distance between columns and between rows of the grid."""
         return self.base / self.columns_per_base, self.separation / self.rows_per_strip
 
 
@@ -66,12 +66,12 @@ def laid_out(
     points_per_photo: float,
     reach: float,
 ) -> Layout:
-    """Lay out strips: lengths in metres, `footprint` the side of a frame on the mean terrain.
+    """Lay out strips; lengths in metres, `footprint` is the side of a frame on the ground.
 
-    InputError: many more image points than were asked for, or than there is memory for.
+    InputError if there are many more image points than requested, or too many for the memory.
     """
     base, separation = (1 - forward_overlap) * footprint, (1 - side_overlap) * footprint
-    # Points on one photo are left out: where one photo of one strip sees, the images are lost.
+    # Correct for points that only one photo of one strip sees, because they are removed.
     photos = strips * photos_per_strip
     lost = _covered_once(photos_per_strip, base, footprint) * _covered_once(strips, separation, footprint)
     density = points_per_photo * photos / (photos * footprint**2 - lost)
@@ -90,14 +90,14 @@ def laid_out(
 
 
 def _covered_once(count: int, step: float, length: float) -> float:
-    """How much of a line only one of `count` overlapping intervals covers, their starts a step apart."""
+    """Return the length covered by one of `count` intervals only; their starts differ by `step`."""
     if count == 1:
         return length
     return 2 * step + (count - 2) * max(0.0, 2 * step - length)
 
 
 def window(plan: Layout) -> tuple[Indices, Indices]:
-    """Grid columns and rows a photograph may see, counted from the column and half-strip below it."""
+    """Return grid columns and rows in view, relative to the column and half-strip below."""
     dx, dy = plan.cell
     columns = math.ceil(plan.reach / dx + _JITTER)
     middle, rows = -plan.rows_per_strip / 2, plan.reach / dy + _JITTER
@@ -107,7 +107,7 @@ def window(plan: Layout) -> tuple[Indices, Indices]:
 
 
 def grid(plan: Layout) -> tuple[Indices, Indices]:
-    """All grid columns and rows: those of the first photograph to those of the last."""
+    """Return all grid columns and rows in view of any photograph."""
     columns, rows = window(plan)
     last_column = (plan.photos_per_strip - 1) * plan.columns_per_base + columns[-1]
     last_row = (plan.strips - 1) * plan.rows_per_strip + rows[-1]
@@ -115,7 +115,7 @@ def grid(plan: Layout) -> tuple[Indices, Indices]:
 
 
 def candidates(plan: Layout) -> Iterator[tuple[Indices, Indices]]:
-    """Pairs of photo and grid point that may see each other, by photo, then point: some photos at a time."""
+    """Yield pairs of photo and visible grid point in batches, sorted by photo, then point."""
     columns, rows = window(plan)
     _, all_rows = grid(plan)
     step = max(1, _AT_ONCE // (len(columns) * len(rows)))
@@ -130,7 +130,7 @@ def candidates(plan: Layout) -> Iterator[tuple[Indices, Indices]]:
 
 
 def ground_points(plan: Layout, relief: float, footprint: float, random: np.random.Generator) -> Floats:
-    """Ground points in the plan, (n, 3), column by column: a jittered grid on long waves."""
+    """Generate ground points in the plan, (n, 3), column by column: a jittered grid on waves."""
     dx, dy = plan.cell
     columns, rows = grid(plan)
     x, y = np.meshgrid(
@@ -150,7 +150,7 @@ def ground_points(plan: Layout, relief: float, footprint: float, random: np.rand
 def flight(
     plan: Layout, flying_height: float, crab: float, tilt: float, random: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Projection centres in the plan and rotations from the plan to the photos."""
+    """Return projection centres in the plan and rotations from the plan to the photos."""
     strip, number = np.divmod(np.arange(plan.strips * plan.photos_per_strip), plan.photos_per_strip)
     x, y = number * plan.base - plan.length / 2, strip * plan.separation - plan.width / 2
     deviation = random.uniform(-1.0, 1.0, (len(strip), 3)) * [tilt, tilt, crab]
@@ -165,7 +165,7 @@ def into_object_space(
     spheroid: Spheroid | None,
     photo_to_ground: bool,
 ) -> tuple[Floats, Floats]:
-    """Positions and, given the rotations from the plan to the photos, attitudes in the object space."""
+    """Transform positions and, if given, rotations from the plan to the object space."""
     positions = plan_positions + np.asarray(origin)
     if spheroid is not None:
         tangent_point = np.array([[origin[0], origin[1], 0.0]])
@@ -177,8 +177,7 @@ def into_object_space(
     if rotations is None:
         return positions, np.empty((0, 3))
     if spheroid is not None:
-        # East at the station, seen from the plan: turned about the vertical by the convergence of the
-        # meridians.
+        # East at the station, seen from the plan, is rotated about the vertical by meridian convergence.
         in_plan = geometry.local_frames(positions)[:, 0] @ frame.T
         convergence = np.zeros_like(positions)
         convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
@@ -187,7 +186,7 @@ def into_object_space(
 
 
 def control_pattern(plan: Layout, terrain: Floats, pattern: str, spacing: int) -> NDArray[np.bool_]:
-    """Which components of which points are held, (n, 3)."""
+    """Return (n, 3) which components of points are control."""
     held = np.zeros(terrain.shape, dtype=bool)
     if pattern == "none":
         return held
@@ -202,7 +201,7 @@ def control_pattern(plan: Layout, terrain: Floats, pattern: str, spacing: int) -
     if pattern == "perimeter":
         overlaps = np.linspace(-top, top, plan.strips + 1)[1:-1]
         height = [(x, y) for x in xs[1:-1] for y in overlaps]
-    # Along the longer side few points are near a place.
+    # Along the longer side, few points are close to a control position.
     axis = int(top > right)
     order = np.argsort(terrain[:, axis])
     along_axis = terrain[order, axis]
@@ -225,7 +224,7 @@ def photo_ids(plan: Layout) -> list[str]:
 
 
 def point_ids(held: NDArray[np.bool_], checks: Indices) -> list[str]:
-    """Return the names of points: C of control, K of check points, P of pass points."""
+    """Return point names: C for control points, K for check points, P for pass points."""
     kind = np.where(held.any(axis=1), "C", "P")
     kind[checks] = "K"
     return [f"{letter}{number:06d}" for number, letter in enumerate(kind, start=1)]

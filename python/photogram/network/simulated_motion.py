@@ -1,7 +1,7 @@
-"""How the cameras of simulated blocks move while they look: rolling shutters, line scanners.
+"""Motion of simulated cameras during exposure: rolling shutters and line scanners.
 
-The truth of a rolling shutter is uniform motion of each photo, that of a scanner a table with corrections
-drawn from what is known of them: the model of the adjustment, so that errors agree with their covariance.
+The true motion of a rolling shutter is uniform. A true scanner trajectory is a table with corrections drawn
+from their prior. Both match the model of the adjustment, so that errors agree with their covariance.
 """
 
 from __future__ import annotations
@@ -28,32 +28,31 @@ from photogram.network.trajectories import Polynomial, Readout, Spline
 
 __all__ = ["LineScanner", "RollingShutter", "photo_angles", "rolled", "rotations_of"]
 
-_GUSTS = 0.03  # Standard deviation of a component of a velocity, as part of the speed
-_STARTS = 0.5  # Where a readout time starts of which nothing is known, as part of the true one
+_GUSTS = 0.03  # Standard deviation of a velocity component, relative to the speed
+_STARTS = 0.5  # Initial value of an unknown readout time, relative to the true one
 
 
 @dataclass(frozen=True)
 class RollingShutter:
-    """Photos whose rows are exposed one after the other while the camera flies on and turns.
+    """Simulated rolling shutter: rows are exposed in sequence while the camera moves.
 
     Parameters
     ----------
     readout
-        From the first row to the last, seconds.
+        Time from the first row to the last, seconds.
     speed
-        Of the flight along the strips, metres a second; velocities of photos differ from it by some percent.
+        Speed along the strips, metres per second; velocities of photos differ from it by a few percent.
     rate
-        Standard deviation of the true rate of a photo about each of its axes, radians a second.
+        Standard deviation of the true rotation rate of a photo about each axis, radians per second.
     readout_sd
-        How well the readout time is known, seconds: it starts so far off. Infinite: not at all, and it starts
-        at half of the true one; 0: it is known.
+        Standard deviation of the readout time and of its initial error, seconds. Infinite: free, with half of
+        the true value as initial value. 0: fixed.
     speed_sd, rate_sd
-        Standard deviations of a component of the observed velocities (GNSS), metres a second, and rates
-        (gyroscope), radians a second, of the photos: of their noise and in the block. Infinite: none are
-        observed.
+        Standard deviations of the components of observed velocities (GNSS, metres per second) and rotation
+        rates (gyroscope, radians per second), used for noise and in the block. Infinite: not observed.
     direction
-        In which rows or columns are read. Strips are flown along x of the photos: `right` and `left` read
-        along and against the flight, `down` and `up` across it.
+        Direction in which rows or columns are read. Strips are flown along x of the photos: `right` and
+        `left` read along and against the flight, `down` and `up` across it.
     """
 
     readout: float
@@ -71,36 +70,36 @@ class RollingShutter:
 
     @property
     def turned(self) -> float:
-        """Angle by which hardly a photo turns more while it is read, radians."""
+        """Practical upper bound of the rotation of a photo during readout, radians."""
         return 5 * self.rate * self.readout
 
     def margin(self, height: float, half_angle: float) -> float:
-        """Return how far an image may move while it is read, in principal distances."""
+        """Return the maximum image motion during readout, in principal distances."""
         flown = (1 + 5 * _GUSTS) * self.speed * self.readout / height
         return (flown + self.turned) * (1 + math.tan(half_angle) ** 2)
 
 
 @dataclass(frozen=True)
 class LineScanner:
-    """Lines of sensors across the flight in the focal plane of one lens, in the place of frames.
+    """Simulated line scanner: sensor lines across the flight direction behind one lens.
 
     Parameters
     ----------
     lines
-        1 looks down, 2 ahead and back, 3 ahead, down and back: so many images of a strip, on one trajectory.
+        1: nadir; 2: forward and backward; 3: forward, nadir and backward. Each gives one image per strip.
     view_angle
-        Between looking down and looking ahead or back, radians.
+        Angle between the nadir and the forward or backward view, radians.
     pitch
-        Millimetres from sample to sample. Lines are as far apart on the ground.
+        Millimetres between samples. The ground distance of lines equals the ground distance of samples.
     speed
-        Of the flight, metres a second.
+        Flying speed, metres per second.
     every
-        Seconds between the records of trajectories, and between those of GNSS and inertial unit.
+        Seconds between trajectory records, and between GNSS and inertial records.
     position, rotation
-        What the errors of trajectories are made of; their coefficients are drawn, and weighted.
+        Basis of the trajectory errors; the coefficients are drawn and weighted.
     scenes
-        True: each photo of the layout is a scene, as long as a frame would be, on a trajectory of its own (as
-        from orbits); False: each strip is one.
+        True: each photo of the layout is a scene with the length of a frame, on a trajectory of its own (e.g.
+        from orbit). False: each strip is one scene.
     """
 
     lines: int = 3
@@ -128,7 +127,7 @@ class LineScanner:
 
     @property
     def views(self) -> dict[str, float]:
-        """The lines by name, and the angles ahead of looking down, radians."""
+        """Names of the lines and their forward viewing angles, radians."""
         ahead = {"forward": self.view_angle, "nadir": 0.0, "backward": -self.view_angle}
         chosen = {1: ["nadir"], 2: ["forward", "backward"], 3: list(ahead)}[self.lines]
         return {name: ahead[name] for name in chosen}
@@ -139,7 +138,6 @@ def _check_numbers(
     within: Mapping[str, tuple[float, float]],
     deviations: tuple[str, ...],
 ) -> None:
-    """Refuse numbers outside their limits, and what is no standard deviation."""
     for name in (each.name for each in fields(given)):
         value = getattr(given, name)
         if name in within:
@@ -167,11 +165,10 @@ def rolled(
     frame: float,
     random: np.random.Generator,
 ) -> tuple[Block, Block]:
-    """Let the photos of a simulated block be read row by row while they move; return truth and block.
+    """Simulate the motion of photos with a rolling shutter; return truth and block.
 
-    Both are in rectangular space, with strips that are flown in opposite directions; `frame` is the side of
-    the frame in principal distances. Photos get motions of their own: in the first block the true ones are
-    given.
+    Both are in rectangular space, and strips are flown in opposite directions. `frame` is the side of the
+    frame in principal distances. Each photo has its own motion, which is true in the first block.
     """
     count = len(truth.photo_ids)
     strip, along = np.divmod(np.arange(count), layout.photos_per_strip)
@@ -199,15 +196,15 @@ def rolled(
 
 
 def _observed(true: Floats, nominal: Floats, sd: float, random: np.random.Generator) -> Floats:
-    """Return what is given of true values: observed, or nominal where nothing is."""
+    """Return observed values with noise, or nominal values if `sd` is infinite."""
     draw = random.standard_normal(true.shape)
     return true + sd * draw if math.isfinite(sd) else nominal
 
 
 def _with_attitudes(block: Block, truth: Block, draw: Floats) -> Block:
-    """Return a block whose weighted attitudes are observations: those of photos that move are none of theirs.
+    """Convert weighted attitudes of moving photos to attitude observations.
 
-    `truth` has the true attitudes, `draw` is of the errors.
+    `truth` contains the true attitudes, `draw` the normalised errors.
     """
     sd = truth.photo_attitude_sd
     if not ((sd > 0) & np.isfinite(sd)).any():
@@ -234,7 +231,7 @@ def _timed(
     times: Floats,
     motions: tuple[Floats, Floats],
 ) -> Block:
-    """Return a block whose photos have motions of their own, and a shutter for each camera."""
+    """Return a block with own motions of the photos, and a shutter for each camera."""
     cameras = _photo_cameras(block)
     names = block.camera_names if block.cameras else ["camera 1"]
     shutters = [
@@ -259,13 +256,13 @@ def _timed(
 
 
 def _photo_cameras(block: Block) -> Indices:
-    """Return (P,) which camera each photo has; the first where there are principal distances."""
+    """Return (P,) camera rows of the photos; 0 for principal distances."""
     given = block.photo_cameras
     return np.zeros(len(block.photo_ids), dtype=np.int64) if given is None else given
 
 
 def _edges(block: Block, direction: Direction, frame: float) -> list[tuple[float, float]]:
-    """Return the image coordinates of the edges where reading begins and ends, for each camera."""
+    """Return the image coordinates of the readout edges, start and end, for each camera."""
     axis = 1 if direction in ("down", "up") else 0
     found = []
     for photo in np.unique(_photo_cameras(block), return_index=True)[1].tolist():

@@ -1,7 +1,7 @@
-"""What else is measured of simulated blocks: GNSS with shift and drift, inertial units, distances, rigs.
+"""Additional observations of simulated blocks: GNSS, inertial units, distances and rigs.
 
-Each function takes a simulation and returns one with more in it. The truth has the same observations without
-errors, and what they have in common known; in the block it is unknown and starts elsewhere.
+Each function returns a simulation with more observations. In the truth they are errorless and shared unknowns
+are fixed. In the block shared unknowns are free and have other initial values.
 """
 
 from __future__ import annotations
@@ -42,30 +42,30 @@ def with_gnss(
     seconds: float = 5.0,
     seed: int | np.random.Generator = 1,
 ) -> Simulation:
-    """Add a GNSS position of every photo.
+    """Add a GNSS position to every photo.
 
     Parameters
     ----------
     simulation
-        A simulated block, photos strip by strip.
+        Simulated block with photos strip by strip.
     sd
-        Standard deviation of a coordinate, metres: of its error and in the block.
+        Standard deviation of a coordinate in metres, for the noise and in the block.
     lever_arm
         (3,) from the projection centres to the antenna, in the axes of the photos, metres.
     lever_arm_sd
-        With what standard deviation it was measured: 0 known, infinite unknown.
+        Standard deviation of the lever arm: 0 fixed, infinite free.
     shift_sd, drift_sd
-        Standard deviations of shifts and, a second, drifts of the strips, which are unknown: of their draw
-        alone. 0: there are none.
+        Standard deviations of the true shifts (metres) and drifts (metres per second) of the strips, which
+        are free in the block. 0: no shift or drift.
     seconds
-        Between photos.
+        Time between photos, seconds.
     seed
         Equal seeds and equal arguments give equal observations.
 
     Raises
     ------
     InputError
-        Arguments outside their ranges, a block with a rig.
+        If an argument is outside its range, or the block has a rig.
     """
     _positive(sd=sd, seconds=seconds)
     for name, deviation in (("shift_sd", shift_sd), ("drift_sd", drift_sd)):
@@ -77,7 +77,7 @@ def with_gnss(
     given = arm + (lever_arm_sd if math.isfinite(lever_arm_sd) else 1.0) * random.standard_normal(3)
     arms = LeverArm("antenna", arm, 0.0), LeverArm("antenna", given, lever_arm_sd)
     axes, (centres, turned) = Cartesian(truth.spheroid), _poses(truth)
-    # The strip of a photo is the first half of its name.
+    # The strip is the first half of the name of a photo.
     names = [name[: len(name) // 2] for name in truth.photo_ids]
     places = {name: row for row, name in enumerate(dict.fromkeys(names))}
     strips = np.array([places[name] for name in names], dtype=np.int64)
@@ -121,24 +121,24 @@ def with_inertial(
     boresight: ArrayLike = 0.0,
     seed: int | np.random.Generator = 2,
 ) -> Simulation:
-    """Add the attitude of every photo, from an inertial unit whose boresight is unknown.
+    """Add the attitude of every photo, from an inertial unit with unknown boresight.
 
     Parameters
     ----------
     simulation
         A simulated block.
     sd
-        Standard deviation of a rotation about an axis of the unit, radians: of its error and in the block.
+        Standard deviation of a rotation about an axis of the unit, radians, for the noise and in the block.
     boresight
-        (3,) rotation vector of the boresight, from the axes of the unit to those of the photos, radians; it
-        starts at 0.
+        (3,) rotation vector of the boresight, from the axes of the unit to the axes of the photos, radians.
+        Its initial value is 0.
     seed
         Equal seeds and equal arguments give equal observations.
 
     Raises
     ------
     InputError
-        Arguments outside their ranges.
+        If an argument is outside its range.
     """
     _positive(sd=sd)
     random, truth = np.random.default_rng(seed), simulation.truth
@@ -166,27 +166,27 @@ def with_distances(
     unknown: bool = False,
     seed: int | np.random.Generator = 3,
 ) -> Simulation:
-    """Add distances between points that are drawn at random.
+    """Add distances between random pairs of points.
 
     Parameters
     ----------
     simulation
         A simulated block.
     count
-        How many.
+        Number of distances.
     sd
-        Standard deviation, metres: of their errors and in the block.
+        Standard deviation of a distance in metres, for the noise and in the block.
     scale, constant
-        Of the instrument; `constant` in metres.
+        Scale and constant of the instrument; `constant` in metres.
     unknown
-        Whether these are unknown; they start at 1 and 0. Otherwise they are 1 and 0.
+        Whether scale and constant are free, with the initial values 1 and 0. If False, they must be 1 and 0.
     seed
         Equal seeds and equal arguments give equal observations.
 
     Raises
     ------
     InputError
-        Arguments outside their ranges, more distances than there are points.
+        If an argument is outside its range, or there are not enough points.
     """
     _positive(sd=sd, scale=scale)
     truth = simulation.truth
@@ -221,20 +221,20 @@ def with_rig(
     frame_size: float = 230.0,
     seed: int | np.random.Generator = 4,
 ) -> Simulation:
-    """Add cameras to the frame that carries the camera of a block: an oblique head, a stereo head.
+    """Add cameras to the camera frame of a block, e.g. oblique or stereo cameras.
 
-    Every photo of the block gets companions; they show the points of the block that lie in their frames, with
-    its standard deviations. The poses of the sensors are unknown.
+    Each photo of the block gets one companion per sensor. Companions observe the points of the block inside
+    their frames, with the same standard deviations. The poses of the sensors are free.
 
     Parameters
     ----------
     simulation
-        A simulated block with principal distances and without refraction.
+        Simulated block with principal distances and without refraction.
     positions, rotations
-        (k, 3) positions of the k sensors in the axes of the photos in metres, and rotation vectors of their
-        axes there in radians.
+        (k, 3) positions of the k sensors in the axes of the photos, metres, and rotation vectors of their
+        axes, radians.
     position_error, rotation_error
-        Standard deviations of the errors of their initial poses, metres and radians.
+        Standard deviations of the errors of initial sensor poses, metres and radians.
     frame_size
         Side of the square frame, in the unit of image coordinates.
     seed
@@ -243,7 +243,7 @@ def with_rig(
     Raises
     ------
     InputError
-        Arguments outside their ranges, a block with cameras or refraction.
+        If an argument is outside its range, or the block has cameras or refraction.
     """
     _positive(frame_size=frame_size)
     random, truth = np.random.default_rng(seed), simulation.truth
@@ -326,14 +326,14 @@ def _observed(
 
 
 def _of_strips(kind: type[Shift] | type[Drift], values: Floats) -> tuple[list[Any], list[Any]]:
-    """Return the shifts or drifts of strips as they are, and as they are known."""
+    """Return true shifts or drifts of strips, and the free ones of the block."""
     names = [f"strip {k + 1}" for k in range(len(values))]
     known = [kind(name, value, 0.0) for name, value in zip(names, values, strict=True)]
     return known, [kind(name) for name in names]
 
 
 def _poses(block: Block) -> tuple[Floats, Floats]:
-    """Return the cartesian positions of the photos, and their axes there as columns."""
+    """Return cartesian positions of the photos, and their axes as columns."""
     axes, turned = Cartesian(block.spheroid), photo_axes(block.photo_attitudes, block.photo_to_ground)
     return axes.positions(block.photo_positions), axes.from_local(turned, block.photo_positions)
 
@@ -341,7 +341,7 @@ def _poses(block: Block) -> tuple[Floats, Floats]:
 def _seen(
     block: Block, positions: Floats, angles: Floats, distances: Floats, frame_size: float
 ) -> tuple[Indices, Indices, Floats]:
-    """Return photos, points and image coordinates of what lies in the frames, in front."""
+    """Return photos, points and image coordinates of points in front and inside the frames."""
     photos, points, images = [], [], []
     everything = np.arange(len(block.point_ids))
     centres, axes = _poses(block.replace(photo_positions=positions, photo_attitudes=angles))

@@ -1,4 +1,4 @@
-"""Simulated strips of a line scanner: trajectories with errors, images line by line, records beside them."""
+"""Simulated strips of a line scanner: trajectories with errors, images line by line, records."""
 
 from __future__ import annotations
 
@@ -19,22 +19,21 @@ from photogram.network.simulated_layout import Layout, grid, photo_ids, window
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
-_BETWEEN = 60.0  # Seconds between two passes, at least
-_PERIODS = 8.0, 30.0  # Seconds, of the three waves that roll and pitch are made of
-_BEYOND = 2  # Lines beyond the first and the last, to which trajectories reach
+_BETWEEN = 60.0  # Minimum time between two passes, seconds
+_PERIODS = 8.0, 30.0  # Periods in seconds of the three waves of roll and pitch
+_BEYOND = 2  # Lines before the first and after the last one within reach of trajectories
 _SURE = 5.0
-"""Standard deviations within which the measurement of a line stays: where the ground moves slowly past the
-line, an error in the focal plane is one of many lines.
-"""
+"""Maximum measurement error in standard deviations. At low ground speed, an error in the focal plane equals
+many lines."""
 
 
 @dataclass(frozen=True)
 class Flown:
-    """How a scanner is flown; lengths of the plan in metres, of the camera in millimetres, angles in radians.
+    """Flight of a scanner: plan in metres, camera in millimetres, angles in radians.
 
-    The lines of sensors are as long as the frame; `crab` and `tilt` are the largest deviations from heading
-    and vertical. `image_sd` is of measurements in the focal plane; `errors` and `sd` of the coefficients of
-    positions and rotations, and of their observations; `origin` (3,) of the plan in the object space.
+    Sensor lines have the length of the frame. `crab` and `tilt` are the maximum deviations from heading and
+    vertical. `image_sd` refers to the focal plane. `errors` and `sd` belong to the coefficients of positions
+    and rotations, and to their observations. `origin` (3,) is the plan origin in the object space.
     """
 
     scanner: LineScanner
@@ -51,17 +50,17 @@ class Flown:
 
     @property
     def line(self) -> float:
-        """Seconds from line to line: as far on the ground as from sample to sample."""
+        """Seconds between lines, for equal ground distances of lines and samples."""
         c = abs(self.principal_distance)
         return self.scanner.pitch * self.height / c / self.scanner.speed
 
     @property
     def ahead(self) -> float:
-        """Metres that the line that looks farthest ahead looks ahead."""
+        """Maximum ground distance ahead of the camera in view of a line, metres."""
         return self.height * math.tan(max(self.scanner.views.values()))
 
     def sensors(self) -> dict[str, LineSensor]:
-        """Return the lines of sensors by name: each as long as the frame, ahead of the axis or behind."""
+        """Return the sensor lines by name, each with the length of the frame."""
         pitch = self.scanner.pitch
         middle = round(self.frame_size / pitch) / 2
         return {
@@ -74,8 +73,8 @@ class Flown:
 class _Pass:
     """A strip or a scene.
 
-    It is flown from `first` on in a sense of x at `across` of y, metres of the plan, for some seconds from
-    `start` on, over points of the grid.
+    It begins at `first` with direction `sense` in x, at `across` in y, metres of the plan. It lasts `seconds`
+    from `start` on and covers `points` of the grid.
     """
 
     name: str
@@ -88,7 +87,7 @@ class _Pass:
 
 
 def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Generator) -> Taken:
-    """Let a line scanner take the (n, 3) points of the grid of a layout, in the object space."""
+    """Scan (n, 3) grid points of a layout in the object space with a line scanner."""
     sensors = flown.sensors()
     cameras = [Camera("perspective", {"c": flown.principal_distance}, name=name) for name in sensors]
     ids: list[str] = []
@@ -130,7 +129,7 @@ def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Gene
 
 
 def _passes(layout: Layout, flown: Flown) -> Iterator[_Pass]:
-    """Yield strips, or scenes, one after the other."""
+    """Yield strips, or scenes, in sequence."""
     columns, rows = window(layout)
     all_columns, all_rows = grid(layout)
     half = flown.frame_size / 2 / abs(flown.principal_distance) * flown.height
@@ -154,12 +153,12 @@ def _passes(layout: Layout, flown: Flown) -> Iterator[_Pass]:
 
 
 def _trajectories(each: _Pass, flown: Flown, random: np.random.Generator) -> tuple[Trajectory, Trajectory]:
-    """Return the true trajectory, and what is known of it: the same table with other coefficients."""
+    """Return the true trajectory and the known one, with the same table and other coefficients."""
     scanner = flown.scanner
     times = np.arange(-1.0, math.ceil(each.seconds / scanner.every) + 2) * scanner.every + each.start
     along = each.first + each.sense * scanner.speed * (times - each.start)
     places = np.column_stack([along, np.full(len(times), each.across), np.full(len(times), flown.height)])
-    # Samples to the right of the flight, y of the camera ahead.
+    # Samples are to the right of the flight direction, y of the camera is ahead.
     heading = random.uniform(-flown.crab, flown.crab) - each.sense * math.pi / 2
     vectors = np.zeros((len(times), 3))
     for axis in (0, 1):
@@ -170,12 +169,12 @@ def _trajectories(each: _Pass, flown: Flown, random: np.random.Generator) -> tup
     table = Table(times, places + flown.origin, times, axes)
     true: list[Polynomial | Spline | None] = [None, None]
     given = true.copy()
-    # Of a spline that goes on beyond the images nothing would show the last coefficients.
+    # Images would not determine the last coefficients of a spline that extends beyond them.
     beyond = _BEYOND * flown.line
     for which, (basis, error, sd) in enumerate(
         zip((scanner.position, scanner.rotation), flown.errors, flown.sd, strict=True)
     ):
-        # What is fixed at the truth, or has no error, has no corrections.
+        # Fixed or errorless trajectories need no corrections.
         if error and sd:
             placed = basis.over(each.start - beyond, each.start + each.seconds + beyond)
             drawn = error * random.standard_normal((placed.count, 3))
@@ -190,7 +189,7 @@ def _trajectories(each: _Pass, flown: Flown, random: np.random.Generator) -> tup
 def _records(
     each: _Pass, both: tuple[Trajectory, Trajectory], flown: Flown, random: np.random.Generator
 ) -> tuple[list[Observation], list[Observation]]:
-    """Return positions and attitudes of a pass that are observed: without errors, and with them."""
+    """Return errorless and noisy observations of positions and attitudes of a pass."""
     every = flown.scanner.every
     count = math.floor(each.seconds / every + 0.5)
     times = np.asarray(each.start + every * (np.arange(count) + 0.5), dtype=np.float64)
@@ -217,7 +216,7 @@ def _records(
 def _images(
     each: _Pass, own: Timed, camera: Camera, ground: Floats, sd: float
 ) -> tuple[Indices, Floats, Floats]:
-    """Return points that an image of a pass shows, their samples and lines, and these by errors."""
+    """Return the points in an image of a pass, their samples and lines, and derivatives by errors."""
     assert own.trajectory is not None
     assert own.lines is not None
     assert own.line_sensor is not None
@@ -229,12 +228,12 @@ def _images(
         standing(own, own.trajectory, camera, ground[points], own.lines.times(xy[:, 1] + half))
         for half in (-0.5, 0.5)
     )
-    # v = place of the sample - image in the focal plane, by samples and lines.
+    # v = position of the sample - image in the focal plane, by samples and lines.
     by = np.empty((len(points), 2, 2))
     by[:, :, 0] = own.line_sensor.pitch
     by[:, :, 1] = before - after
     per_error = np.asarray(np.linalg.inv(by), dtype=np.float64)
-    # What may be measured beyond the image is not in it.
+    # Measurements beyond the image are not part of it.
     apart = _SURE * sd * np.linalg.norm(per_error[:, 1], axis=1) - _BEYOND
     inside = (xy[:, 1] >= apart) & (xy[:, 1] <= extent[1] - apart)
     return points[inside], xy[inside], per_error[inside]

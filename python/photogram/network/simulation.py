@@ -36,22 +36,22 @@ __all__ = ["Blunders", "Simulation", "simulate"]
 
 
 _HUGE = 1e12
-_TINY = 1e-3  # What no length of a block exceeds, and what none falls below
+_TINY = 1e-3  # Largest and smallest length of a block
 _NARROWEST, _WIDEST = 1e-6, 1.4
-"""Radians from the vertical: what photos show beyond it is too far away to simulate."""
-_FAR_MORE = 10.0  # Times as far aside as photos see is too far
+"""Limits of the viewing angle from the vertical, radians; a wider view is too far away to simulate."""
+_FAR_MORE = 10.0  # Maximum lateral distance relative to the range of view
 
 
 @dataclass(frozen=True)
 class Blunders:
-    """Gross errors put into image observations.
+    """Gross errors added to image observations.
 
     Attributes
     ----------
     images
         (k,) rows of the block's image arrays.
     amounts
-        (k, 2) what was added to x and y, in millimetres.
+        (k, 2) errors added to x and y, in millimetres.
     """
 
     images: Indices
@@ -60,19 +60,19 @@ class Blunders:
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulated block and the truth behind it.
+    """Simulated block with its true values.
 
     Attributes
     ----------
     block
-        What would have been measured: noisy image coordinates, control and, where they are weighted,
-        positions and attitudes of the photos; besides their coarse initial values. Check points have their
-        true positions, unheld and known without error; pass points have none.
+        Simulated measurements: noisy image coordinates, control, weighted positions and attitudes of photos,
+        and coarse initial values. Check points have true positions, but are free and errorless. Positions of
+        pass points are missing.
     truth
-        The same block with true positions and attitudes everywhere and image coordinates free of errors; with
-        true readout times, motions and trajectories, which are weighted as in `block`.
+        The same block with true positions and attitudes and errorless image coordinates. Readout times,
+        motions and trajectories are true as well, and weighted as in `block`.
     blunders
-        The gross errors in `block`.
+        Gross errors in `block`.
     """
 
     block: Block
@@ -118,61 +118,60 @@ def simulate(
     Parameters
     ----------
     strips, photos_per_strip
-        Their numbers; neighbouring strips are flown in opposite directions.
+        Number of strips and of photos in each; neighbouring strips are flown in opposite directions.
     forward_overlap, side_overlap
-        Of neighbouring photographs and strips, as parts of the frame: above 0.5 and above 0 respectively,
+        Overlap of neighbouring photographs (above 0.5) and strips (above 0), as a fraction of the frame,
         below 1.
     principal_distance
-        Millimetres; negative for the positive (diapositive) plane.
+        Principal distance in millimetres; negative for the positive (diapositive) plane.
     frame_size
         Side of the square frame, millimetres.
     flying_height, relief
-        Above the mean terrain, and the largest height of the smooth terrain above or below its mean; metres.
+        Height above the mean terrain, and maximum deviation of the smooth terrain from its mean; metres.
     points_per_photo
-        Mean number of image points on a photograph, nearly: the grid has whole numbers of points in a base
-        and in a strip.
+        Approximate mean number of image points per photograph; the grid has a whole number of points in a
+        base and in a strip.
     crab, tilt
-        Largest deviations of kappa from the heading, and of omega and phi from zero (uniform, either sign);
+        Maximum deviations of kappa from the heading, and of omega and phi from zero (uniform, either sign);
         radians.
     control
-        "perimeter": full control around the block every `control_spacing` bases and chains of height control
-        across it, as far apart; "corners": four full control points; "none". Control points are pass points
-        near these places.
+        "perimeter": full control around the block every `control_spacing` bases, and chains of height control
+        across it at the same distance. "corners": four full control points. "none": without control. Control
+        points are the pass points nearest to these positions.
     control_sd
-        Standard deviation of every held component, metres; 0 gives fixed control.
+        Standard deviation of each control coordinate, metres; 0 for fixed control.
     check_points
-        How many points, chosen at random, carry their true position without being held.
+        Number of random points with true positions that are not used as control.
     image_sd
-        Standard deviation of image coordinates, millimetres: of their noise and in the block.
+        Standard deviation of image coordinates in millimetres, for the noise and in the block.
     position_error, attitude_error
-        Standard deviation of the errors in the initial values of the photos, metres and radians.
+        Standard deviations of the errors of initial photo positions and attitudes, metres and radians.
     position_sd, attitude_sd
-        Standard deviations of observed positions and attitudes (GNSS, inertial), metres and radians: of their
-        noise and in the block. Infinite: none are observed; 0: they are fixed at the truth.
+        Standard deviations of observed positions and attitudes (GNSS, inertial) in metres and radians, for
+        the noise and in the block. Infinite: not observed. 0: fixed at the true values.
     blunders, blunder_size
-        How many image points get a gross error, and its size in millimetres, in x or y, of either sign.
+        Number of image points with a gross error, and its size in millimetres, in x or y, of either sign.
     spheroid
-        None: rectangular space, x and y of the plan being X and Y. Else geographic space in metres: the plan
-        touches the spheroid at the origin, its x pointing east there; heights count from the spheroid,
+        None: rectangular space, with x and y of the plan as X and Y. Otherwise geographic space in metres:
+        the plan touches the spheroid at the origin, with x to the east. Heights are ellipsoidal, and
         photographs look down the local vertical.
     origin
-        The centre of the block on the mean terrain: X, Y, Z in metres, or longitude (rad), latitude (rad),
-        height (m).
+        Centre of the block on the mean terrain: X, Y, Z in metres, or longitude (rad), latitude (rad), height
+        (m).
     photo_to_ground
-        The sense of the attitude angles.
+        Direction of the attitude angles.
     refraction
-        What bends the rays, in the images and in the block; None: they are straight.
+        Refraction model, for the images and in the block; None for straight rays.
     cameras
-        Take the photos in turn: with distortion, in millimetres or pixels; `frame_size` and
-        `principal_distance` then only say what they see, and errors of image coordinates are as large in
-        angle. None given: a camera without distortion, with the principal distance.
+        Cameras, assigned to photos cyclically, with distortion, in millimetres or pixels. `frame_size` and
+        `principal_distance` then only define the field of view, and image errors have the same angular size.
+        Default: one camera without distortion and with the principal distance.
     start_cameras
-        What the block knows of them: where it starts from, and which parameters are free or weighted. None:
-        they are known.
+        Initial cameras of the block, which also define free and weighted parameters. None: cameras are fixed.
     motion
-        How the cameras move while they look: with a rolling shutter, or as line scanners whose trajectories
-        have errors of `position_error` and `attitude_error`, which are weighted, and records of `position_sd`
-        and `attitude_sd`. In rectangular space and without refraction alone. None: they stand still.
+        Motion of the cameras during exposure: a rolling shutter, or line scanners. Trajectories of scanners
+        have weighted errors of `position_error` and `attitude_error`, and records of `position_sd` and
+        `attitude_sd`. Requires rectangular space without refraction. None: cameras are at rest.
     seed
         Equal seeds and equal arguments give equal blocks.
 
@@ -180,13 +179,13 @@ def simulate(
     -------
     Simulation
         Photos strip by strip, named by strip and photo ("0203"); images sorted by photo, then point. Points
-        seen on one photo only are left out. Names of control points begin with C, of check points with K, of
-        pass points with P.
+        with one image are removed. Names begin with C for control points, K for check points and P for pass
+        points.
 
     Raises
     ------
     InputError
-        Arguments outside their ranges.
+        If an argument is outside its range.
     """
     _check_numbers(locals())
     require_kind("spheroid", spheroid, Spheroid, optional=True)
@@ -230,7 +229,7 @@ def simulate(
             photo_to_ground=photo_to_ground,
         )
         taken = scanned(plan, flown, ground, motion_random)
-        # They are those of trajectories.
+        # The standard deviations apply to trajectories.
         position_error = attitude_error = 0.0
         position_sd = attitude_sd = math.inf
     else:
@@ -305,7 +304,7 @@ def _looks(
     motion: RollingShutter | LineScanner | None,
     attitude_error: float,
 ) -> tuple[float, float]:
-    """Return half the angle of view of cameras, and their largest inclination, of (tilt, crab); radians."""
+    """Return half the angle of view and the maximum inclination of cameras, radians."""
     tilt, crab = angles
     spread = frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab))
     steepest = 2 * tilt
@@ -320,7 +319,7 @@ def _looks(
 
 
 def _observed(truth: Floats, sd: Floats, random: np.random.Generator) -> Floats | None:
-    """Draw observations of the truth; None where nothing is observed."""
+    """Draw observations of the true values; None if nothing is observed."""
     draw = random.standard_normal(truth.shape)
     return truth + sd * draw if np.isfinite(sd).all() else None
 
@@ -335,7 +334,7 @@ def _title(strips: int, photos_per_strip: int, motion: RollingShutter | LineScan
 
 
 _WHOLE_NUMBERS = {"strips": 1, "photos_per_strip": 2, "control_spacing": 1, "check_points": 0, "blunders": 0}
-"""Least values."""
+"""Minimum values."""
 _BETWEEN = {
     "forward_overlap": (0.5, 1),
     "side_overlap": (0, 1),
@@ -344,15 +343,14 @@ _BETWEEN = {
     "image_sd": (0, _HUGE),
     "principal_distance": (-_HUGE, _HUGE),
 }
-"""Limits, which are excluded."""
+"""Limits, both excluded."""
 _FROM = {"crab": (0, math.pi / 4), "tilt": (0, 0.1), "points_per_photo": (4, _HUGE)}
 _FROM |= dict.fromkeys(("relief", "control_sd", "position_error", "attitude_error"), (0, _HUGE))
 _FROM |= dict.fromkeys(("blunder_size", "position_sd", "attitude_sd"), (0, _HUGE))
-"""Limits, of which the first is included; the last two arguments may be infinite."""
+"""Limits; the lower one is included, and the last two arguments may be infinite."""
 
 
 def _check_numbers(arguments: Mapping[str, Any]) -> None:
-    """Refuse numbers outside their limits."""
     for name, least in _WHOLE_NUMBERS.items():
         count = whole_number(name, arguments[name])
         require(count >= least, name, "least", low=least, value=count)
@@ -366,7 +364,7 @@ def _check_numbers(arguments: Mapping[str, Any]) -> None:
 
 
 def _check_motion(motion: object, *, plain: bool, cameras: bool) -> None:
-    """Refuse objects that are not motions, and combinations that no simulation supports."""
+    """Reject objects that are not motions, and unsupported combinations."""
     if motion is None:
         return
     if not isinstance(motion, RollingShutter | LineScanner):

@@ -1,4 +1,4 @@
-"""Strips of photos, told from where they were taken."""
+"""Strips of photos, detected from their positions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from photogram.arguments.types import Floats, Indices
 
 
 def strips_of(positions: Floats) -> list[Indices]:
-    """Cut photos at (P, 3) in metric axes, in their order, into strips: where the flight turns or jumps."""
+    """Divide photos at (P, 3) in metric axes, in order, into strips at curves and gaps."""
     plan = positions[:, :2]
     steps = np.linalg.norm(np.diff(plan, axis=0), axis=1)
     usual = float(np.median(steps)) if steps.size else 0.0
@@ -29,7 +29,7 @@ def strips_of(positions: Floats) -> list[Indices]:
         if strips and follows(last, strips[-1][0], photo, photo - last):
             strips[-1].append(photo)
             last = photo
-        # One photo out of line breaks no strip when the next one is back on course.
+        # A single deviating photo does not end a strip if the next one is on course.
         elif (
             strips
             and len(strips[-1]) > 1

@@ -1,9 +1,9 @@
-"""Data structuring of the 1987 program: the bandwidth of the normal equations (GIANT guide, Appendix A).
+"""Data structuring of the 1987 program: bandwidth of normal equations (GIANT guide, Appendix A).
 
-Unknowns come in sets of three: two for a station, one for a point. The frames are walked in their order, and
-the points of a frame in theirs; the first image of a point enters the sets of all stations that observe it
-(those that are not there yet, in the order of the frames), then the set of the point. A station is open from
-its entry until the last point that it observes; points share one set of storage.
+Unknowns form sets of three: two per station, one per point. Frames and their points are processed in order.
+The first image of a point adds the missing sets of all stations that observe it, in the order of the frames.
+The set of the point follows. A station is open from its entry until its last point. Points share one set of
+storage.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from photogram.network.block import Block
 
 __all__ = ["FEWEST_TIES", "Overflow", "Structure", "structure", "ties"]
 
-FEWEST_TIES = 3  # Points that the orientation of a photo needs at least
+FEWEST_TIES = 3  # Minimum number of points for the orientation of a photo
 
 
 @dataclass(frozen=True)
 class Overflow:
-    """Where the bandwidth first exceeds a limit: the station whose entry is too much.
+    """First station whose entry exceeds a limit of the bandwidth.
 
-    `photos` are the stations in storage then, in the order of their entry, `point` that whose first image
-    called for it.
+    `photos` are the stations in storage at that time, in the order of entry. The first image of `point`
+    requires the entry.
     """
 
     photo: int
@@ -34,11 +34,11 @@ class Overflow:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The order of the parameter sets and what it costs.
+    """Order of the parameter sets, and the resulting bandwidth.
 
-    Of P' photos with images, in the order of their entry, `entry` and `exit` are the places, in `points`, of
-    the points at which they enter, and of the last they observe; n' points are in the order of their first
-    image.
+    `photos` are the P' photos with images, in the order of entry. `entry` and `exit` are indices into
+    `points`, of the point at which a photo enters and of its last point. `points` are in the order of their
+    first image.
     """
 
     photos: Indices
@@ -48,22 +48,22 @@ class Structure:
 
     @property
     def open_photos(self) -> Indices:
-        """(n',) stations that are open while each point is in its turn."""
+        """(n',) number of open stations at each point."""
         changes = np.bincount(self.entry, minlength=len(self.points) + 1)
         changes -= np.bincount(self.exit + 1, minlength=len(self.points) + 1)
         return np.cumsum(changes)[:-1]
 
     @property
     def effective_bandwidth(self) -> int:
-        """Sets of three in storage at the most: two for each open station and one for the point."""
+        """Maximum number of sets of three in storage: two per open station, one for the point."""
         return 2 * int(self.open_photos.max(initial=0)) + 1 if len(self.points) else 0
 
     @property
     def naive_bandwidth(self) -> int:
-        """Sets of three from the first of a station to the last set that it is correlated with."""
+        """Maximum span in sets of three from a station to its last correlated set."""
         if not len(self.points):
             return 0
-        # Before the set of a point stand those of the points before it and of the stations entered by then.
+        # The sets of previous points and of stations entered so far precede the set of a point.
         entered = np.cumsum(np.bincount(self.entry, minlength=len(self.points)))
         first = self.entry + 2 * np.arange(len(self.photos))
         last = self.exit + 2 * entered[self.exit]
@@ -81,14 +81,14 @@ class Structure:
         return ordered
 
     def overflow(self, limit: int) -> Overflow | None:
-        """Return where the effective bandwidth first exceeds a limit, if it does."""
+        """Return the first station and point that exceed a limit of the effective bandwidth."""
         over = 2 * self.open_photos + 1 > limit
         if not over.any():
             return None
         at = int(over.argmax())
         before = np.flatnonzero((self.entry < at) & (self.exit >= at))
         entering = np.flatnonzero(self.entry == at)
-        # So many stations fit; the next one to enter is too much.
+        # This number of stations fits; the next one exceeds the limit.
         room = (limit - 1) // 2 - len(before)
         stored = self.photos[np.concatenate([before, entering[:room]])]
         return Overflow(int(self.photos[entering[room]]), stored.tolist(), int(self.points[at]))
@@ -97,8 +97,8 @@ class Structure:
 def structure(image_photos: Indices, image_points: Indices, order: Indices | None = None) -> Structure:
     """Structure the normal equations of a block as the 1987 program did.
 
-    The points of a photo are in the order of its (m,) images; the photos are walked in the order (P,), by
-    default that of their indices.
+    The points of a photo are in the order of its (m,) images. Photos are processed in the order (P,), by
+    default of their indices.
     """
     if not len(image_photos):
         nothing = np.empty(0, dtype=np.int64)
@@ -123,7 +123,7 @@ def structure(image_photos: Indices, image_points: Indices, order: Indices | Non
 
 
 def ties(block: Block) -> Indices:
-    """(P,) points of each photo that another photo or control ties."""
+    """Return (P,) how many points of each photo are tied by another photo or by control."""
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     useful = (rays >= 2) | np.isfinite(block.point_sd).any(axis=1)
     return np.bincount(block.image_photos[useful[block.image_points]], minlength=len(block.photo_ids))

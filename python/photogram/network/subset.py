@@ -1,4 +1,4 @@
-"""A block of some of the photos, or of the images, of a block."""
+"""Subsets of a block: some of its photos or images."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ PHOTOS = (
     *("photo_positions_observed", "photo_attitudes_observed", "principal_distances", "photo_cameras"),
 )
 """Arrays of a block with a row for each photo."""
-IMAGES = ("image_photos", "image_points", "image_xy", "image_sd")  # Those with a row for each image
+IMAGES = ("image_photos", "image_points", "image_xy", "image_sd")  # Arrays with a row for each image
 
 
 def image_rows(network: object, kept: Indices | Bools) -> dict[str, Any]:
-    """Return arrays of some images of a block or collection, by their rows or a mask, by their names."""
+    """Return the image arrays of a block or collection by name, for some rows or a mask."""
     return {name: getattr(network, name)[kept] for name in IMAGES}
 
 
 def kept_images(block: Block, kept: Indices | Bools) -> Block:
-    """Return a block with some of its images, by different rows or a mask: all checks stay fulfilled."""
+    """Return a block with some of its images, by unique rows or a mask; it remains valid."""
     own = block.kept()
     for name, values in image_rows(block, kept).items():
         object.__setattr__(own, name, frozen(values))
@@ -33,7 +33,7 @@ def kept_images(block: Block, kept: Indices | Bools) -> Block:
 
 
 def with_rejected_points(block: Block, before: Block) -> Block:
-    """Return a block that names the points which lost their last image observation since another block."""
+    """Record the points that lost their last image observation since an earlier block."""
     lost = np.setdiff1d(before.image_points, block.image_points)
     names = {before.point_ids[row] for row in lost.tolist()}
     own = block.kept()
@@ -42,7 +42,7 @@ def with_rejected_points(block: Block, before: Block) -> Block:
 
 
 def of_photos(block: Block, kept: Bools) -> Block:
-    """Return a block of the (P,) photos that are kept, with their images and what was observed of them."""
+    """Return a block of the photos `kept` (P,), with their images and observations."""
     fewer = kept_images(block, kept[block.image_photos])
     number = np.cumsum(kept) - 1
     names = [name for name, own in zip(block.photo_ids, kept.tolist(), strict=True) if own]
@@ -58,7 +58,7 @@ def of_photos(block: Block, kept: Bools) -> Block:
 
 
 def _observations(block: Block, there: set[str]) -> list[Observation]:
-    """Return those of the photos that are there, and of trajectories but for those of other photos."""
+    """Return the observations of these photos and their trajectories."""
     own = [(each.photo in there, one) for each, one in zip(block.timed, block.trajectories, strict=True)]
     flown = {id(one) for kept, one in own if kept}
     left = [one for kept, one in own if not kept and id(one) not in flown]

@@ -1,4 +1,4 @@
-"""What blocks are made of, checked: tables, which are data frames or mappings of columns, names, cameras."""
+"""Validation of the parts of a block: tables (data frames or mappings), names and cameras."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TABLE = "a table (a mapping of column names to columns)"
 
 
 class Table(Protocol):
-    """What has columns by name: a data frame of pandas or polars, a dictionary, an Arrow table of columns."""
+    """Columns by name: a data frame of pandas or polars, a dictionary, or an Arrow table."""
 
     def __contains__(self, name: Any, /) -> bool: ...
 
@@ -39,7 +39,7 @@ def table_arguments(
     image_sd: float | None,
     spheroid: Spheroid | None,
 ) -> dict[str, Any]:
-    """Return arguments of a block from tables; :meth:`photogram.Block.from_tables` says what these have."""
+    """Convert tables to arguments of a block, as specified in :meth:`photogram.Block.from_tables`."""
     axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
     has_names = _has(photos, "photos", "photo")
     photo_ids = _name_column(photos, "photos", "photo") if has_names else numbered(_rows(photos, "photos"))
@@ -79,7 +79,7 @@ def table_arguments(
 
 
 def different(name: str, values: Sequence[str]) -> list[str]:
-    """Return names that are all different."""
+    """Return validated names; reject repeated ones."""
     checked = names(name, values)
     if len(set(checked)) != len(checked):
         seen: set[str] = set()
@@ -89,7 +89,7 @@ def different(name: str, values: Sequence[str]) -> list[str]:
 
 
 def numbered(count: int) -> list[str]:
-    """Return names for things that have none: 0, 1, 2 ..."""
+    """Return default names: 0, 1, 2 ..."""
     return [str(number) for number in range(count)]
 
 
@@ -111,7 +111,7 @@ def _column(table: Table, table_name: str, name: str) -> Sequence[Any]:
 
 
 def _rows(table: Table, table_name: str) -> int:
-    """Return how many rows a table has: those of its names, or of a coordinate where it has none."""
+    """Return the number of rows of a table, from its names or else a coordinate."""
     name = "photo" if table_name == "photos" else "point"
     first = (RECTANGULAR_COLUMNS[0], GEOGRAPHIC_COLUMNS[0])
     known = next((each for each in (name, *first) if _has(table, table_name, each)), name)
@@ -128,7 +128,7 @@ def _name_column(table: Table, table_name: str, name: str) -> list[str]:
 def _columns(
     table: Table, table_name: str, columns: Sequence[str], default: ArrayLike | None = None
 ) -> Floats:
-    """Stack columns as (rows, len(columns)), `_deg` ones in radians; absent ones get the default."""
+    """Stack columns as (rows, len(columns)), `_deg` columns in radians; use the default if absent."""
     rows = _rows(table, table_name)
     stacked = []
     for name in columns:
@@ -152,14 +152,14 @@ def _distances(photos: Table, principal_distance: float | None, cameras: Sequenc
 
 
 def _camera_column(photos: Table, cameras: Sequence[Camera]) -> Indices | None:
-    """Return (P,) indices of the cameras that photos name; None where they name none."""
+    """Return (P,) camera indices of the photos; None without a camera column."""
     if not cameras or "camera" not in photos:
         return None
     return photo_indices(list(_column(photos, "photos", "camera")), cameras, _rows(photos, "photos"))
 
 
 def _observed(photos: Table, columns: Sequence[str]) -> Floats | None:
-    """Return the columns of observed values, the initial ones where there are none; None without any."""
+    """Return the observed columns, with initial values if missing; None without any."""
     observed = [f"observed_{name}" for name in columns]
     if not any(name in photos for name in observed):
         return None
@@ -176,7 +176,7 @@ def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
 
 
 def checked_cameras(cameras: object) -> tuple[Camera, ...]:
-    """Return cameras with different names and one unit."""
+    """Return validated cameras with unique names and one unit."""
     checked = instances("cameras", cameras, Camera)
     different("cameras", [each.name for each in checked if each.name])
     if len({each.unit for each in checked}) > 1:
@@ -185,10 +185,10 @@ def checked_cameras(cameras: object) -> tuple[Camera, ...]:
 
 
 def photo_indices(given: object, cameras: Sequence[Camera], photos: int) -> Indices:
-    """Return (P,) indices of the cameras of photos.
+    """Return (P,) camera indices of photos.
 
-    Given are (P,) indices or names of cameras, one for all photos, or None: the only camera, or one for each
-    photo.
+    `given` contains (P,) indices or names of cameras, or one for all photos. None: the only camera, or one
+    for each photo.
     """
     if given is None:
         unique = len(cameras) in (1, photos)

@@ -1,11 +1,11 @@
 """Poses as functions of time: trajectories, rolling shutters, line scanners, clocks.
 
-The pose of an image is that of its trajectory at its time (docs/moving.md)::
+An image has the pose of its trajectory at its time (docs/moving.md)::
 
     C(t) = C0(t) + sum B_k(t) c_k        A(t) = A0(t) Exp(r(t)),  r(t) = sum B_k(t) r_k
 
-C0 and A0 are a table of what is known beforehand, c_k and r_k coefficients of a polynomial or a spline: free,
-weighted or known. Times are seconds.
+C0 and A0 are a table with prior values, c_k and r_k are coefficients of a polynomial or a spline: free,
+weighted or fixed. Times are in seconds.
 """
 
 from __future__ import annotations
@@ -46,36 +46,36 @@ Interpolation = Literal["linear", "hermite", "lagrange"]
 PositionAxes = Literal["table", "orbit", "flight"]
 Angles = Literal["vector", "zxz"]
 BasisRow = tuple[str, int, list[float]]
-"""Name, degree, and reference and scale of a polynomial, or the knots of a spline."""
+"""Name, degree, and reference and scale of a polynomial, or knots of a spline."""
 
 DEGREES = {"polynomial": (0, 8), "spline": (1, 5)}
 
 
 class Coefficient(Numbers):
-    """A coefficient c_k or r_k of a trajectory."""
+    """Coefficient c_k or r_k of a trajectory."""
 
 
 class PositionCoefficient(Coefficient):
-    """A coefficient of the positions of a trajectory, in its axes and the linear unit."""
+    """Position coefficient of a trajectory, in its axes and the linear unit."""
 
     KIND = "position coefficient"
 
 
 class RotationCoefficient(Coefficient):
-    """A coefficient of the rotation vectors of a trajectory, about the axes of the photo, in radians."""
+    """Rotation coefficient of a trajectory, about the axes of the photo, in radians."""
 
     KIND = "rotation coefficient"
 
 
 class GyroBias(Numbers):
-    """What a gyroscope says of a body at rest: b, about the axes of the body.
+    """Bias b of a gyroscope about the axes of the body.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value, sd
-        (3,) radians a second.
+        (3,) bias and standard deviations in radians per second.
     """
 
     KIND = "gyro bias"
@@ -88,14 +88,14 @@ class _Scalar(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Clock(_Scalar):
-    """The offset d of a clock: what it dates t was at t + d of the trajectory.
+    """Offset d of a clock: its time t is t + d of the trajectory.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value, sd
-        Seconds.
+        Offset and standard deviation in seconds.
     """
 
     KIND = "clock"
@@ -106,14 +106,14 @@ class Clock(_Scalar):
 
 @dataclass(frozen=True, eq=False)
 class Readout(_Scalar):
-    """The readout time of all rows of a rolling shutter, or a factor of the line rates of a scanner.
+    """Readout time of a rolling shutter, or factor of the line rates of a scanner.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value, sd
-        Seconds, or a number about 1.
+        Seconds, or a factor about 1.
     """
 
     KIND = "readout"
@@ -124,26 +124,26 @@ class Readout(_Scalar):
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What is known of a trajectory beforehand.
+    """Sampled trajectory with prior positions and attitudes.
 
     Parameters
     ----------
     times, positions
-        (k,) seconds, increasing, and (k, 3) projection centres in the object space: X, Y, Z, geocentric where
-        the object space is geographic; where there is a `body`, inertial.
+        (k,) seconds, increasing, and (k, 3) projection centres in the object space: X, Y, Z, geocentric if
+        the object space is geographic; inertial if the trajectory has a `body`.
     attitude_times, attitudes
         (m,) and (m, 3, 3) rotation matrices whose columns are the axes of the photo (x right, y up, z back)
-        in those of the positions.
+        in the axes of the positions.
     velocities
-        (k, 3) in a second, for `hermite`.
+        (k, 3) per second, for `hermite`.
     interpolation, attitude_interpolation
-        Between records: `linear` (attitudes turn uniformly), `hermite` (positions alone), `lagrange` (eight
-        neighbours; attitudes by their quaternions).
+        Between records: `linear` (attitudes rotate uniformly), `hermite` (positions only), `lagrange` (eight
+        neighbours; attitudes by quaternions).
 
     Raises
     ------
     InputError
-        Times that do not increase, arrays of other lengths, matrices that are no rotations.
+        If times do not increase, lengths of arrays differ, or matrices are not rotations.
     """
 
     times: Floats
@@ -178,13 +178,13 @@ class Table:
 
     @property
     def span(self) -> tuple[float, float]:
-        """The first and the last time of its records; one record alone is for all times."""
+        """First and last time of the records; a single record applies to all times."""
         both = [each for each in (self.times, self.attitude_times) if len(each) > 1] or [self.times]
         return max(float(each[0]) for each in both), min(float(each[-1]) for each in both)
 
 
 def increasing(name: str, values: ArrayLike) -> Floats:
-    """Return (k,) finite times that increase."""
+    """Return validated times (k,), finite and increasing."""
     times = np.atleast_1d(numbers(name, values))
     if times.ndim != 1 or not len(times):
         raise kind_error(name, "a list of times", values)
@@ -197,7 +197,7 @@ def increasing(name: str, values: ArrayLike) -> Floats:
 
 
 def rotations(name: str, values: ArrayLike, count: int) -> Floats:
-    """Return (count, 3, 3) rotation matrices."""
+    """Return validated rotation matrices (count, 3, 3)."""
     matrices = shaped(name, values, (count, 3, 3))
     apart = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
     bad = (apart > 1e-6) | (np.linalg.det(matrices) < 0)
@@ -209,17 +209,17 @@ def rotations(name: str, values: ArrayLike, count: int) -> Floats:
 
 @dataclass(frozen=True)
 class Polynomial:
-    """Corrections that are polynomials: B_k = ((t - reference) / scale)^k.
+    """Polynomial corrections: B_k = ((t - reference) / scale)^k.
 
     Parameters
     ----------
     degree
         0 to 8.
     reference, scale
-        Seconds. None: the middle and half of the table's span; 0 and 1 where that has one record.
+        Seconds. None: the centre and half of the table's span; 0 and 1 if the table has one record.
     value, sd
-        (3,), (K, 3) or one number: what is given of the K = degree + 1 coefficients, and its standard
-        deviations, infinite (free), 0 (known) or between.
+        (3,), (K, 3) or one number: given values of the K = degree + 1 coefficients and their standard
+        deviations; infinite (free), 0 (fixed) or between (weighted).
     """
 
     degree: int = 0
@@ -230,7 +230,7 @@ class Polynomial:
 
     @property
     def count(self) -> int:
-        """How many coefficients there are."""
+        """Number of coefficients."""
         return self.degree + 1
 
     @property
@@ -240,7 +240,7 @@ class Polynomial:
         return self.reference, self.scale
 
     def over(self, first: float, last: float) -> Polynomial:
-        """Return it with reference and scale for a span of time."""
+        """Return the polynomial with reference and scale for a time span."""
         _degree("polynomial", self.degree)
         for name, value in (("reference", self.reference), ("scale", self.scale)):
             where = f"{name} of a polynomial"
@@ -252,36 +252,35 @@ class Polynomial:
         return replace(self, reference=reference, scale=scale)
 
     def row(self, origin: float) -> BasisRow:
-        """Return what the core takes, times counted from an origin."""
+        """Return the row for the core, with times relative to an origin."""
         reference, scale = self._placed
         return "polynomial", self.degree, [reference - origin, scale]
 
     @property
     def smoothed(self) -> list[tuple[list[int], list[float], float]]:
-        """Nothing is observed of its coefficients together."""
+        """Joint observations of coefficients; always empty for polynomials."""
         return []
 
 
 @dataclass(frozen=True)
 class Spline:
-    """Corrections that are splines in time, B-splines over knots.
+    """Spline corrections in time: B-splines over knots.
 
     Parameters
     ----------
     every
-        Seconds from knot to knot over the table's span, which is divided evenly; or `knots`.
+        Approximate seconds between knots over the table's span, which is divided evenly; or use `knots`.
     knots
-        (n,) all of them, not decreasing; n - degree - 1 coefficients.
+        (n,) all knots, not decreasing; n - degree - 1 coefficients.
     degree
         1 to 5.
     value, sd
         As for :class:`Polynomial`.
     smooth
-        q and s: differences of order q = 1, 2 or 3 of neighbours are 0 with the standard deviation s. With
-        knots h apart that is white noise of the q-th derivative of the density s^2 / h^(2q - 1).
+        q and s: differences of order q = 1, 2 or 3 of neighbours are 0 with standard deviation s. For knots h
+        apart, this is white noise of the q-th derivative with density s^2 / h^(2q - 1).
     correlation
-        T and s: a process of Gauss and Markov with the correlation time T in seconds and the standard
-        deviation s.
+        T and s: a Gauss-Markov process with correlation time T in seconds and standard deviation s.
     """
 
     every: float | None = None
@@ -294,7 +293,7 @@ class Spline:
 
     @property
     def count(self) -> int:
-        """How many coefficients there are."""
+        """Number of coefficients."""
         return len(self._knots) - self.degree - 1
 
     @property
@@ -304,7 +303,7 @@ class Spline:
         return numbers("knots", self.knots)
 
     def over(self, first: float, last: float) -> Spline:
-        """Return it with knots for a span of time: even over it, as many beyond each end as the degree."""
+        """Return the spline with even knots for a time span, and `degree` knots beyond each end."""
         p = _degree("spline", self.degree)
         one = (self.every is None) != (self.knots is None)
         require(one, "spline", "exclusive", first="every", second="knots")
@@ -326,12 +325,12 @@ class Spline:
         return self
 
     def row(self, origin: float) -> BasisRow:
-        """Return what the core takes, times counted from an origin."""
+        """Return the row for the core, with times relative to an origin."""
         return "spline", self.degree, (self._knots - origin).tolist()
 
     @property
     def smoothed(self) -> list[tuple[list[int], list[float], float]]:
-        """What is observed of coefficients together: which, their factors, the standard deviation of 0."""
+        """Joint observations of coefficients: indices, factors, standard deviation of 0."""
         found: list[tuple[list[int], list[float], float]] = []
         if self.smooth is not None:
             found += self._differences(*self.smooth)
@@ -348,7 +347,7 @@ class Spline:
         return found
 
     def _differences(self, order: int, sd: float) -> list[tuple[list[int], list[float], float]]:
-        """Return divided differences at the Greville points, those of even knots times h^q."""
+        """Return divided differences at the Greville points, scaled by h^q."""
         if order not in (1, 2, 3) or not 0 < sd < np.inf:
             raise kind_error("smooth", "an order of 1, 2 or 3 and a standard deviation", self.smooth)
         knots, p = self._knots, self.degree
@@ -377,37 +376,37 @@ def _degree(kind: str, degree: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A pose as a function of time, shared by the images and records that are on it.
+    """Pose as a function of time, shared by images and records.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     table
-        What is known of it beforehand.
+        Table with prior values.
     position, rotation
-        What its corrections are made of; None for none.
+        Basis of the corrections; None without corrections.
     body
-        (m,) times and (m, 3, 3) matrices, inertial to body, of a body that turns under an inertial table.
+        (m,) times and (m, 3, 3) matrices, inertial to body, of a body that rotates under an inertial table.
     position_axes
-        What the components of position coefficients are along: the axes of the `table`; `orbit`: along the
-        flight, across it (to the left) and radial, away from the origin of the axes; `flight`: along, across
-        and up, the third axis of the table.
+        Axes of the position coefficients. `table`: the axes of the `table`. `orbit`: along the flight, across
+        it (to the left) and radial, away from the origin of the axes. `flight`: along, across and up (third
+        axis of the table).
     angles
-        What rotation coefficients are: `vector`, rotation vectors about the axes of the photo, A = A0 Exp(r);
-        or `zxz`, radians added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its axes
-        to those of a camera that looks along +z, x right, y down. Polynomials in the place of the table are
-        the same with a table that they are sampled to (`formats.csm.photos.with_polynomial_pointing`).
+        Meaning of the rotation coefficients. `vector`: rotation vectors about the axes of the photo, A = A0
+        Exp(r). `zxz`: radians added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its
+        axes to the axes of a camera that looks along +z, x right, y down. Polynomials instead of a table are
+        equivalent to a table sampled from them (`formats.csm.photos.with_polynomial_pointing`).
 
     Attributes
     ----------
     coefficients
-        Those of positions, and those of rotations: common unknowns of the block.
+        Position coefficients and rotation coefficients, as shared unknowns of the block.
 
     Raises
     ------
     InputError
-        Bases that are none, a table that is none.
+        If a basis or the table is invalid.
     """
 
     name: str
@@ -452,11 +451,11 @@ class Trajectory:
 
     @property
     def origin(self) -> float:
-        """A whole second at its beginning: times are counted from there, so that no digits are lost."""
+        """A whole second at the start; relative times preserve digits."""
         return float(np.floor(self.table.times[0]))
 
     def row(self, places: dict[int, int]) -> _photocore.TrajectoryRow:
-        """Return what the core takes; `places` are those of common unknowns by their identity."""
+        """Return the row for the core; `places` are indices of unknowns by object identity."""
         table, origin = self.table, self.origin
 
         def attitudes(times: Floats, matrices: Floats, joined: str) -> tuple[list[float], Floats, str]:
@@ -482,26 +481,26 @@ class Trajectory:
         }
 
     def flown(self, times: Floats, position: Floats, rotation: Floats) -> _photocore.FlownRow:
-        """Return what the core makes of (n,) times, (K, 3) coefficients of positions and of rotations."""
+        """Evaluate the core at (n,) times, with (K, 3) position and rotation coefficients."""
         c, r = np.reshape(position, (-1, 3)), np.reshape(rotation, (-1, 3))
         return _photocore.flown(self._row, c, r, (times - self.origin).tolist())
 
     @property
     def reach(self) -> tuple[float, float]:
-        """The first and the last time that it may be asked for, in seconds.
+        """First and last time at which the pose is defined, in seconds.
 
-        They lie half a record beyond its table, and within the knots of its splines.
+        The interval extends half a record beyond the table, and is limited by the knots of splines.
         """
         first, last = _photocore.trajectory_span(self._row)
         return self.origin + first, self.origin + last
 
     @property
     def _row(self) -> _photocore.TrajectoryRow:
-        """What the core takes where it does not matter which unknowns its coefficients are."""
+        """Row for the core, if the indices of coefficients are irrelevant."""
         return self.row({id(each): 0 for own in self.coefficients for each in own})
 
 
 def _of_each(name: str, given: ArrayLike, count: int) -> Floats:
-    """Return (count, 3) of what is given of every coefficient, or of each."""
+    """Return (count, 3) values from one for all coefficients, or one for each."""
     found = numbers(name, given)
     return shaped(name, np.tile(found, (count, 1)) if found.shape == (3,) else found, (count, 3))

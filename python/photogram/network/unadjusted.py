@@ -1,4 +1,4 @@
-"""What every network has before its adjustment, whatever numbers its poses and cameras are in."""
+"""Common interface of blocks and collections before the adjustment."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from photogram.network.observations import Observation
 
 
 class Given(Protocol):
-    """P photos, n points and m image points that are adjusted together: a block or a collection."""
+    """P photos, n points and m image observations to adjust together: a block or a collection."""
 
     @property
     def photo_ids(self) -> list[str]:
-        """P names."""
+        """P names of photos."""
 
     @property
     def point_ids(self) -> list[str]:
-        """N names."""
+        """Names of the n points."""
 
     @property
     def point_positions(self) -> Floats:
-        """(n, 3) as they were given; NaN where unknown."""
+        """(n, 3) given positions; NaN if unknown."""
 
     @property
     def point_sd(self) -> Floats:
-        """(n, 3) standard deviations of coordinates as observations: infinite not held, zero fixed."""
+        """(n, 3) standard deviations of observed coordinates: infinite is free, zero is fixed."""
 
     @property
     def image_photos(self) -> Indices:
-        """(m,) the photo of each image."""
+        """(m,) photo index of each image observation."""
 
     @property
     def image_points(self) -> Indices:
-        """(m,) the point of each image."""
+        """(m,) point index of each image observation."""
 
     @property
     def image_xy(self) -> Floats:
@@ -42,15 +42,15 @@ class Given(Protocol):
 
     @property
     def image_sd(self) -> Floats:
-        """(m, 2) their standard deviations a priori."""
+        """(m, 2) a-priori standard deviations of image coordinates."""
 
     @property
     def observations(self) -> Sequence[Observation]:
-        """What else was observed."""
+        """Additional observations."""
 
     @property
     def image_unit(self) -> str:
-        """What image coordinates are measured in, `mm` or `px`."""
+        """Unit of image coordinates, `mm` or `px`."""
 
     @property
     def geographic(self) -> bool:

@@ -1,7 +1,7 @@
-"""Unknowns that observations have in common: lever arms, shifts, drifts, boresights, instruments, surfaces.
+"""Unknowns shared by observations: lever arms, shifts, drifts, boresights, instruments, surfaces.
 
-Each is an object with a name; the observations that it is given to share it. Its values are where the
-adjustment starts from and, where its standard deviations are neither 0 (known) nor infinite (free), observed.
+Each unknown is an object with a name, shared by the observations that contain it. Its values are initial
+values. They are also observations if their standard deviations are neither 0 (fixed) nor infinite (free).
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ __all__ = [
 ]
 
 UnknownRow = tuple[str, list[float], list[float], list[float]]
-"""Type, position, rotation matrix row by row and standard deviations, as the core takes an unknown."""
+"""Type, position, rotation matrix row by row, and standard deviations: the row of an unknown for the core."""
 
 _ORTHONORMAL = 1e-6
 _UNKNOWNS = dict(_photocore.UNKNOWNS)
 
 
 def rotation(name: str, value: ArrayLike) -> Floats:
-    """Return a (3, 3) rotation matrix; InputError where it is not orthonormal to six digits, or mirrored."""
+    """Return a rotation matrix (3, 3); InputError if it is mirrored or not orthonormal to 1e-6."""
     matrix = shaped(name, value, (3, 3))
     orthonormal = np.abs(matrix.T @ matrix - np.eye(3)).max() < _ORTHONORMAL
     if not orthonormal or np.linalg.det(matrix) < 0:
@@ -69,22 +69,22 @@ def _units(kind: str, linear_unit: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """What all have in common.
+    """Base class of shared unknowns.
 
     Attributes
     ----------
     name
-        For reports.
+        Name in reports.
     position, attitude
-        (3,) and (3, 3) what the core takes: where it is, and its own axes as columns.
+        (3,) position and (3, 3) axes as columns, for the core.
     deviations
-        (k,) standard deviations of its unknowns.
+        (k,) standard deviations of the k components.
     """
 
     KIND: ClassVar[str] = ""
-    """The name under which results know the type."""
+    """Name of the type in results."""
     GIVEN: ClassVar[tuple[str, ...]] = ()
-    """Fields that say where it is, and may be None, all of them, where nothing is known of it."""
+    """Fields of the initial values; all of them may be None if they are unknown."""
 
     position: Floats = field(init=False, repr=False)
     attitude: Floats = field(init=False, repr=False)
@@ -104,11 +104,11 @@ class Unknown:
 
     @property
     def is_open(self) -> bool:
-        """Whether nobody has said where it is: an adjustment begins where points and photos have it."""
+        """Whether initial values are missing; they are then computed from points and photos."""
         return all(getattr(self, name) is None for name in self.GIVEN) and bool(self.GIVEN)
 
     def replace(self, **changes: Any) -> Self:
-        """Return it with some fields replaced, checked anew."""
+        """Return a validated unknown with some fields replaced."""
         return replace(self, **changes)
 
     def _set(self, name: str, value: Floats) -> None:
@@ -124,38 +124,38 @@ class Unknown:
 
     @property
     def title(self) -> str:
-        """Its type and name."""
+        """Type and name."""
         return f"{self.KIND} {self.name}"
 
     @property
     def components(self) -> tuple[str, ...]:
-        """The names of its k unknowns."""
+        """Names of the k components."""
         return _components(self.KIND)
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Return the units of its unknowns; nothing for plain numbers."""
+        """Return the units of the components; empty for dimensionless numbers."""
         return _units(self.KIND, linear_unit)
 
     @property
     def is_held(self) -> bool:
-        """Whether nothing of it is unknown."""
+        """Whether all components are fixed."""
         return not self.deviations.any()
 
     def row(self) -> UnknownRow:
-        """Return what the core takes."""
+        """Return the row for the core."""
         return self.KIND, self.position.tolist(), self.attitude.ravel().tolist(), self.deviations.tolist()
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers(Unknown):
-    """One to three numbers and their standard deviations.
+    """Unknown with one to three numbers.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value, sd
-        Of its unknowns, or one for all.
+        Values and standard deviations of the components, or one for all.
     """
 
     value: ArrayLike = 0.0
@@ -168,16 +168,16 @@ class Numbers(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class LeverArm(Numbers):
-    """The vector l from the projection centre to the antenna, in the axes of the photo.
+    """Vector l from the projection centre to the antenna, in the axes of the photo.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value
         (3,) x right, y up, z back towards the viewer, in the linear unit.
     sd
-        (3,) standard deviations of the same, or one for all.
+        (3,) standard deviations of the vector, or one for all.
     """
 
     KIND = "lever arm"
@@ -185,16 +185,16 @@ class LeverArm(Numbers):
 
 @dataclass(frozen=True, eq=False)
 class Shift(Numbers):
-    """The vector s that GNSS positions of a strip, a flight or a session are off by.
+    """Shift s of the GNSS positions of a strip, a flight or a session.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value
-        (3,) along X, Y, Z or, in geographic space, east, north and up amid the photos, in the linear unit.
+        (3,) along X, Y, Z, or east, north, up at the photos in geographic space, in the linear unit.
     sd
-        (3,) standard deviations of the same, or one for all.
+        (3,) standard deviations of the shift, or one for all.
     """
 
     KIND = "shift"
@@ -202,18 +202,18 @@ class Shift(Numbers):
 
 @dataclass(frozen=True, eq=False)
 class Drift(Numbers):
-    """The vector d by which that grows in a second.
+    """Drift d of GNSS positions: change of the shift per second.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value
-        (3,) in the axes of a shift, in the linear unit a second.
+        (3,) in the axes of a shift, in the linear unit per second.
     sd
-        (3,) standard deviations of the same, or one for all.
+        (3,) standard deviations of the drift, or one for all.
     epoch
-        The time that it counts from, in seconds; None: the mean time of its observations.
+        Reference time in seconds; None: the mean time of its observations.
     """
 
     KIND = "drift"
@@ -230,15 +230,15 @@ class Drift(Numbers):
 
 @dataclass(frozen=True, eq=False)
 class Boresight(Unknown):
-    """The rotation B from an inertial unit to the photo.
+    """Rotation B from an inertial unit to the photo.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value
-        (3, 3) body to the axes of the photo: the transposed mounting, or what is known of it. None: where it
-        is free, the mean of what photos and observed attitudes make of it; otherwise the identity.
+        (3, 3) body to the axes of the photo: the transposed mounting, or an approximation. None: the mean
+        from photos and observed attitudes if it is free, else the identity.
     sd
         (3,) standard deviations of rotations about the axes of the body in radians, or one for all.
     """
@@ -250,7 +250,7 @@ class Boresight(Unknown):
 
     @property
     def is_open(self) -> bool:
-        """Whether it is free, and nobody has said what it is about."""
+        """Whether the boresight is free and its initial value is missing."""
         return self.value is None and bool(np.isinf(self.deviations).all())
 
     def _position(self) -> Floats:
@@ -262,16 +262,16 @@ class Boresight(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Instrument(Unknown):
-    """The scale m and constant k of an instrument for distances: it shows m s + k.
+    """Scale m and constant k of an instrument for distances: it measures m s + k.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     scale, constant
-        m, a number, and k in the linear unit.
+        m, dimensionless, and k in the linear unit.
     sd
-        (2,) standard deviations of the same, or one for both.
+        (2,) standard deviations of m and k, or one for both.
     """
 
     KIND = "instrument"
@@ -287,17 +287,17 @@ class Instrument(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Level(Unknown):
-    """A height h that points have in common: a water line, a levelling instrument.
+    """Common height h of points, e.g. a water line or a levelling instrument.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     height
         Z, or the height above the ellipsoid in geographic space, in the linear unit. None: the mean of its
         points.
     sd
-        Its standard deviation.
+        Standard deviation of the height.
     """
 
     KIND = "level"
@@ -313,18 +313,18 @@ class Level(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class PlumbLine(Unknown):
-    """A vertical line.
+    """Vertical line.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     through
-        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height. None: the middle of its
-        points.
+        (3,) a position near the line: X, Y, Z; or longitude (rad), latitude (rad), height. None: the centre
+        of its points.
     sd
-        (2,) standard deviations of its offset from there along X and Y or, in geographic space, east and
-        north.
+        (2,) standard deviations of the offset from `through` along X and Y (east and north in geographic
+        space).
     """
 
     KIND = "plumb line"
@@ -339,20 +339,20 @@ class PlumbLine(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Line(Unknown):
-    """A straight line.
+    """Straight line.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     direction
-        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`. None, with
-        `through`: a principal axis of its points.
+        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`. None,
+        together with `through`: a principal axis of its points.
     through
-        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
+        (3,) a position near the line: X, Y, Z; or longitude (rad), latitude (rad), height.
     sd
-        (4,) standard deviations of its offsets from there along two axes of its own, across it (columns of
-        `attitude`), and of rotations about these in radians.
+        (4,) standard deviations of the offsets from `through` along two axes across the line (columns of
+        `attitude`), and of rotations about these axes in radians.
     """
 
     KIND = "line"
@@ -371,20 +371,20 @@ class Line(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Plane(Unknown):
-    """A plane.
+    """Plane.
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     normal
-        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`. None, with
-        `through`: a principal axis of its points.
+        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`. None,
+        together with `through`: a principal axis of its points.
     through
-        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
+        (3,) a position near the plane: X, Y, Z; or longitude (rad), latitude (rad), height.
     sd
-        (3,) standard deviations of its distance from there along the normal, and of rotations about two axes
-        of its own in it (columns of `attitude`) in radians.
+        (3,) standard deviations of the distance from `through` along the normal, and of rotations about two
+        axes in the plane (columns of `attitude`) in radians.
     """
 
     KIND = "plane"
@@ -403,17 +403,17 @@ class Plane(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Sensor(Unknown):
-    """The pose of a camera on a frame (see :class:`photogram.network.Mount`).
+    """Pose of a camera on a frame (see :class:`photogram.network.Mount`).
 
     Parameters
     ----------
     name
-        For reports.
+        Name in reports.
     value
-        (3,) c, its position in the axes of the frame (x right, y up, z back), in the linear unit. None, with
-        `matrix`: the middle of what the first poses of frames and photos make of it.
+        (3,) c, position in the axes of the frame (x right, y up, z back), in the linear unit. None, together
+        with `matrix`: the centre of the values from the initial poses of frames and photos.
     matrix
-        (3, 3) its axes in those of the frame, as columns. None with a given position: the identity.
+        (3, 3) axes in the system of the frame, as columns. None with a given position: the identity.
     sd
         (6,) standard deviations of c, then of rotations about the sensor's own axes in radians.
     """
@@ -435,7 +435,7 @@ class Sensor(Unknown):
     def from_colmap(
         cls, name: str, matrix: ArrayLike, translation: ArrayLike, sd: ArrayLike = np.inf
     ) -> Self:
-        """Return the sensor of COLMAP's `sensor_from_rig`: R (3, 3) and t (3,), y down and z forward.
+        """Convert `sensor_from_rig` of COLMAP: R (3, 3) and t (3,), y down and z forward.
 
         A = F R' F and c = -F R' t with F = diag(1, -1, -1).
         """
@@ -446,7 +446,7 @@ class Sensor(Unknown):
 
 
 def _place(own: Unknown, value: ArrayLike | None, what: str = "through") -> Floats:
-    """Return (3,) where it is; zero of what is open."""
+    """Return the position (3,); zero if the initial value is missing."""
     if own.is_open:
         return np.zeros(3)
     if value is None:
@@ -455,7 +455,7 @@ def _place(own: Unknown, value: ArrayLike | None, what: str = "through") -> Floa
 
 
 def _across(name: str, value: ArrayLike | None) -> Floats:
-    """Return axes of which the third has a direction."""
+    """Return axes with the third one along a direction."""
     if value is None:
         raise argument_error(name, "requires", name="through", other="a direction")
     third = shaped(name, value, (3,))
@@ -469,7 +469,7 @@ def _across(name: str, value: ArrayLike | None) -> Floats:
 
 
 def different_unknowns(unknowns: Iterable[Unknown]) -> list[Unknown]:
-    """Return unknowns, each once, in their order; refuse two of one type and name."""
+    """Return each unknown once, in order; reject repeated names within a type."""
     distinct = list({id(each): each for each in unknowns}.values())
     titles: set[str] = set()
     for each in distinct:

@@ -1,4 +1,4 @@
-"""Camera models with more lens terms: the same camera, whose further parameters are 0 and may be free."""
+"""Camera models with more lens terms: equivalent cameras whose additional parameters are 0 or free."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LENS = ("k", "k1", "k2", "p1", "p2", "a1", "a2")
 
 
 def matching_word(name: str, words: Collection[str]) -> str:
-    """Return the word that selects a parameter, `f` for `fx` and `fy`; nothing if none does."""
+    """Return the word that selects a parameter, `f` for `fx` and `fy`; empty if none does."""
     lower = name.lower()
     if lower in words:
         return lower
@@ -31,7 +31,7 @@ def matching_word(name: str, words: Collection[str]) -> str:
 
 
 def with_parameters(camera: Camera, words: Collection[str]) -> Camera:
-    """Return a camera of the narrowest model that contains its own and has most of the named parameters."""
+    """Return an equivalent camera in the smallest model with most of the named parameters."""
 
     def count(model: Camera) -> int:
         return len({matching_word(name, words) for name in model.names} - {""})
@@ -40,7 +40,7 @@ def with_parameters(camera: Camera, words: Collection[str]) -> Camera:
 
 
 def freed(camera: Camera, words: Collection[str]) -> Camera:
-    """Return a camera whose named parameters are free; other values are known as well as before."""
+    """Return a camera whose named parameters are free; standard deviations of others are unchanged."""
     known = zip(camera.names, camera.deviations.tolist(), strict=True)
     sd = {
         name: math.inf if matching_word(name, words) and name not in camera.constants else value
@@ -55,10 +55,10 @@ def freed(camera: Camera, words: Collection[str]) -> Camera:
 
 
 def calibration_words(camera: Camera) -> list[str]:
-    """Return the parameters that a calibration of a camera frees; nothing if all of these are free.
+    """Return the parameters that a calibration frees; empty if all of them are free already.
 
-    These are principal distance and point and the first lens terms: in the narrowest model with a fixed lens
-    term if there is one.
+    The parameters are principal distance and point and the first lens terms, in the smallest model with a
+    fixed lens term if there is one.
     """
     models = _models(camera)
     model = next((each for each in models if any(name.lower() in _LENS for name in _fixed(each))), camera)
@@ -75,7 +75,6 @@ def calibration_words(camera: Camera) -> list[str]:
 
 
 def _fixed(camera: Camera) -> list[str]:
-    """Return the parameters that a calibration frees and that are fixed."""
     return [
         name
         for name, sd in zip(camera.names, camera.deviations.tolist(), strict=True)
@@ -90,10 +89,10 @@ def calibrated(camera: Camera) -> Camera:
 
 
 def with_one_focal_length(camera: Camera, size: tuple[float, float] | None = None) -> Camera:
-    """Return a camera with equal fx and fy in the narrowest model with one focal length f and its images.
+    """Return an equivalent camera with one focal length f in the smallest model; fx = fy required.
 
-    The camera remains as it is if fx differs from fy, if no model contains its values and unknowns, or if
-    that model requires the `size` of the picture (width and height in pixels) and none is given.
+    The camera is unchanged if fx differs from fy, or if no model contains its values and unknowns. It is also
+    unchanged if that model requires the missing `size` of the image (width and height in pixels).
     """
     sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     values = camera.parameters
@@ -126,7 +125,7 @@ def focal_length_message(camera: Camera, single: Camera) -> str:
 
 
 def _models(camera: Camera) -> list[Camera]:
-    """Return a camera in its own model and in all that contain it, those with the fewest parameters first.
+    """Return equivalent cameras in all models that contain it, by number of parameters.
 
     Models with inverted formulas (Brown's) precede others of as many parameters.
     """
@@ -142,7 +141,7 @@ def _models(camera: Camera) -> list[Camera]:
 
 @cache
 def _names_by_model() -> list[tuple[str, tuple[str, ...]]]:
-    """Return models and their parameters, those with the fewest parameters first."""
+    """Return models and their parameters, by number of parameters."""
     models = sorted(_photocore.camera_models(), key=lambda each: (len(each[1][1]), each[1][3] == "forward"))
     return [(name, tuple(parameter for parameter, _ in facts[1])) for name, facts in models]
 
@@ -150,7 +149,7 @@ def _names_by_model() -> list[tuple[str, tuple[str, ...]]]:
 def _in_model(
     camera: Camera, model: str, used: tuple[str, ...], size: tuple[float, float] | None = None
 ) -> Camera | None:
-    """Return a camera in another model with its images; None if that model lacks a used parameter."""
+    """Return an equivalent camera in another model; None if the model lacks a used parameter."""
     same = _same_parameters(camera.model, model, used)
     if same is None:
         return None
@@ -159,13 +158,13 @@ def _in_model(
     try:
         values = _renamed(camera.parameters, same, model, size)
         return replace(camera, model=model, parameters=values, sd=deviations)
-    except InputError:  # A constant of the model, such as the size of the picture, is required.
+    except InputError:  # A constant of the model, such as the image size, is required.
         return None
 
 
 @cache
 def _same_parameters(model: str, other: str, used: tuple[str, ...]) -> dict[str, tuple[str, ...]] | None:
-    """Return the parameters of another model by those that do the same; None if their images differ."""
+    """Return corresponding parameters of two models; None if their images differ."""
     names = dict(_names_by_model())[other]
     same: dict[str, tuple[str, ...]] = {name: (name,) for name in names}
     if "k" not in names:
@@ -197,7 +196,7 @@ def _renamed(
     model: str,
     size: tuple[float, float] | None,
 ) -> dict[str, float]:
-    """Return values under the names of another model, which may count from the middle of the picture."""
+    """Return values under the names of another model, which may count from the image centre."""
     renamed = {other: values[name] for name, others in same.items() for other in others}
     if size is not None and "w" not in values and "w" in dict(_names_by_model())[model]:
         middle = {"cx": size[0] / 2, "cy": size[1] / 2}

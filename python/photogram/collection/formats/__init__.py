@@ -1,4 +1,4 @@
-"""Formats of collections: each is a file with a `FORMAT`, and a line here."""
+"""File formats of collections: each is a module with a `FORMAT`, listed here."""
 
 from photogram.collection.formats.registry import FORMATS, read, recognised, to_bytes
 

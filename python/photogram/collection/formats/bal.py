@@ -1,7 +1,8 @@
 """The text format of "Bundle Adjustment in the Large".
 
-First line: photos, points, images; then for each image `photo point x y`; then nine parameters of each
-photo and three coordinates of each point, one number a line. Any white space separates numbers.
+The first line contains the numbers of photos, points and images. Each image is `photo point x y`. Nine
+parameters of each photo and three coordinates of each point follow, one number per line. Any white space
+separates numbers.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.memory import require
 from photogram.words import phrase
 
-ROOM = 64  # Characters that a number and the white space after it take at the most, in the mean over a file
-HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3  # Numbers of the first line, of an image, of a photo, of a point
+ROOM = 64  # Maximum mean number of characters of a number and the white space after it
+HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3  # Counts of numbers in the first line, an image, a photo, a point
 
 
 def read(path: Path, pieces: Iterator[bytes]) -> Collection:
@@ -63,7 +64,7 @@ def to_bytes(collection: Collection) -> bytes:
 
 
 def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[tuple[int, int, int], Floats]:
-    """Read as many numbers as the first line announces, and no more text than they can take."""
+    """Read the numbers announced in the first line, and no more text than they may need."""
     counts: tuple[int, int, int] | None = None
     most, wanted = HEAD, phrase("collection.head")
     parts: list[Floats] = []
@@ -87,7 +88,7 @@ def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[tuple[int, int, int],
         length += len(piece)
         if length > PIECE + ROOM * most:
             raise InputError(phrase("collection.too-long", content=wanted), file=path)
-        # The parts, and what is made of them.
+        # Memory of the parts and of the arrays made from them.
         require(4 * read * numbers.itemsize, f"{path}: {read} numbers")
     if counts is None or read < most:
         raise InputError(phrase("collection.ends", content=wanted), file=path)
@@ -98,7 +99,7 @@ FORMAT = Format(
     name="bal",
     title='problem of "Bundle Adjustment in the Large"',
     suffix=".txt",
-    # Any text may be meant for one: the reader says what is wrong.
+    # Any text may be intended as this format; the reader reports errors.
     begins=lambda _: True,
     read=read,
     to_bytes=to_bytes,

@@ -1,9 +1,9 @@
 """The text format of Bundler, version 0.3 (Snavely, Seitz and Szeliski 2006): `bundle.out`.
 
-After the line `# Bundle file v0.3` there are the numbers of cameras and points; for each camera f, k1, k2,
-the rows of R and t; for each point X, Y, Z, a colour, and its views: how many, and for each the camera, a
-key, x and y. P = R X + t; the camera looks along -z, and image coordinates are pixels from the middle, x to
-the right, y up. A camera that was not registered has zeros only. Colours and keys are not kept.
+The line `# Bundle file v0.3` is followed by the numbers of cameras and points. Each camera has f, k1, k2 and
+the rows of R and t. Each point has X, Y, Z, a colour, and its views: their number, then camera, key, x and y.
+P = R X + t; the camera looks along -z. Image coordinates are pixels from the centre, x to the right, y up.
+Unregistered cameras contain zeros only. Colours and keys are discarded.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from photogram.words import Phrase, phrase
 
 HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
 VERSION = b"0.3"
-COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4  # Numbers in a head, a camera, a point and a view
-ORTHONORMAL = 1e-6  # What R R^T may differ from the unit matrix
+COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4  # Counts in the second line, a camera, a point and a view
+ORTHONORMAL = 1e-6  # Tolerance of R R^T - I
 
 
 class _Numbers:
-    """The numbers of a file after its first line, taken one after the other."""
+    """Sequential reader of the numbers of a file after its first line."""
 
     def __init__(self, path: Path, pieces: Iterator[bytes]) -> None:
         first = next(pieces)
@@ -40,7 +40,7 @@ class _Numbers:
             line = first.split(b"\n", 1)[0].decode("latin-1").strip()
             raise InputError(phrase("bundler.version"), file=path, record=1, text=line)
         self.path = path
-        self.words = len(header[0].split())  # Of the first line
+        self.words = len(header[0].split())  # Words of the first line
         self.taken = 0
         parts: list[Floats] = []
         read = 0
@@ -50,7 +50,7 @@ class _Numbers:
             if not good:
                 raise self.fault(read, phrase("bundler.number"))
             parts.append(numbers)
-            # The parts, and what is made of them.
+            # Memory of the parts and of the arrays made from them.
             require(4 * read * numbers.itemsize, f"{self.path}: {read} numbers")
         self.values = np.concatenate(parts)
 
@@ -68,7 +68,7 @@ class _Numbers:
 
 
 def read(path: Path, pieces: Iterator[bytes]) -> Collection:
-    """Read a collection; cameras keep their numbers, those that were not registered have no images."""
+    """Read a collection; camera numbers are unchanged, unregistered cameras have zero images."""
     numbers = _Numbers(path, pieces)
     counts = numbers.take(COUNTS, "the second line")
     if not whole(counts).all():
@@ -135,7 +135,7 @@ def _points(numbers: _Numbers, points: int) -> tuple[Floats, Indices, Indices]:
 
 
 def to_bytes(collection: Collection) -> bytes:
-    """Return a collection in the format; points are black, and keys count the views of a photo."""
+    """Write a collection to bytes; points are black, keys count the views of a photo."""
     lines = ["# Bundle file v0.3", f"{len(collection.photo_parameters)} {len(collection.point_positions)}"]
     matrices = _photocore.vector_rotations(collection.photo_parameters[:, :3])
     matrices[collection.photo_parameters[:, 6] == 0] = 0.0

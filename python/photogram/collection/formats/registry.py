@@ -1,4 +1,4 @@
-"""The formats that are known, and which of them a file has."""
+"""Known formats of collections, and detection of the format of a file."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from photogram.words import phrase
 
 @dataclass(frozen=True)
 class Format:
-    """A format of collections."""
+    """Format of collections."""
 
-    name: str  # As functions take it
-    title: str  # As people are told what a file is
-    suffix: str  # Of files that are written
-    begins: Callable[[bytes], bool]  # Whether a file that begins with this, after unpacking, is meant for one
-    # Takes the path, for messages, and the content, unpacked, in pieces that end at the end of a word
+    name: str  # Name as a function argument
+    title: str  # Description for people
+    suffix: str  # Suffix of written files
+    begins: Callable[[bytes], bool]  # Whether unpacked content with this beginning has the format
+    # Arguments: path for messages, and unpacked content in pieces that end at word boundaries.
     read: Callable[[Path, Iterator[bytes]], Collection]
     to_bytes: Callable[[Collection], bytes]
-    camera: str = "bal"  # The model of cameras that the format can hold
+    camera: str = "bal"  # Camera model of the format
 
 
 FORMATS: dict[str, Format] = {
@@ -35,11 +35,11 @@ FORMATS: dict[str, Format] = {
         "bundler",
         "bal",
     )
-}  # By name; a file has the first format that it begins like
+}  # By name; the first matching format is used for a file
 
 
 def recognised(path: Path) -> tuple[Collection, Format]:
-    """Read a collection, packed by bzip2 or gzip or not, and say what format it has.
+    """Read a collection, optionally packed by bzip2 or gzip, and return its format too.
 
     All unknowns are free, and the standard deviation of image coordinates is one pixel.
     """
@@ -51,17 +51,17 @@ def recognised(path: Path) -> tuple[Collection, Format]:
 
 
 def read(path: Path) -> Collection:
-    """Read a collection, packed by bzip2 or gzip or not; see `recognised`."""
+    """Read a collection, optionally packed by bzip2 or gzip; see `recognised`."""
     return recognised(path)[0]
 
 
 def to_bytes(collection: Collection, suffix: str = "", file_format: str = "bal") -> bytes:
-    """Return a collection in the named format, packed as the suffix (`.bz2`, `.gz`) says.
+    """Convert a collection to bytes of a format, packed by suffix (`.bz2`, `.gz`).
 
     Raises
     ------
     InputError
-        There is no such format, or it cannot hold the cameras.
+        If the format does not exist or does not support the camera model.
     """
     if file_format not in FORMATS:
         raise InputError(phrase("collection.format", names=list(FORMATS), value=file_format))

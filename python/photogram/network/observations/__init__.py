@@ -1,8 +1,8 @@
-"""Observations beside images: distances, heights, surfaces, positions and attitudes of photos, control.
+"""Additional observations: distances, heights, surfaces, positions and attitudes of photos, control.
 
-Each kind is a class with names of points or photos, perhaps unknowns that it has in common with others
-(:mod:`photogram.network.unknowns`), what was observed, and its standard deviations `sd` or, where components
-are correlated, their covariance matrix `covariance`. Residuals are observed minus computed.
+Each type is a class with names of points or photos, shared unknowns (:mod:`photogram.network.unknowns`),
+observed values, and their standard deviations `sd` or covariance matrix `covariance`. Residuals are observed
+minus computed.
 """
 
 from photogram.network.observations.fiducial import FILM, Fiducial, KnownFilm, KnownTogether

@@ -1,4 +1,4 @@
-"""Readings of fiducial marks, and what is known of films, marks and scanners beforehand."""
+"""Observations of fiducial marks, and priors of films, marks and scanners."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Unknown
 
-FILM = ("t1", "t2", "theta", "m", "b1", "b2")  # The unknowns of the film of a photo: mm, radians, ratios
+FILM = ("t1", "t2", "theta", "m", "b1", "b2")  # Unknowns of the film of a photo: mm, radians, ratios
 
 
 @dataclass(frozen=True, eq=False)
 class Fiducial(Observation):
-    """The reading of a fiducial mark on a photo.
+    """Observed reading of a fiducial mark on a photo.
 
     Parameters
     ----------
     photo
-        Its name, for reports.
+        Name of the photo, for reports.
     mark
-        Where it is in the camera's frame, one object for all photos of that.
+        Position of the mark in the camera frame, one object for all photos of the camera.
     film
-        That of the photo.
+        Film of the photo.
     reading
-        (2,) in the unit of the scanner's readings.
+        (2,) reading in the unit of the scanner.
     sd
-        (2,) standard deviations of the same, or one for both.
+        (2,) standard deviations of the reading, or one for both.
     covariance
-        (2, 2) covariance matrix of the same, in place of `sd`.
+        (2, 2) covariance matrix of the reading, instead of `sd`.
 
     Raises
     ------
     InputError
-        What is no mark or film, values that are not finite, standard deviations that give no weight.
+        If mark or film is invalid, a value is not finite, or standard deviations are invalid.
     """
 
     KIND = "fiducial"
@@ -65,39 +65,39 @@ class Fiducial(Observation):
 
     @property
     def of(self) -> tuple[str, ...]:
-        """The photo and the mark."""
+        """Names of the photo and the mark."""
         return self.photo, self.mark.name
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Return that of readings."""
+        """Return the units of the readings."""
         return ("mm" if self.film.readings.pitch == 1.0 else "px",) * 2
 
 
 @dataclass(frozen=True, eq=False)
 class KnownFilm(Observation):
-    """Some of t1, t2, theta, m, b1, b2 of the film of a photo; m about that of its roll.
+    """Prior of t1, t2, theta, m, b1 or b2 of the film of a photo; m may refer to its roll.
 
     Parameters
     ----------
     photo
-        Its name, for reports.
+        Name of the photo, for reports.
     placement, size
-        Those of the film; their own standard deviations of what is observed are infinite.
+        Placement and size of the film; standard deviations of the observed components must be infinite.
     roll
-        The roll; None: m is known by itself.
+        Roll to which m refers; None: m is the whole size change.
     known
-        (k,) which of the six, by name.
+        (k,) names of the observed components.
     values
-        (k,) what was observed.
+        (k,) observed values.
     sd
-        (k,) standard deviations of the same, or one for all.
+        (k,) standard deviations of the values, or one for all.
     covariance
-        (k, k) covariance matrix of the same, in place of `sd`.
+        (k, k) covariance matrix of the values, instead of `sd`.
 
     Raises
     ------
     InputError
-        Other names, values that are not finite, standard deviations that give no weight.
+        If a name is invalid, a value is not finite, or standard deviations are invalid.
     """
 
     KIND = "film"
@@ -126,45 +126,45 @@ class KnownFilm(Observation):
 
     @property
     def of(self) -> tuple[str, ...]:
-        """The photo."""
+        """Name of the photo."""
         return (self.photo,)
 
     @property
     def label(self) -> str:
-        """Those of which the same is known stand together."""
+        """Group of the priors with the same components."""
         same = self.known == FILM[3:]
         return self.KIND if same else f"{self.KIND}, {' '.join(self.known)}"
 
     @property
     def own_components(self) -> tuple[str, ...]:
-        """Those that are known; m about the roll's."""
+        """Names of the observed components; m may refer to the roll."""
         about = "m" if self.roll is None else "m - roll"
         return tuple(about if name == "m" else name for name in self.known)
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Return those of the six."""
+        """Return the units of the observed components."""
         return tuple({"t1": "mm", "t2": "mm", "theta": "rad"}.get(name, "") for name in self.known)
 
 
 @dataclass(frozen=True, eq=False)
 class KnownTogether(Observation):
-    """What is given of several unknowns as one observation with its covariance: a certificate, a calibration.
+    """Joint prior of several unknowns with full covariance, e.g. from a certificate or calibration.
 
     Parameters
     ----------
     title
-        Under which such observations stand together in results: `certificate`, `scanner`.
+        Name of the group in results, e.g. `certificate` or `scanner`.
     joined
-        The unknowns; their own standard deviations are infinite.
+        The unknowns; their own standard deviations must be infinite.
     sd
-        (k,) standard deviations of all their unknowns.
+        (k,) standard deviations of all components.
     covariance
-        (k, k) their covariance matrix, in place of `sd`.
+        (k, k) covariance matrix of all components, instead of `sd`.
 
     Raises
     ------
     InputError
-        What is no unknown, both or none of `sd` and `covariance`, or such as give no weight.
+        If an unknown is invalid, or weights are invalid: exactly one of `sd` and `covariance` is required.
     """
 
     KIND = "prior"
@@ -189,26 +189,26 @@ class KnownTogether(Observation):
 
     @property
     def of(self) -> tuple[str, ...]:
-        """The unknowns."""
+        """Names of the unknowns."""
         return tuple(each.name for each in self.joined)
 
     @property
     def name(self) -> str:
-        """Its title and the unknowns."""
+        """Title and names of the unknowns."""
         return f"{self.title} {listed(list(self.of), 4)}"
 
     @property
     def label(self) -> str:
-        """Its title."""
+        """Title of the prior."""
         return self.title
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Return those of the unknowns."""
+        """Return the units of the unknowns."""
         return tuple(unit for each in self.joined for unit in each.units(linear_unit))
 
     @property
     def own_components(self) -> tuple[str, ...]:
-        """Those of the unknowns, with their names where there are several."""
+        """Components of the unknowns, with names of the unknowns if there are several."""
         if len(self.joined) == 1:
             return self.joined[0].components
         return tuple(f"{each.name} {name}" for each in self.joined for name in each.components)

@@ -1,4 +1,4 @@
-"""What all kinds of observation have in common."""
+"""Base class of all observation types."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Unknown, rotation
 
 Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
-"""A kind, (k, p) indices of points, (k, q) photos, (k, c) unknowns; (k, v) values, (k, r, r) covariances."""
+"""Type; indices (k, p) of points, (k, q) photos, (k, c) unknowns; values (k, v), covariances (k, r, r)."""
 
 AXES = ("X", "Y", "Z")
 ROTATIONS = ("rotation x", "rotation y", "rotation z")
@@ -25,44 +25,43 @@ ROTATIONS = ("rotation x", "rotation y", "rotation z")
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """An observation of points, photos and unknowns that it has in common with others.
+    """Observation of points, photos and unknowns that may be shared with other observations.
 
-    A kind is a class of its own: fields for what it is of, what was observed and how well (`sd` or
-    `covariance`), and the names below.
+    Each type is a class with fields for points, photos or unknowns, for observed values and for `sd` or
+    `covariance`, and with the class attributes below.
 
     Attributes
     ----------
     points, photos
-        Names of what it is of.
+        Names of the observed points and photos.
     unknowns
-        Its common unknowns; None for those that it does without.
+        Shared unknowns; None for an optional one that is not used.
     observed
-        (v,) what was observed, as the core takes it.
+        (v,) observed values in the order of the core.
     precision
-        (r, r) covariance matrix of its r components.
+        (r, r) covariance matrix of the r components.
     """
 
     KIND: ClassVar[str] = ""
-    """The name under which results know the kind."""
+    """Name of the type in results."""
     POINTS: ClassVar[tuple[str, ...]] = ()
-    """Fields that name points."""
+    """Fields with names of points."""
     PHOTOS: ClassVar[tuple[str, ...]] = ()
-    """Fields that name photos."""
+    """Fields with names of photos."""
     UNKNOWNS: ClassVar[tuple[tuple[str, type[Unknown]], ...]] = ()
-    """Fields that may be common unknowns, with their type."""
+    """Fields for shared unknowns, with their classes."""
     NEEDS: ClassVar[frozenset[str]] = frozenset()
-    """Those that it cannot do without."""
+    """Fields of unknowns that are required."""
     VALUES: ClassVar[tuple[tuple[str, tuple[int, ...]], ...]] = ()
-    """Fields that are numbers, with their shapes, in the order in which the core takes them: of fields that
-    are common unknowns what is known instead."""
+    """Numeric fields with shapes, in the order of the core. A field with a shared unknown counts as 0."""
     COMPONENTS: ClassVar[tuple[str, ...]] = ()
-    """What its components are called: rotations are in radians, all others in the linear unit."""
+    """Names of the components; rotations are in radians, others in the linear unit."""
     LOCAL: ClassVar[bool] = False
-    """Whether in geographic space these are east, north and up."""
-    _PER: ClassVar[str] = ""  # What follows the units of its components: `/s` of rates
+    """Whether components are east, north and up in geographic space."""
+    _PER: ClassVar[str] = ""  # Suffix of the units: `/s` for rates
     MISSING: ClassVar[bool] = False
-    """Whether NaN stands for components that were not observed."""
-    _POSITIVE: ClassVar[bool] = False  # Whether its first value, a length, must be positive
+    """Whether NaN marks components that were not observed."""
+    _POSITIVE: ClassVar[bool] = False  # Whether the first value, a length, must be positive
 
     points: tuple[str, ...] = field(init=False, repr=False)
     photos: tuple[str, ...] = field(init=False, repr=False)
@@ -110,45 +109,45 @@ class Observation:
 
     @property
     def moment(self) -> Moment | None:
-        """The time on a trajectory that it is of, in the place of a photo."""
+        """Time on a trajectory to which the observation refers, instead of a photo."""
         own = vars(self)
         trajectory = own.get("trajectory")
         return None if trajectory is None else Moment(trajectory, float(own["time"]), own["clock"])
 
     @property
     def of(self) -> tuple[str, ...]:
-        """What it is of, by name: points and photos or, where there are none, unknowns."""
+        """Names of the observed points and photos; without these, names of the unknowns."""
         return self.points + self.photos or tuple(each.name for each in self.unknowns if each is not None)
 
     @property
     def name(self) -> str:
-        """Its kind and what it is of, for reports."""
+        """Observation type and observed objects, for reports."""
         return f"{self.KIND} {' - '.join(self.of)}"
 
     @property
     def label(self) -> str:
-        """Under which observations stand together in results."""
+        """Name of the group of the observation in results."""
         return self.KIND
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Return the units of its components; nothing for plain numbers."""
+        """Return the units of the components; empty for dimensionless numbers."""
         return tuple(
             ("rad" if name in ROTATIONS else linear_unit) + self._PER for name in self.own_components
         )
 
     @property
     def own_components(self) -> tuple[str, ...]:
-        """The names of its components, in rectangular space."""
+        """Names of the components in rectangular space."""
         return self.COMPONENTS
 
     def components(self, *, geographic: bool) -> tuple[str, ...]:
-        """Return the names of its components; of places in geographic space those of local axes."""
+        """Return the names of the components; east, north, up for positions in geographic space."""
         own = self.own_components
         return ("east", "north", "up")[: len(own)] if geographic and self.LOCAL else own
 
     @classmethod
     def values_of(cls, observations: Sequence[Observation]) -> Floats:
-        """Return (k, v) what the core takes of observations of this kind, all of a block."""
+        """Return the values (k, v) for the core of all observations of this type in a block."""
         return np.stack([each.observed for each in observations])
 
     def _unknown(self, name: str, kind: type[Unknown]) -> Unknown | None:
@@ -161,7 +160,7 @@ class Observation:
         return None
 
     def _value(self, name: str, shape: tuple[int, ...]) -> Floats:
-        """Check a field and return its numbers; zeros or the identity for common unknowns."""
+        """Validate a field and return its numbers; zeros or the identity for shared unknowns."""
         value = getattr(self, name)
         turns = shape == (3, 3)
         if isinstance(value, Unknown) or (value is None and turns):
@@ -175,7 +174,7 @@ class Observation:
         return array
 
     def _covariance(self, use: NDArray[np.bool_]) -> Floats:
-        """Return the covariance matrix; `use` says which components were observed."""
+        """Return the covariance matrix of the observed components `use`."""
         r = len(self.own_components)
         sd: ArrayLike | None = getattr(self, "sd", None)
         covariance: ArrayLike | None = getattr(self, "covariance", None)
@@ -185,7 +184,7 @@ class Observation:
                 own = deviations[use] ** 2
             if not (deviations[use] > 0).all():
                 raise argument_error(f"sd of {self.name}", "positive", value=deviations.tolist())
-            if not ((own > 0) & np.isfinite(own)).all():  # squares must be numbers
+            if not ((own > 0) & np.isfinite(own)).all():  # squares must be finite and not 0
                 raise argument_error(
                     f"sd of {self.name}", "range", low=1e-150, high=1e150, value=deviations.tolist()
                 )
@@ -199,24 +198,24 @@ class Observation:
 
 
 def with_unknowns(observation: Observation, others: Mapping[int, Unknown]) -> Observation:
-    """Return an observation with other common unknowns in the place of some, by the identity of these."""
+    """Replace shared unknowns of an observation; keys of `others` are object identities."""
     fields = zip(observation.UNKNOWNS, observation.unknowns if observation.UNKNOWNS else (), strict=True)
     changes: dict[str, Any] = {name: others[id(own)] for (name, _), own in fields if id(own) in others}
     return replace(observation, **changes) if changes else observation
 
 
 def moments(observations: Sequence[Observation]) -> list[Moment]:
-    """Return the different times on trajectories that observations are of."""
+    """Return the different times on trajectories to which observations refer."""
     return list({each.name: each for each in _moments(observations)}.values())
 
 
 def of_records(observations: Sequence[Observation]) -> list[Unknown]:
-    """Return the coefficients and clocks that times on trajectories are made of, each once."""
+    """Return the trajectory coefficients and clocks of record times, each once."""
     found: dict[int, Unknown] = {}
     seen: set[int] = set()
     for each in _moments(observations):
         own: list[Unknown] = []
-        # A trajectory has many records, and may have many coefficients.
+        # A trajectory has many records, and possibly many coefficients.
         if id(each.trajectory) not in seen:
             seen.add(id(each.trajectory))
             own += [one for part in each.trajectory.coefficients for one in part]
@@ -228,13 +227,13 @@ def of_records(observations: Sequence[Observation]) -> list[Unknown]:
 def all_trajectories(
     of_photos: Sequence[Trajectory], observations: Sequence[Observation]
 ) -> list[Trajectory]:
-    """Return trajectories of photos, then those of records, each once."""
+    """Return the trajectories of photos, then of records, each once."""
     of_times = (each.trajectory for each in _moments(observations))
     return list({id(each): each for each in (*of_photos, *of_times)}.values())
 
 
 def _moments(observations: Sequence[Observation]) -> Iterator[Moment]:
-    """Yield the time of each observation that is of one."""
+    """Yield the trajectory times of observations."""
     return (moment for each in observations if (moment := each.moment) is not None)
 
 
@@ -244,9 +243,9 @@ def observation_rows(
     photos: Sequence[str],
     unknowns: Sequence[Unknown],
 ) -> list[tuple[list[int], Group]]:
-    """Return observations kind by kind: their rows among the given ones, and what the core takes.
+    """Group observations by type: their row indices, and their arrays for the core.
 
-    Times on trajectories stand behind the photos. InputError: a point or photo that is not there.
+    Record times follow the photos. InputError if a point or photo is not in the block.
     """
     if not observations:
         return []

@@ -1,4 +1,4 @@
-"""Observations of photos: positions and velocities of GNSS, inertial units, ranges, relative poses."""
+"""Observations of photos: GNSS positions and velocities, inertial attitudes, ranges, relative poses."""
 
 from __future__ import annotations
 
@@ -16,34 +16,35 @@ from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, S
 
 @dataclass(frozen=True, eq=False)
 class Position(Observation):
-    """The position of the GNSS antenna of a photo: C + A l + s + d dt.
+    """Observed position of the GNSS antenna of a photo: C + A l + s + d dt.
 
     Parameters
     ----------
     photo
-        Its name; None where it is of a trajectory.
+        Name of the photo; None if a trajectory is observed.
     position
         (3,) observed X, Y, Z of the antenna; or longitude (rad), latitude (rad), height.
     sd
-        (3,) standard deviations in the linear unit, or one for all: of X, Y, Z; or of east, north, up.
+        (3,) standard deviations in the linear unit, or one for all; along X, Y, Z or east, north, up.
     covariance
-        (3, 3) covariance matrix of the same, in place of `sd`.
+        (3, 3) covariance matrix of the position, instead of `sd`.
     lever_arm
         (3,) l, from the projection centre to the antenna in the axes of the photo (x right, y up, z back
-        towards the viewer), in the linear unit; or one that is unknown.
+        towards the viewer), in the linear unit; or an unknown lever arm.
     shift
-        s; None without.
+        Unknown shift s, optional.
     drift
-        d; None without. It counts from its epoch, or the mean time of the observations that it is given to.
+        Unknown drift d, optional. It refers to its epoch, or to the mean time of the observations that share
+        it.
     time
-        Seconds.
+        Time in seconds.
     trajectory, clock
-        What it is of in the place of a photo, at `time`, and the offset of the receiver's clock.
+        Trajectory observed at `time` instead of a photo, and clock of the receiver with unknown offset.
 
     Raises
     ------
     InputError
-        Values that are not finite, both or none of `sd` and `covariance`, or such as give no weight.
+        If a value is not finite, or weights are invalid: exactly one of `sd` and `covariance` is required.
     """
 
     KIND = "position"
@@ -66,7 +67,7 @@ class Position(Observation):
 
     @classmethod
     def values_of(cls, observations: Sequence[Observation]) -> Floats:
-        """Return what the core takes; times count from the epochs of drifts."""
+        """Return the values for the core; times are relative to the epochs of drifts."""
         values = super().values_of(observations)
         epochs = epochs_of(observations)
         drifts = [each.unknowns[-1] for each in observations]
@@ -75,7 +76,7 @@ class Position(Observation):
 
 
 def epochs_of(observations: Iterable[Observation]) -> dict[int, float]:
-    """Return the epoch of each drift, by its identity: its own, or the mean time of its observations."""
+    """Return the epoch of each drift by object identity: given, or the mean observation time."""
     times: dict[int, list[float]] = {}
     given: dict[int, float] = {}
     for each in observations:
@@ -87,7 +88,7 @@ def epochs_of(observations: Iterable[Observation]) -> dict[int, float]:
 
 
 def with_epochs(observations: Sequence[Observation]) -> list[Observation]:
-    """Return observations whose drifts count from where they do now, whichever of them are left out."""
+    """Fix the present epochs of all drifts, so that removals do not change them."""
     epochs = epochs_of(observations)
     dated: dict[int, Unknown] = {}
     for each in (one for own in observations for one in own.unknowns):
@@ -98,29 +99,30 @@ def with_epochs(observations: Sequence[Observation]) -> list[Observation]:
 
 @dataclass(frozen=True, eq=False)
 class Attitude(Observation):
-    """The attitude of the body that carries a camera, as an inertial unit gives it: A B.
+    """Observed attitude of the body that carries a camera, e.g. an inertial unit: A B.
 
     Parameters
     ----------
     photo
-        Its name; None where it is of a trajectory.
+        Name of the photo; None if a trajectory is observed.
     attitude
-        (3, 3) observed, body to object: its columns are the axes of the body in X, Y, Z; or in east, north,
-        up at the photo where the object space is geographic.
+        (3, 3) observed rotation, body to object. Its columns are the axes of the body in X, Y, Z, or in east,
+        north, up at the photo if the object space is geographic.
     sd
         (3,) standard deviations of rotations about the axes of the body in radians, or one for all.
     covariance
-        (3, 3) covariance matrix of the same in square radians, in place of `sd`.
+        (3, 3) covariance matrix of the rotations in square radians, instead of `sd`.
     boresight
-        (3, 3) B, body to the axes of the photo (x right, y up, z back towards the viewer); or one that is
-        unknown. None where what is observed is the attitude of the photo itself.
+        (3, 3) B, body to the axes of the photo (x right, y up, z back towards the viewer), or an unknown
+        boresight. None if the observed attitude is the attitude of the photo.
     trajectory, time, clock
-        What it is of in the place of a photo, at a time in seconds, and the offset of that clock.
+        Trajectory observed at a time in seconds instead of a photo, and clock with unknown offset.
 
     Raises
     ------
     InputError
-        Matrices that are no rotations, both or none of `sd` and `covariance`, or such as give no weight.
+        If a matrix is not a rotation, or weights are invalid: exactly one of `sd` and `covariance` is
+        required.
     """
 
     KIND = "attitude"
@@ -141,9 +143,9 @@ class Attitude(Observation):
 
 @dataclass(frozen=True, eq=False)
 class Relative(Observation):
-    """The pose of one photo in the axes of another: odometry, a calibrated stereo rig.
+    """Observed pose of one photo in the axes of another, e.g. odometry or a calibrated stereo rig.
 
-    t = A_i' (C_j - C_i) and R = A_i' A_j, A being the matrix from photo to object.
+    t = A_i' (C_j - C_i) and R = A_i' A_j; A is the matrix from photo to object.
 
     Parameters
     ----------
@@ -152,18 +154,18 @@ class Relative(Observation):
     translation
         (3,) observed t in the axes of photo i (x right, y up, z back towards the viewer), in the linear unit.
     rotation
-        (3, 3) observed R: its columns are the axes of photo j in those of photo i.
+        (3, 3) observed R; its columns are the axes of photo j in the system of photo i.
     sd
         (6,) standard deviations of the components of t in the linear unit, then of rotations about the axes
         of photo j in radians.
     covariance
-        (6, 6) covariance matrix of the same, in place of `sd`.
+        (6, 6) covariance matrix of the same components, instead of `sd`.
 
     Raises
     ------
     InputError
-        A photo with itself, values that are not finite, a matrix that is no rotation, both or none of `sd`
-        and `covariance`, or such as give no weight.
+        If both photos are the same, a value is not finite, or a matrix is not a rotation. If not exactly one
+        of `sd` and `covariance` is given with valid weights.
     """
 
     KIND = "relative"
@@ -181,32 +183,32 @@ class Relative(Observation):
 
 @dataclass(frozen=True, eq=False)
 class Range(Observation):
-    """The distance of a point from a rangefinder that moves with a photo.
+    """Observed distance of a point from a rangefinder that moves with a photo.
 
-    The norm s of P - C - A l; of an instrument m s + k.
+    The observed value is s = ||P - C - A l||, or m s + k with an instrument.
 
     Parameters
     ----------
     photo
-        Its name; None where it is of a trajectory.
+        Name of the photo; None if a trajectory is observed.
     point
-        The name of the point P.
+        Name of the point P.
     length
-        Observed, in the linear unit of the object space.
+        Observed distance in the linear unit of the object space.
     sd
-        Its standard deviation in the same unit.
+        Standard deviation of the distance in the same unit.
     lever_arm
-        (3,) l, from the projection centre to the rangefinder in the axes of the photo (x right, y up, z back
-        towards the viewer), in the linear unit; known.
+        (3,) fixed l, from the projection centre to the rangefinder in the axes of the photo (x right, y up, z
+        back towards the viewer), in the linear unit.
     instrument
-        Scale m and constant k of the rangefinder; None where these are 1 and 0.
+        Instrument with scale m and constant k; None for 1 and 0.
     trajectory, time, clock
-        What it is of in the place of a photo, at a time in seconds, and the offset of that clock.
+        Trajectory observed at a time in seconds instead of a photo, and clock with unknown offset.
 
     Raises
     ------
     InputError
-        A length or a standard deviation that is not positive and finite, a lever arm that is not finite.
+        If a length or standard deviation is not positive and finite, or a lever arm is not finite.
     """
 
     KIND = "range"
@@ -230,27 +232,27 @@ class Range(Observation):
 
 @dataclass(frozen=True, eq=False)
 class Velocity(Observation):
-    """The velocity of the GNSS antenna of a photo that moves: C' + A [w]x l.
+    """Observed velocity of the GNSS antenna of a moving photo: C' + A [w]x l.
 
     Parameters
     ----------
     photo
-        Its name, on a trajectory; None where it is of a trajectory itself.
+        Name of a photo on a trajectory; None if the trajectory is specified.
     velocity
-        (3,) in the linear unit a second, along X, Y, Z; geocentric where the object space is geographic.
+        (3,) in the linear unit per second along X, Y, Z; geocentric if the object space is geographic.
     sd
-        (3,) standard deviations of the same, or one for all.
+        (3,) standard deviations of the velocity, or one for all.
     covariance
-        (3, 3) covariance matrix of the same, in place of `sd`.
+        (3, 3) covariance matrix of the velocity, instead of `sd`.
     lever_arm
-        (3,) l, from the projection centre to the antenna in the axes of the photo; or one that is unknown.
+        (3,) l, from the projection centre to the antenna in the axes of the photo; or an unknown lever arm.
     trajectory, time, clock
-        What it is of in the place of a photo, at a time in seconds, and the offset of that clock.
+        Trajectory observed at a time in seconds instead of a photo, and clock with unknown offset.
 
     Raises
     ------
     InputError
-        Values that are not finite, both or none of `sd` and `covariance`, or such as give no weight.
+        If a value is not finite, or weights are invalid: exactly one of `sd` and `covariance` is required.
     """
 
     KIND = "velocity"
@@ -272,29 +274,30 @@ class Velocity(Observation):
 
 @dataclass(frozen=True, eq=False)
 class Rate(Observation):
-    """The rate of rotation of the body that carries a camera, as a gyroscope gives it: B' w + b.
+    """Observed rotation rate of the body that carries a camera, e.g. a gyroscope: B' w + b.
 
     Parameters
     ----------
     photo
-        Its name, on a trajectory; None where it is of a trajectory itself.
+        Name of a photo on a trajectory; None if the trajectory is specified.
     rate
-        (3,) about the axes of the body, in radians a second.
+        (3,) rotation rate about the axes of the body, in radians per second.
     sd
-        (3,) standard deviations of the same, or one for all.
+        (3,) standard deviations of the rate, or one for all.
     covariance
-        (3, 3) covariance matrix of the same, in place of `sd`.
+        (3, 3) covariance matrix of the rate, instead of `sd`.
     boresight
-        (3, 3) B, body to the axes of the photo; or one that is unknown. None: the identity.
+        (3, 3) B, body to the axes of the photo; or an unknown boresight. None: the identity.
     bias
-        b; None without.
+        Unknown bias b, optional.
     trajectory, time, clock
-        What it is of in the place of a photo, at a time in seconds, and the offset of that clock.
+        Trajectory observed at a time in seconds instead of a photo, and clock with unknown offset.
 
     Raises
     ------
     InputError
-        Matrices that are no rotations, both or none of `sd` and `covariance`, or such as give no weight.
+        If a matrix is not a rotation, or weights are invalid: exactly one of `sd` and `covariance` is
+        required.
     """
 
     KIND = "rate"

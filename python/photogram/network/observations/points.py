@@ -1,4 +1,4 @@
-"""Observations of points: control, distances, differences of coordinates, and surfaces that points are on."""
+"""Observations of points: control, distances, differences of coordinates, and points on surfaces."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine
 
 @dataclass(frozen=True, eq=False)
 class Control(Observation):
-    """The position of a point with its full covariance, as from an adjustment of its own.
+    """Observed position of a point with full covariance, e.g. from a separate adjustment.
 
     Parameters
     ----------
     point
-        Its name.
+        Name of the point.
     position
         (3,) observed X, Y, Z; or longitude (rad), latitude (rad), height.
     sd
-        (3,) standard deviations in the linear unit, or one for all: of X, Y, Z; or of east, north, up.
+        (3,) standard deviations in the linear unit, or one for all; along X, Y, Z or east, north, up.
     covariance
-        (3, 3) covariance matrix of the same, in place of `sd`.
+        (3, 3) covariance matrix of the position, instead of `sd`.
 
     Raises
     ------
     InputError
-        Values that are not finite, both or none of `sd` and `covariance`, or such as give no weight.
+        If a value is not finite, or weights are invalid: exactly one of `sd` and `covariance` is required.
     """
 
     KIND = "control"
@@ -44,25 +44,25 @@ class Control(Observation):
 
 @dataclass(frozen=True, eq=False)
 class Distance(Observation):
-    """The distance between two points: a tape, a rangefinder, the ends of a scale bar.
+    """Observed distance between two points, e.g. by tape, rangefinder or scale bar.
 
-    The norm s of Q - P; of an instrument m s + k.
+    The observed value is s = ||Q - P||, or m s + k with an instrument.
 
     Parameters
     ----------
     first, second
         Names of the points P and Q.
     length
-        Observed, in the linear unit of the object space.
+        Observed distance in the linear unit of the object space.
     sd
-        Its standard deviation in the same unit.
+        Standard deviation of the distance in the same unit.
     instrument
-        Scale m and constant k of what it was measured with; None where these are 1 and 0.
+        Instrument with scale m and constant k; None for 1 and 0.
 
     Raises
     ------
     InputError
-        A point with itself, a length or a standard deviation that is not positive and finite.
+        If both points are the same, or a length or standard deviation is not positive and finite.
     """
 
     KIND = "distance"
@@ -81,25 +81,26 @@ class Distance(Observation):
 
 @dataclass(frozen=True, eq=False)
 class Difference(Observation):
-    """The vector from one point to another, or some of its components: a GNSS baseline, taped offsets.
+    """Observed vector between two points, or some components, e.g. a GNSS baseline.
 
-    Q - P along X, Y, Z; geocentric axes where the object space is geographic.
+    Q - P along X, Y, Z; along geocentric axes if the object space is geographic.
 
     Parameters
     ----------
     first, second
         Names of the points P and Q.
     vector
-        (3,) observed components in the linear unit of the object space; NaN where not observed.
+        (3,) components in the linear unit of the object space; NaN if not observed.
     sd
-        (3,) their standard deviations, or one for all; what stands where nothing was observed does not count.
+        (3,) standard deviations, or one for all; ignored for components that were not observed.
     covariance
-        (3, 3) their covariance matrix, in place of `sd`.
+        (3, 3) covariance matrix of the vector, instead of `sd`.
 
     Raises
     ------
     InputError
-        A point with itself, no component, both or none of `sd` and `covariance`, or such as give no weight.
+        If both points are the same, no component was observed, or not exactly one of `sd` and `covariance` is
+        given.
     """
 
     KIND = "difference"
@@ -117,9 +118,9 @@ class Difference(Observation):
 
 @dataclass(frozen=True, eq=False)
 class EqualHeight(Observation):
-    """Two points at one height, or with the difference of heights that was levelled.
+    """Equal height of two points, or a levelled height difference.
 
-    h = Z_Q - Z_P; heights above the ellipsoid where the object space is geographic.
+    h = Z_Q - Z_P; the difference of ellipsoidal heights if the object space is geographic.
 
     Parameters
     ----------
@@ -133,8 +134,8 @@ class EqualHeight(Observation):
     Raises
     ------
     InputError
-        A point with itself, a difference that is not finite, a standard deviation that is not positive and
-        finite.
+        If both points are the same, the difference is not finite, or the standard deviation is not positive
+        and finite.
     """
 
     KIND = "equal height"
@@ -150,14 +151,14 @@ class EqualHeight(Observation):
 
 @dataclass(frozen=True, eq=False)
 class OnLevel(Observation):
-    """A point at the height of a level, or so much above it: Z - h.
+    """Height of a point relative to a level: Z - h.
 
     Parameters
     ----------
     point
-        Its name.
+        Name of the point.
     level
-        The level.
+        Level with unknown height.
     sd
         Standard deviation in the linear unit of the object space.
     difference
@@ -166,7 +167,7 @@ class OnLevel(Observation):
     Raises
     ------
     InputError
-        What is no level, a difference that is not finite, a standard deviation that gives no weight.
+        If the level is invalid, the difference is not finite, or the standard deviation is invalid.
     """
 
     KIND = "on level"
@@ -184,23 +185,23 @@ class OnLevel(Observation):
 
 @dataclass(frozen=True, eq=False)
 class OnPlane(Observation):
-    """A point on a plane, or at a distance from it: n.(P - p0) - d.
+    """Distance of a point from a plane, usually 0: n.(P - p0) - d.
 
     Parameters
     ----------
     point
-        Its name.
+        Name of the point.
     plane
-        The plane.
+        Plane with unknown parameters.
     sd
-        Standard deviation in the linear unit of the object space: how flat the plane is.
+        Standard deviation in the linear unit of the object space: flatness of the plane.
     distance
-        Observed distance from it along its normal, in the same unit.
+        Observed distance from the plane along its normal, in the same unit.
 
     Raises
     ------
     InputError
-        What is no plane, a distance that is not finite, a standard deviation that gives no weight.
+        If the plane is invalid, the distance is not finite, or the standard deviation is invalid.
     """
 
     KIND = "on plane"
@@ -218,24 +219,24 @@ class OnPlane(Observation):
 
 @dataclass(frozen=True, eq=False)
 class OnPlumbLine(Observation):
-    """A point on a plumb line: (X - X0, Y - Y0).
+    """Point on a plumb line: (X - X0, Y - Y0).
 
     Parameters
     ----------
     point
-        Its name.
+        Name of the point.
     line
-        The line.
+        Plumb line with unknown position.
     sd
-        (2,) standard deviations of its offsets along X and Y or, in geographic space, east and north, in the
+        (2,) standard deviations of the offsets along X and Y (east and north in geographic space) in the
         linear unit, or one for both.
     covariance
-        (2, 2) covariance matrix of the same, in place of `sd`.
+        (2, 2) covariance matrix of the offsets, instead of `sd`.
 
     Raises
     ------
     InputError
-        What is no such line, both or none of `sd` and `covariance`, or such as give no weight.
+        If the line is invalid, or not exactly one of `sd` and `covariance` is given with valid weights.
     """
 
     KIND = "on plumb line"
@@ -253,24 +254,24 @@ class OnPlumbLine(Observation):
 
 @dataclass(frozen=True, eq=False)
 class OnLine(Observation):
-    """A point on a straight line: T'(P - p0) - q, T the first two of the axes of the line.
+    """Point on a straight line: T'(P - p0) - q, with the first two axes T of the line.
 
     Parameters
     ----------
     point
-        Its name.
+        Name of the point.
     line
-        The line.
+        Line with unknown parameters.
     sd
-        (2,) standard deviations of its offsets along the first two axes of the line, in the linear unit, or
+        (2,) standard deviations of the offsets along the first two axes of the line, in the linear unit, or
         one for both.
     covariance
-        (2, 2) covariance matrix of the same, in place of `sd`.
+        (2, 2) covariance matrix of the offsets, instead of `sd`.
 
     Raises
     ------
     InputError
-        What is no such line, both or none of `sd` and `covariance`, or such as give no weight.
+        If the line is invalid, or not exactly one of `sd` and `covariance` is given with valid weights.
     """
 
     KIND = "on line"

@@ -1,4 +1,4 @@
-"""Observations of common unknowns alone: priors, bases of rigs, knots of lenses, smooth trajectories."""
+"""Observations of shared unknowns: priors, base lengths of rigs, knots of lenses, smooth trajectories."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from photogram.network.unknowns import Sensor, Unknown
 
 @dataclass(frozen=True, eq=False)
 class Prior(Observation):
-    """What was observed of a common unknown as one observation with its full covariance.
+    """Prior of a shared unknown: an observation with full covariance.
 
     Parameters
     ----------
     unknown
-        The unknown; its own standard deviations are infinite.
+        The unknown; its own standard deviations must be infinite.
     sd
-        (k,) standard deviations of its unknowns, rotations in radians.
+        (k,) standard deviations of its components, rotations in radians.
     covariance
-        (k, k) their covariance matrix, in place of `sd`.
+        (k, k) covariance matrix of the components, instead of `sd`.
     value
-        (k,) what was observed of them, in the place of what the unknown is given; not of rotations.
+        (k,) observed values, if they differ from the values of the unknown; not for rotations.
 
     Raises
     ------
     InputError
-        What is no unknown, both or none of `sd` and `covariance`, or such as give no weight.
+        If the unknown is invalid, or not exactly one of `sd` and `covariance` is given with valid weights.
     """
 
     KIND = "prior"
@@ -61,40 +61,40 @@ class Prior(Observation):
 
     @property
     def label(self) -> str:
-        """Those of one type stand together."""
+        """Group of the priors with the same type of unknown."""
         return f"prior, {self.unknown.KIND}" + ("" if self.value is None else ", observed")
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Those of the unknown."""
+        """Return the units of the unknown."""
         return self.unknown.units(linear_unit)
 
     @property
     def own_components(self) -> tuple[str, ...]:
-        """Those of the unknown."""
+        """Components of the unknown."""
         return self.unknown.components
 
 
 @dataclass(frozen=True, eq=False)
 class Base(Observation):
-    """The distance between two sensors on a frame, or of one from the frame itself.
+    """Observed distance between two sensors on a frame, or between a sensor and the frame.
 
-    The norm of c_2 - c_1; a base that was measured gives a rig its scale.
+    The observed value is ||c_2 - c_1||. A measured base length defines the scale of a rig.
 
     Parameters
     ----------
     first
-        The first sensor; None for that which stands for the frame.
+        First sensor; None for the sensor that represents the frame.
     second
-        The second sensor.
+        Second sensor.
     length
-        Observed, in the linear unit of the object space.
+        Observed distance in the linear unit of the object space.
     sd
-        Its standard deviation in the same unit.
+        Standard deviation of the distance in the same unit.
 
     Raises
     ------
     InputError
-        What is no sensor, values that are not finite, a standard deviation that gives no weight.
+        If a sensor is invalid, a value is not finite, or the standard deviation is invalid.
     """
 
     KIND = "base"
@@ -111,25 +111,25 @@ class Base(Observation):
 
 @dataclass(frozen=True, eq=False)
 class Smoothness(Observation):
-    """A sum of coefficients of a trajectory, each with its factor, that was observed: most often as zero.
+    """Observed weighted sum of trajectory coefficients, usually 0.
 
     Parameters
     ----------
     coefficients
-        Of one trajectory, all of positions or all of rotations.
+        Coefficients of one trajectory, all of positions or all of rotations.
     factors
-        As many numbers.
+        One factor per coefficient.
     observed_sum
-        (3,) what was observed; most often 0.
+        (3,) observed value of the sum, default 0.
     sd
         (3,) standard deviations of x, y, z in the unit of the coefficients, or one for all.
     covariance
-        (3, 3) covariance matrix of the same, in place of `sd`.
+        (3, 3) covariance matrix of the sum, instead of `sd`.
 
     Raises
     ------
     InputError
-        What is no coefficient, coefficients of two kinds, more or fewer factors.
+        If a coefficient is invalid, types differ, or the number of factors is wrong.
     """
 
     KIND: ClassVar[str] = "smoothness"
@@ -158,21 +158,21 @@ class Smoothness(Observation):
 
     @property
     def label(self) -> str:
-        """Those of one kind and number of coefficients stand together."""
+        """Group of the observations with the same type and number of coefficients."""
         return f"smoothness, {len(self.coefficients)} {self.coefficients[0].KIND}s"
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Those of the coefficients."""
+        """Return the units of the coefficients."""
         return self.coefficients[0].units(linear_unit)
 
     @property
     def of(self) -> tuple[str, ...]:
-        """The coefficients."""
+        """Names of the coefficients."""
         return tuple(each.name for each in self.coefficients)
 
 
 def smoothness_of(trajectory: Trajectory) -> list[Observation]:
-    """Return what is observed of the coefficients of a trajectory together."""
+    """Return the smoothness observations of the coefficients of a trajectory."""
     found: list[Observation] = []
     for basis, own in zip((trajectory.position, trajectory.rotation), trajectory.coefficients, strict=True):
         for numbers, factors, sd in [] if basis is None else basis.smoothed:
@@ -183,7 +183,7 @@ def smoothness_of(trajectory: Trajectory) -> list[Observation]:
 def with_smoothness(
     observations: Sequence[Observation], trajectories: Sequence[Trajectory]
 ) -> tuple[Observation, ...]:
-    """Return observations with those of trajectories that are not among them."""
+    """Add the missing smoothness observations of trajectories."""
     known: set[Unknown | None] = set()
     for each in observations:
         if isinstance(each, Smoothness):
@@ -195,9 +195,9 @@ def with_smoothness(
 
 
 def with_knots(observations: Sequence[Observation], cameras: Sequence[Camera]) -> tuple[Observation, ...]:
-    """Return observations with those of the weighted knots of cameras: each is zero, radially and across.
+    """Add priors for weighted knots of cameras: 0 radially and across.
 
-    Those of knots of other cameras go.
+    Priors of knots of other cameras are removed.
     """
     own = [knot for camera in cameras for knot in camera.knot_unknowns]
     there = {id(each) for each in own}
