@@ -1,4 +1,4 @@
-"""Absolute orientation: similarity between a model and its control (C&GS Technical Bulletin 19, 1962)."""
+"""Absolute orientation of a model (C&GS Technical Bulletin 19, 1962)."""
 
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv

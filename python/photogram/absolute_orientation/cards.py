@@ -1,4 +1,4 @@
-"""Stations, previous results and transformations in the card order of TB 19, section 7.
+"""Stations, results and transformations in the card order of TB 19, section 7.
 
 The bulletin does not define the format of the cards. Here a record is a line of words, separated by blanks or
 by commas. A missing control coordinate is a word `-`, or nothing between two commas.
@@ -146,7 +146,7 @@ def _stations(
 
 
 def read_restart(path: Path, stations: Stations, messages: list[Message]) -> Similarity | None:
-    """Read the record of a restart (TB 19, step 12): eight words, for the stations of the new solution."""
+    """Read a restart record (TB 19, step 12): eight words for a new solution."""
     records = _records(path)
     if len(records) != 1:
         raise InputError(phrase("orientation.restart"), file=path)
@@ -173,7 +173,7 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
 
 
 def _kappa(stations: Stations) -> float | None:
-    """Return kappa = theta_X - theta_x of the first two stations; None without plan coordinates."""
+    """Return kappa = theta_X - theta_x of two stations; None without plan."""
     if len(stations.ids) < 2 or not stations.given[:2, :2].all():
         return None
     ground, model = (array[1, :2] - array[0, :2] for array in (stations.control, stations.model))
@@ -181,7 +181,7 @@ def _kappa(stations: Stations) -> float | None:
 
 
 def restart_record(similarity: Similarity, identification: str) -> str:
-    """Return record 1 of part I for a new solution: sines of the angles, s, B, identification."""
+    """Return record 1 of part I for a new solution: sines, s, B, identification."""
     values = [*np.sin(similarity.angles), similarity.scale, *similarity.translation]
     return _record(values, identification)
 
@@ -200,7 +200,7 @@ def _record(values: list[float] | Floats, identification: str) -> str:
 
 
 def read_transformation(path: Path) -> Similarity:
-    """Read the two records of part II, the output of part I; their covariance is unknown."""
+    """Read the two records of part II; their covariance is unknown."""
     records = _records(path)
     if len(records) < 2:
         raise InputError(phrase("orientation.transformation"), file=path)

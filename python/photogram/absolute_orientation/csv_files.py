@@ -27,7 +27,7 @@ SPELLINGS = {f"{letter}{k + 1}": "xyz"[k] if letter == "x" else "XYZ"[k] for let
 
 
 def is_csv(path: Path) -> bool:
-    """Whether the first line with content is the header of a CSV file, not a record of numbers."""
+    """Whether the first line is a CSV header, not a record of numbers."""
     lines = enumerate(read_lines(path), 1)
     first = next(
         (Place(path, n, line) for n, line in lines if line.strip() and not line.startswith("#")), None

@@ -1,4 +1,4 @@
-"""The document of an orientation; `docs/absolute-orientation.md` describes its JSON form."""
+"""The document of an orientation; see `docs/absolute-orientation.md`."""
 
 from __future__ import annotations
 
@@ -161,12 +161,12 @@ def _units(result: Orientation) -> dict[str, str]:
 
 
 def to_json(result: Orientation) -> bytes:
-    """Return the whole result as JSON (UTF-8); its points are the stations without control."""
+    """Return the result as JSON (UTF-8); points are stations without control."""
     return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}\n"])
 
 
 def without_points(result: Orientation) -> Iterator[bytes]:
-    """Yield the document up to its first point, so that any number of points can follow."""
+    """Yield the document up to its first point, for any number of points."""
     yield json.to_json(record(result.document())).removesuffix(b"\n}\n")
     yield b',\n  "points": ['
 
@@ -182,7 +182,7 @@ def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> by
 
 
 def orientation_findings(result: Orientation) -> Findings:
-    """Return the tests of an orientation: w with a priori standard deviations, otherwise t."""
+    """Return the tests of an orientation: w with a priori sd, otherwise t."""
 
     def name(index: tuple[int, ...]) -> Phrase:
         station, axis = result.stations.ids[index[0]], "XYZ"[index[1]]

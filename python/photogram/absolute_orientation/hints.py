@@ -98,7 +98,7 @@ def find(
 
 
 def trials(names: list[str], control: Floats, placed: Floats, rounding: float, orient: Orient) -> list[Trial]:
-    """Orient the model for each hypothesis, mistakes of the whole set first; see :func:`find`."""
+    """Orient the model by hypotheses, mistakes of the set first; see :func:`find`."""
     return [
         Trial(text, changed, max(fit.sum_of_squares, rounding))
         for text, changed in _hypotheses(names, control, placed)
@@ -132,7 +132,7 @@ def _hypotheses(names: list[str], control: Floats, placed: Floats) -> Iterator[t
 
 
 def _pairs(control: Floats, placed: Floats, suspects: list[int]) -> list[tuple[int, int]]:
-    """Return pairs of stations with the same known components, closest to each other's positions first."""
+    """Return station pairs with equal known components, the closest first."""
     known = np.isfinite(control)
     pairs = [(one, other) for one, other in combinations(suspects, 2) if (known[one] == known[other]).all()]
 
@@ -145,7 +145,7 @@ def _pairs(control: Floats, placed: Floats, suspects: list[int]) -> list[tuple[i
 
 
 def _suspects(control: Floats, residuals: Floats) -> list[int]:
-    """Return stations to be tried: all, or the largest residuals and the most distant ones.
+    """Return stations to be tried: all, or large residuals and distant ones.
 
     A distant station attracts the orientation, and its residual may be small.
     """
@@ -160,7 +160,7 @@ def _suspects(control: Floats, residuals: Floats) -> list[int]:
 
 
 def unit_of(scale: float, sd: float) -> Phrase | None:
-    """Return a message if a scale, within its sd (or NaN), is the ratio of feet and metres."""
+    """Return a message if a scale within its sd is the ratio of feet and metres."""
     for factor, unit in UNITS.items():
         near = abs(math.log(scale / factor))
         if near <= SAME_SCALE and not near > max(SCALE_DEVIATIONS * sd / scale, ROUNDING):
@@ -169,7 +169,7 @@ def unit_of(scale: float, sd: float) -> Phrase | None:
 
 
 def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> Phrase | None:
-    """Return a message if a mirror image of the model fits as well, because control is in a plane.
+    """Return a message if a mirrored model fits as well, with control in a plane.
 
     `control` (n, 3) is NaN if it is not used; a sum of squares up to `rounding` is rounding only.
     """

@@ -1,4 +1,4 @@
-"""Models before their absolute orientation: relative orientation of pairs of photos, and strips.
+"""Models before absolute orientation: relative orientation, and strips.
 
 A model is a network of two photos with a minimum datum. A strip is a chain of similarities between models.
 Both use the adjustment and `orient`.
@@ -81,7 +81,7 @@ class Strip:
 
 
 def relative_model(block: Block, first: str, second: str) -> Model:
-    """Compute the relative orientation of two photos of a block from their common points.
+    """Compute the relative orientation of two photos from common points.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def relative_model(block: Block, first: str, second: str) -> Model:
 
 
 def strip_of(block: Block, photos: Sequence[str]) -> Strip:
-    """Compute the models of neighbouring photos and join them to a strip by similarities.
+    """Compute models of neighbouring photos and join them by similarities.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ __all__ = ["Orientation", "Trace"]
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Intermediate results of one cycle of the bulletin: its prints under sense switches.
+    """Intermediate results of one cycle: prints under sense switches.
 
     Coordinates are relative to the centres of both systems.
     """
@@ -47,7 +47,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Orientation(Documented, Judged, Brief):
-    """Result of an absolute orientation; arrays in the order of the n stations, NaN if not used.
+    """Result of an absolute orientation; arrays of n stations, NaN if not used.
 
     Covariances are cofactors times `covariance_scale`.
 
@@ -150,7 +150,7 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def decided_by_w(self) -> bool:
-        """Whether standardized residuals are tested: the given standard deviations are reliable.
+        """Whether standardized residuals are tested: given sd are reliable.
 
         Otherwise the unit weight is estimated, and studentized residuals are tested.
         """
@@ -158,7 +158,7 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def tested(self) -> Floats:
-        """(n, 3) test values of the residuals; NaN if a redundancy number is too small for a test."""
+        """(n, 3) test values of the residuals; NaN if redundancy is too small."""
         values = self.standardized if self.decided_by_w else self.studentized
         tested: Floats = np.where(self.redundancy >= TESTABLE, values, np.nan)
         return tested
@@ -173,7 +173,7 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def outliers(self) -> list[tuple[int, int]]:
-        """Row and component of control whose test value exceeds the limit, the largest first."""
+        """Row and component of control beyond the limit, the largest first."""
         values = np.abs(np.nan_to_num(self.tested))
         beyond = np.argwhere(values > self.limit).tolist()
         return sorted(((row, axis) for row, axis in beyond), key=lambda place: -values[place])
@@ -239,7 +239,7 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def differences(self) -> Floats:
-        """(n, 3) given minus transformed coordinates of all control, including rejected, ground units."""
+        """(n, 3) given minus transformed coordinates of all control, ground units."""
         positions, _ = self.similarity.transform(self.stations.model)
         differences: Floats = self.stations.control - positions
         return differences
@@ -257,20 +257,20 @@ class Orientation(Documented, Judged, Brief):
         return without
 
     def transform_points(self) -> tuple[list[str], Floats, Floats]:
-        """Transform the points among the stations: identifiers, (m, 3) positions, (m, 3, 3) covariances."""
+        """Transform station points: identifiers, (m, 3) positions, (m, 3, 3) covariances."""
         rows = np.flatnonzero(self.points)
         sd = 0.0 if self.stations.model_sd is None else self.stations.model_sd[rows]
         positions, covariances = self.similarity.transform(self.stations.model[rows], sd)
         return [self.stations.ids[row] for row in rows.tolist()], positions, covariances
 
     def control_table(self) -> pd.DataFrame:
-        """Return the stations as a data frame with residuals, redundancy numbers and test values."""
+        """Return stations as a data frame: residuals, redundancy numbers, tests."""
         from photogram.absolute_orientation.tables import control
 
         return control(self).frame()
 
     def document(self) -> Document:
-        """Return the document of the orientation: parameters, control with tests, transformed points."""
+        """Return the document: parameters, control with tests, transformed points."""
         from photogram.absolute_orientation.document import orientation_document
 
         return orientation_document(self)

@@ -22,7 +22,7 @@ def control_plot(
     used: NDArray[np.bool_],
     rms: float,
 ) -> Plot:
-    """Plot control residuals, given minus transformed: arrows in plan, bars for elevations."""
+    """Plot control residuals: arrows in plan, bars for elevations."""
     unit = stations.ground_unit
     size = float(np.ptp(plan, axis=0).max())
     largest = float(np.nanmax(np.abs(residuals)))

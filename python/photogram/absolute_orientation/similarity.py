@@ -1,4 +1,4 @@
-"""The similarity x = s A X + B with its covariance, and the transformation of points."""
+"""The similarity x = s A X + B with covariance, and transformed points."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ORTHOGONAL = 1e-6  # Largest element of A A^T - I of a matrix read from a file
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """The similarity x = s A X + B from control X (ground units) to model x (model units).
+    """The similarity x = s A X + B from control X to model x (ground, model units).
 
     A = K(kappa) Phi(phi) Omega(omega) (TB 19, equation 2.3).
 
@@ -150,12 +150,12 @@ class Similarity:
 
     @property
     def parameter_partials(self) -> Floats:
-        """(7, 7) partials of omega, phi, kappa, s, b1, b2, b3 with respect to the tangent parameters."""
+        """(7, 7) partials of omega, phi, kappa, s, b1, b2, b3 by tangent parameters."""
         return _photocore.similarity_partials(self._row())
 
     @property
     def covariance(self) -> Floats | None:
-        """(7, 7) covariance of omega, phi, kappa (rad), s, b1, b2, b3 (model units); None if unknown.
+        """(7, 7) covariance of omega, phi, kappa (rad), s, b1, b2, b3 (model units) or None.
 
         Near phi = 90 degrees, the variances of omega and kappa are unbounded. Point covariances are not
         affected.
@@ -167,13 +167,13 @@ class Similarity:
         return covariance
 
     def to_model(self, control: ArrayLike) -> Floats:
-        """Return (n, 3) model coordinates x = s A X + B of control coordinates (TB 19, equation 2.1)."""
+        """Return (n, 3) model coordinates x = s A X + B of control (TB 19, eq. 2.1)."""
         centred = _rows("control", control) - self.control_centre
         model: Floats = self.scale * centred @ self.rotation.T + self.shift + self.model_centre
         return model
 
     def transform(self, model: ArrayLike, model_sd: ArrayLike = 0.0) -> tuple[Floats, Floats]:
-        """Transform model points to control coordinates with covariances (TB 19, equation 2.2).
+        """Transform model points to control with covariances (TB 19, equation 2.2).
 
         Parameters
         ----------

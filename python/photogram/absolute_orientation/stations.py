@@ -37,7 +37,7 @@ MODEL_SD_COLUMNS = ("sd_x", "sd_y", "sd_z")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stations(Brief):
-    """Stations of a model with model and control coordinates; arrays are copied and checked.
+    """Stations with model and control coordinates; arrays are copied and checked.
 
     A station without control coordinates is a point to be transformed. The arrays are read-only, so that
     results based on them cannot change.
@@ -98,7 +98,7 @@ class Stations(Brief):
 
     @classmethod
     def from_table(cls, table: pd.DataFrame, **units: str) -> Self:
-        """Read a data frame with the columns of a CSV file: id, X, Y, Z, x, y, z, and sd_ of each.
+        """Read a data frame with CSV columns: id, X, Y, Z, x, y, z, and sd_ of each.
 
         Parameters
         ----------
@@ -136,7 +136,7 @@ class Stations(Brief):
 
     @property
     def held(self) -> Bools:
-        """(n, 3) True for usable control coordinates: known, with a finite standard deviation."""
+        """(n, 3) True for known control coordinates with finite standard deviations."""
         return self.given & np.isfinite(self.control_sd)
 
     def _check(self) -> None:

@@ -1,4 +1,4 @@
-"""Part II: transformation of any number of model points from file to file, chunk by chunk."""
+"""Part II: transformation of model points from file to file, in chunks."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def transform_file(
     outputs: OutputSet | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> int:
-    """Transform the points of a file and write control coordinates with standard deviations to another.
+    """Transform the points of a file to another file with standard deviations.
 
     `source` is a CSV file with the columns `id`, `x`, `y`, `z` and optionally `sd_x`, `sd_y`, `sd_z`, or
     lines `x y z number` without a header (part II of TB 19). `target` has the columns `id`, `X`, `Y`, `Z`,
@@ -122,7 +122,7 @@ def transform_file(
 
 
 def decimals_for(deviation: float) -> int:
-    """Return the number of decimals whose last digit is a thousandth of a standard deviation."""
+    """Return the decimals for a thousandth of a standard deviation."""
     if not deviation > 0:
         return 6
     return int(np.clip(np.ceil(3 - np.log10(deviation)), 0, 15))
@@ -155,7 +155,7 @@ def _cells(ids: list[str]) -> list[bytes]:
 
 
 def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
-    """Yield identifiers, coordinates and standard deviations (None if missing), chunk by chunk."""
+    """Yield identifiers, coordinates and standard deviations (or None) by chunk."""
     import pandas as pd  # takes long to import
 
     names, options = _layout(source)
@@ -218,7 +218,7 @@ def _checked(table: pd.DataFrame, weighted: bool) -> tuple[list[str], Floats, Fl
 
 
 def _fault(source: Path, names: list[str]) -> InputError | None:
-    """Return the error for the first unreadable record (slow); None if all are readable."""
+    """Return the error of the first unreadable record (slow); None without any."""
     numeric = [name for name in names if name in (*MODEL_COLUMNS, *MODEL_SD_COLUMNS)]
     with source.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         seen_header = names[-1] == "id" and names[0] == "x"

@@ -18,7 +18,7 @@ LISTED = 300  # Maximum number of transformed points in printed tables
 
 
 def control(result: Orientation) -> Table:
-    """Return the used control: residuals, redundancy numbers, test values, adjusted control."""
+    """Return used control: residuals, redundancy, tests, adjusted coordinates."""
     numbers, ground, model = (
         _axes("XYZ", unit) for unit in ("", result.stations.ground_unit, result.stations.model_unit)
     )

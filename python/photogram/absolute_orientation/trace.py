@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def trace_text(result: Orientation) -> str:
-    """Return the intermediate results of the cycles, with the bulletin's names and statement numbers."""
+    """Return intermediate results with the names and statements of the bulletin."""
     rows = np.flatnonzero(result.took_part).tolist()
     names = [result.stations.ids[row] for row in rows]
     parts = [f"photogram {_photocore.__version__}  absolute orientation  prints under sense switches"]

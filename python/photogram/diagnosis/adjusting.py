@@ -1,4 +1,4 @@
-"""Adjustments of a check: stored results, and the choice between several corrected blocks."""
+"""Adjustments of a check: stored results, and selection of corrected blocks."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Adjuster:
 def put_right(
     first: Result | None, tried: Iterable[tuple[Phrase, Block]], adjusted: Adjuster
 ) -> tuple[Phrase, Block, Judged] | None:
-    """Adjust corrected blocks; return the mistake and the block that explain the residuals.
+    """Adjust corrected blocks; return the mistake and block that explain residuals.
 
     `first` is the adjustment of the unchanged block; None if that failed.
     """

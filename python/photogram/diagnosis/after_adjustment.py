@@ -52,7 +52,7 @@ def diagnosed(result: Result) -> Result:
 
 
 def explained(result: Result) -> list[Message]:
-    """Return mistakes in the conventions of the data that explain a failed or bad adjustment."""
+    """Return mistakes in data conventions that explain a failed or bad adjustment."""
     if result.loss is not None:
         return []
     found = _of_block(result.block) if _bad(result) else []
@@ -65,7 +65,7 @@ def explained(result: Result) -> list[Message]:
 
 
 def remarks(result: Result) -> list[Message]:
-    """Return hints on a result that fits: readout directions, clock offsets, fiducial marks."""
+    """Return hints on a good result: readout directions, clock offsets, fiducial marks."""
     if not (result.converged and (result.unknowns or result.block.observations)):
         return []
     from photogram.diagnosis.clocks import known_offsets
@@ -108,7 +108,7 @@ def _with_hints(result: Result) -> Result:
 
 
 def diagnosis_of(result: Result) -> Diagnosis:
-    """Return the diagnosis of an adjustment that failed or fits badly, with its own verdict."""
+    """Return the diagnosis and verdict of an adjustment that failed or fits badly."""
     from photogram.diagnosis.diagnosis import Diagnosis
     from photogram.diagnosis.findings import Section, note_all, note_verdict
     from photogram.diagnosis.weights import weight_hints

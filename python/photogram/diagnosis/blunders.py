@@ -31,7 +31,7 @@ BESIDE = "beside images: "  # Prefix of the names of additional observations
 
 @dataclass(frozen=True)
 class Suspect:
-    """One observation: its type, its row and column in the arrays of the block, and its test value."""
+    """An observation: type, row and column in the arrays of the block, test value."""
 
     kind: str
     row: int
@@ -40,7 +40,7 @@ class Suspect:
 
 
 def tests(result: Result) -> dict[str, Floats]:
-    """Return test values by type, in standard deviations of the residuals; 0 without redundancy."""
+    """Return test values by type, in sd of the residuals; 0 without redundancy."""
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
     others = {
         "control": (result.point_redundancy, result.point_standardized),
@@ -62,7 +62,7 @@ def kind_of(result: Result, suspect: Suspect) -> ObservedKind:
 
 
 def finding_of(result: Result, suspect: Suspect, spread: float) -> Finding:
-    """Return the finding on an observation; `spread` is the robust sd of all test values."""
+    """Return the finding on an observation; `spread` is the robust sd of test values."""
     if suspect.kind == "image":
         return _image_finding(result, suspect, spread)
     if suspect.kind == "control":
@@ -78,7 +78,7 @@ def finding_of(result: Result, suspect: Suspect, spread: float) -> Finding:
 
 
 def with_rivals(misfit: Finding, result: Result, suspect: Suspect, spread: float) -> Finding:
-    """Add control points whose error would leave nearly the same residuals (likelihood ratio below 20)."""
+    """Add control points with nearly equal residuals (likelihood ratio below 20)."""
     values = tests(result)["control"].max(axis=1) / spread
     near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
     near &= values > critical(int((values > 0).sum()))
@@ -112,7 +112,7 @@ def _other_finding(result: Result, suspect: Suspect) -> Finding:
 
 
 def control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
-    """Return the finding on a component of control; `error` is the error of the given value."""
+    """Return the finding on a control component; `error` is that of the given value."""
     angle = block.geographic and axis < 2
     unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
     component = (("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z"))[axis]
@@ -151,7 +151,7 @@ def _image_finding(result: Result, suspect: Suspect, spread: float) -> Finding:
 
 
 def rival_images(result: Result, row: int, spread: float) -> Indices:
-    """Return other observations of a point that may be wrong instead of the one in a row.
+    """Return other observations of a point that may be wrong instead of one row.
 
     With two rays, or three of photos in a row, errors of different observations leave the same residuals. The
     test of an observation as a group (x and y together) is T = v' R^- v. Its residuals v are in standard

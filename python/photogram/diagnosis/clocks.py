@@ -1,4 +1,4 @@
-"""Clock offsets that equal differences of time scales, and scan lines that are counted half a line off."""
+"""Clock offsets equal to time scale differences, and half-line offsets of scans."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def differences() -> Iterator[tuple[str, str, float]]:
 
 
 def scales_of(shift: float) -> list[Phrase]:
-    """Return pairs of time scales whose difference is a shift; seconds added to the second scale."""
+    """Return pairs of time scales with a constant shift; seconds added to the second."""
     return [
         phrase("moving.time-scales", first=to, second=of, seconds=sign * seconds)
         for ahead, behind, seconds in differences()

@@ -41,7 +41,7 @@ def control(edited: Edited, words: Words) -> Section:
 def _misfit(
     result: Result, name: str, findings: list[Finding], images_too: bool, common: bool, words: Words
 ) -> Finding:
-    """Join the findings on the components of one control point, and add the remedies of the guide."""
+    """Join the findings on components of a control point, and add remedies."""
     axes = {int(misfit.values["component"]) for misfit in findings}
     kept = np.isfinite(result.block.point_sd[result.block.point_ids.index(name)])
     part = "plan" if 2 not in axes else "height" if axes == {2} else "both"

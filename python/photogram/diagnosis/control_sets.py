@@ -1,4 +1,4 @@
-"""Control points as a set against the free model of the photos: units, axes, mirror images.
+"""Control points as a set against a free model: units, axes, mirror images.
 
 Without control, the image observations define a free model with its own datum: positions Y of the control
 points with their joint covariance C_Y. A similarity compares control X, with covariance C_X, with this model:
@@ -105,7 +105,7 @@ class FreeModel:
         return self._best(self._target(change))[0]
 
     def scale(self, change: Change) -> float:
-        """Return the scale of the similarity under a hypothesis: 1 if the stations are correct."""
+        """Return the scale of the similarity under a hypothesis: 1 for correct stations."""
         return self._best(self._target(change))[1].scale
 
     def _best(self, target: Floats) -> tuple[float, _Similarity]:
@@ -172,12 +172,12 @@ class FreeModel:
 
     @property
     def _deviations(self) -> Floats:
-        """(k, 3) standard deviations of control minus model, not reduced by the similarity."""
+        """(k, 3) standard deviations of control minus model, before the similarity."""
         own = np.sqrt(np.maximum(np.diag(self.covariance), 0)).reshape(-1, 3)
         return np.asarray(np.hypot(own, self.per_unit * self.block.point_sd[self.points]))
 
     def _nearest(self, target: Floats) -> tuple[Floats, _Similarity]:
-        """Return the similarity of three points that most points fit, after its (k, 3) misfits."""
+        """Return the three-point similarity that most points fit, after (k, 3) misfits."""
         deviations = self._deviations
         best, nearest = math.inf, (np.zeros(target.shape), _Similarity.start(self.model, target))
         for three in _triples(np.flatnonzero(self.held.all(axis=1))):
@@ -189,7 +189,7 @@ class FreeModel:
         return nearest
 
     def _left_out(self, similarity: _Similarity, target: Floats, gone: Indices) -> Floats:
-        """Return errors of omitted components, predicted by the others, in their standard deviations."""
+        """Return errors of omitted components by the others, in standard deviations."""
         rows = np.flatnonzero(self.held.ravel())
         error, design, own = self._equations(similarity, target, rows)
         weighted = np.linalg.solve(own, design)
@@ -203,7 +203,7 @@ class FreeModel:
     def _equations(
         self, similarity: _Similarity, target: Floats, rows: Indices
     ) -> tuple[Floats, Floats, Floats]:
-        """Return misclosures, partials (shift, scale, rotation) and covariance of some rows."""
+        """Return misclosures, partials (shift, scale, rotation) and covariance of rows."""
         turned = similarity.scale * (self.model - self.model.mean(axis=0)) @ similarity.rotation.T
         whole = np.kron(np.eye(len(turned)), similarity.scale * similarity.rotation)
         variances = ((self.per_unit * self.block.point_sd[self.points]).ravel()[rows]) ** 2
@@ -267,19 +267,19 @@ class _Similarity:
         return cls(max(scale, 1e-6), rotation, target.mean(axis=0) - model.mean(axis=0))
 
     def of(self, model: Floats) -> Floats:
-        """Return (k, 3) transformed points of the model; rotation and scale are about their mean."""
+        """Return (k, 3) transformed model points; rotation and scale about their mean."""
         centre = model.mean(axis=0)
         placed: Floats = self.scale * (model - centre) @ self.rotation.T + centre + self.shift
         return placed
 
     def about(self, some: Floats, model: Floats) -> _Similarity:
-        """Return the same similarity about the mean of all points instead of the mean of some."""
+        """Return the same similarity about the mean of all points."""
         from_some, to_all = some.mean(axis=0), model.mean(axis=0)
         moved = self.scale * (to_all - from_some) @ self.rotation.T + from_some + self.shift - to_all
         return _Similarity(self.scale, self.rotation, moved)
 
     def moved(self, step: Floats) -> _Similarity:
-        """Return the similarity after a step of translation, scale and rotation about the mean."""
+        """Return the similarity after a step of translation, scale and rotation."""
         return _Similarity(
             self.scale * math.exp(float(np.clip(step[3], -1, 1))),
             Attitudes.of("rotation_vector", step[np.newaxis, 4:]).matrices[0] @ self.rotation,
@@ -288,7 +288,7 @@ class _Similarity:
 
 
 def doubtful(first: Result | None, *kinds: str) -> bool:
-    """Test whether all observations of some types may be wrong: no adjustment, or several misfits."""
+    """Test whether all observations of some types may be wrong."""
     if first is None or not first.converged:
         return True
     values = tests(first)
@@ -300,7 +300,7 @@ def doubtful(first: Result | None, *kinds: str) -> bool:
 
 
 def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
-    """Return the control points in the free model of the other observations; None if it has none."""
+    """Return control points in the free model of other observations, or None."""
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     points = spread(np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & (rays >= 2)), MOST)
     if len(points) < FEWEST:
@@ -342,7 +342,7 @@ def _of_shape(covariance: Floats, model: Floats) -> Floats:
 
 
 def _similarity_partials(turned: Floats) -> Floats:
-    """(3k, 7) partials of points, relative to their mean, by shift, scale and rotation."""
+    """(3k, 7) partials of points about their mean by shift, scale and rotation."""
     design = np.zeros((len(turned), 3, 7))
     design[:, :, :3] = np.eye(3)
     design[:, :, 3] = turned

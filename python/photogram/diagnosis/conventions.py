@@ -1,4 +1,4 @@
-"""Mistakes in conventions: units, axes and angles of observations, photos and points, found by trial.
+"""Mistakes in units, axes and angles of observations, photos and points by trial.
 
 Such a mistake makes every observation look wrong. So the check searches for it first and reports it once.
 Later steps use corrected values; the data are not changed.
@@ -94,7 +94,7 @@ class Verdict:
 
 
 def hints(block: Block) -> list[Message]:
-    """Return mistakes in the conventions of the data that would explain the misfit of the observations.
+    """Return mistakes in data conventions that would explain the misfit.
 
     The block must have positions and attitudes of photos, which may be rough; otherwise InputError is raised.
     Photos on trajectories are skipped, because a single pose is undefined.
@@ -111,7 +111,7 @@ def hints(block: Block) -> list[Message]:
 
 
 def verdicts(block: Block) -> list[Verdict]:
-    """Compare observations with predictions and return the verdicts; see :func:`hints`."""
+    """Return verdicts on observations compared with predictions; see :func:`hints`."""
     photos = eligible(block)
     if not len(photos):
         return []
@@ -245,7 +245,7 @@ def _apart(given: Floats, found: Floats) -> float:
 
 
 def distances_in_millimetres(block: Block) -> Hypothesis | None:
-    """Compare observed distances with coordinates, to find millimetres instead of metres."""
+    """Compare observed distances with coordinates, to find millimetres."""
     bars = [each for each in block.observations if isinstance(each, Distance)]
     if not bars:
         return None
@@ -311,5 +311,5 @@ def conventions(view: View) -> tuple[Section, View, bool]:
 
 
 def further(section: Section, view: View) -> None:
-    """Add the hints that neither the sides of the cameras nor earlier sections have explained."""
+    """Add hints that camera sides and earlier sections have not explained."""
     note_all(section, "convention", "grave", hints(view.block))

@@ -1,4 +1,4 @@
-"""The check of a network: mistakes of whole sets, gross errors, single errors, then remarkable values.
+"""The check of a network: mistakes of sets, gross errors, single errors, remarks.
 
 The order is the one of Appendix H of the guide (Elassal and Malhotra, NOAA 1987): first by intersection, then
 by adjustment. Units, axes and angles are checked before, because one such mistake looks like a gross error in
@@ -219,7 +219,7 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
 
 
 def _fitting(findings: list[Finding], adjusted: Block) -> list[Finding]:
-    """Return the findings; bad photos that fit after the adjustment are downgraded to `look`."""
+    """Return findings; bad photos that fit after adjustment are downgraded to `look`."""
     return [
         replace(each, level="look")
         if each.kind == "bad-photo"
@@ -270,7 +270,7 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
 
 
 def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) -> Edited:
-    """Adjust the block, or intersect it if only that is required and its stations are good enough."""
+    """Adjust the block, or only intersect it if its stations are good enough."""
     suspects = replace(suspects, images=view.images(suspects.images))
     if not manner.intersect_only:
         return edit(view.block, suspects, adjusted)

@@ -103,7 +103,7 @@ class Diagnosis(Documented, Brief):
         return sorted(self.findings, key=lambda each: (each.level != "grave", each.kind not in CONVENTIONS))
 
     def document(self) -> Document:
-        """Return the document of the check; `docs/giant-check.md` lists the members of its JSON form."""
+        """Return the document of the check; see `docs/giant-check.md` for its members."""
         from photogram.diagnosis.document import check_document
 
         return check_document(self.title, self.verdict, self.sections, self.result)

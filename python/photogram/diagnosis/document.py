@@ -82,7 +82,7 @@ def _section(number: int, section: Section) -> page.Section:
 
 
 def _findings_table(findings: Sequence[tuple[Finding, str]]) -> Table:
-    """Return the table of findings with the titles of their sections, grave findings first."""
+    """Return the table of findings with section titles, grave findings first."""
     ordered = sorted(findings, key=lambda row: row[0].level != "grave")
     columns = [Column(head, text=True) for head in ("Level", "Finding", "Photos and points", "Part")]
     rows: list[list[Cell]] = []

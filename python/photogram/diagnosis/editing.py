@@ -1,4 +1,4 @@
-"""Gross errors found by the adjustment: iterative data snooping (Appendix H, 3-sigma rule).
+"""Gross errors by iterative data snooping (Appendix H, 3-sigma rule).
 
 A gross error affects the test values of its neighbours. So only the largest of a neighbourhood is removed
 before the block is adjusted again, and the others are re-evaluated.
@@ -81,7 +81,7 @@ class Edited:
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
-    """Adjust a block and remove gross errors, the largest of a neighbourhood at a time.
+    """Adjust a block and remove gross errors, the largest of a neighbourhood first.
 
     Suspected observations are excluded from the beginning. Suspected photos are excluded if the block does
     not fit with them, suspected control until its prediction confirms it. Control points that agree with each
@@ -147,7 +147,7 @@ def _names(block: Block, pair: tuple[int, int]) -> tuple[str, str]:
 
 
 def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
-    """Return the wrong control points of a block that converges only with loose control.
+    """Return wrong control points of a block that only converges with loose control.
 
     With standard deviations of a hundredth of the flying height, control causes no strain, and much larger
     errors become visible.
@@ -221,7 +221,7 @@ def blunder_section() -> Section:
 
 
 def _first(block: Block, bad: Bools, adjusted: Adjuster, section: Section) -> tuple[Result, Block]:
-    """Adjust with all photos, or without the bad photos with which the block does not fit."""
+    """Adjust with all photos, or without the bad photos that prevent a fit."""
     error = None
     if not bad.any():
         return adjusted(block), block
@@ -272,7 +272,7 @@ def _snoop(
 
 
 def _largest(result: Result, spread: float) -> list[Suspect]:
-    """Return the observations beyond the critical value that are the largest of their neighbourhood."""
+    """Return the largest observations of neighbourhoods beyond the critical value."""
     values = tests(result)
     count = sum(int((each > 0).sum()) for each in values.values())
     limit = critical(count) * spread
@@ -325,7 +325,7 @@ def _without(result: Result, suspects: list[Suspect]) -> Block:
 
 
 def _returned(result: Result, whole: Block, section: Section, spread: float, adjusted: Adjuster) -> Result:
-    """Reinstate observations that fit after all removals: they looked wrong because of a gross error nearby.
+    """Reinstate observations that fit after the removal of gross errors nearby.
 
     They are tried one by one, in the order of their test values. The one with the largest test value is the
     gross error itself.
@@ -381,7 +381,7 @@ def _graded(findings: list[Finding], limit: float) -> list[Finding]:
 
 
 def _list(result: Result, spread: float, section: Section) -> None:
-    """Report the number of test values beyond 3 after all removals, and list the largest."""
+    """List test values beyond 3 after all removals, the largest ones, and their number."""
     values = tests(result)["image"] / spread
     tested = int((values > 0).sum())
     images, axes = np.nonzero(values > BLUNDER)

@@ -1,4 +1,4 @@
-"""Certificate lens parameters contradicted by the observations: opposite distortion, wrong principal point.
+"""Certificate lens parameters that contradict observations: sign, principal point.
 
 Prior values mu of camera parameters, with covariance C, are observations. Their residuals v = mu - x have the
 cofactors Q = C - Q_x. If mu + D a were given, and all correlated values were moved along, the weighted sum of
@@ -45,7 +45,7 @@ class _Fall:
 
     @classmethod
     def of(cls, result: Result, camera: AdjustedCamera, rows: list[int], columns: Floats) -> Self:
-        """Compute the decrease for weighted parameters (n,) `rows`, moved along (n, k) `columns`."""
+        """Compute the decrease for weighted parameters `rows`, moved along `columns`."""
         own, given = np.ix_(rows, rows), camera.given
         whole = np.diag(given.deviations**2)
         if (correlated := given.prior_covariance) is not None:
@@ -65,7 +65,7 @@ class _Fall:
         return cls(fall / unit, axes.shape[1], -axes @ (axes.T @ vector) / size, sd / size)
 
     def is_sure(self, whole: _Fall, level: float) -> bool:
-        """Whether it is significant, and nearly the decrease if the whole camera were free."""
+        """Whether it is significant, and nearly that of a completely free camera."""
         chance = _photocore.chi_square(self.value, float(self.freedom)) if self.freedom else 1.0
         return chance < level and self.value > EXPLAINED * whole.value
 

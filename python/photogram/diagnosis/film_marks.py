@@ -1,4 +1,4 @@
-"""Fiducial marks that do not fit: of all photos, of one photo, or one reading; and the probable cause.
+"""Misfitting fiducial marks of all photos, a photo, or a reading, with the cause.
 
 Films that have changed along one axis but are modelled as conformal leave a pattern at the marks. Let d be
 the mark readings of a photo, transformed to the camera frame, minus their certificate positions, with the
@@ -126,7 +126,7 @@ ALONE = 1e-6  # Least part of the largest column that is independent of the othe
 
 @dataclass(frozen=True)
 class _Axis:
-    """Relative elongation of the film of a photo along an axis, and the angle of the axis from x, degrees."""
+    """Relative film elongation of a photo along an axis, and its angle, degrees."""
 
     photo: str
     longer: float
@@ -135,7 +135,7 @@ class _Axis:
 
 
 def axis_hints(result: Result) -> list[Message]:
-    """Report photos whose marks show a change of the film along one axis that their model lacks."""
+    """Report photos with unmodelled film changes along one axis."""
     held = {
         row: film
         for row, film in result.films
@@ -158,7 +158,7 @@ def axis_hints(result: Result) -> list[Message]:
 
 
 def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
-    """Yield photos with a significant elongation that explains most of the misfit of their marks."""
+    """Yield photos with significant elongations that explain most of their misfit."""
     if not films:
         return
     residuals, marks = mark_residuals(result), result.fiducials

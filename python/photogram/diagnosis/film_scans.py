@@ -31,7 +31,7 @@ BEYOND = 2.0  # Least shift between halves, in standard deviations of a reading
 
 
 def seam_hints(result: Result) -> list[Message]:
-    """Report the photo whose residuals have the largest step in the middle of the scan.
+    """Report the photo with the largest step of residuals in the middle of the scan.
 
     An affine deformation is estimated together with the step. Marks hardly show the step, because the film
     parameters absorb it. Overlapping photos show a part of it.
@@ -55,7 +55,7 @@ def seam_hints(result: Result) -> list[Message]:
 
 
 def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float, float]:
-    """Return the test value of a step along an axis, and the larger step of x or y; 0 if not significant.
+    """Return the test value of a step, and the larger step of x or y; 0 if not significant.
 
     `away` are (n, 2) readings relative to the middle of the photo.
     """
@@ -84,7 +84,7 @@ TINY = 1e-9
 
 @dataclass(frozen=True)
 class _Found:
-    """Jitter along rows (1) or columns (0), of x or y: z, s in pixels, and the distance in pixels."""
+    """Jitter along rows (1) or columns (0) of x or y: z, s and distance in pixels."""
 
     z: float
     jitter: float
@@ -94,7 +94,7 @@ class _Found:
 
 
 def line_hints(result: Result) -> list[Message]:
-    """Name scanners whose lines jitter, with standard deviations that include the jitter."""
+    """Name scanners with jittering lines, with standard deviations that include it."""
     scanners: dict[int, tuple[str, list[int]]] = {}
     for row, film in result.films:
         if film.readings.pitch != 1.0:
@@ -177,7 +177,7 @@ def _of_photos(result: Result, rows: list[int]) -> _Images | None:
 
 
 def _pairs(at: Floats, values: Floats, redundancy: Floats, within: float) -> Floats:
-    """Return (3,) sums over pairs within a distance: v_i v_j, their squares, and r_i r_j."""
+    """Return (3,) sums over pairs within a distance: v_i v_j, squares, r_i r_j."""
     order = np.argsort(at)
     at = at[order]
     first, last = np.searchsorted(at, at - within), np.searchsorted(at, at + within, "right")

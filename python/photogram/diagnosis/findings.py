@@ -99,7 +99,7 @@ class Finding:
 
 @dataclass
 class Section:
-    """A part of the check: its title, the reason for it, sentences and tables, and findings."""
+    """A part of the check: title, reason, sentences, tables, and findings."""
 
     title: str
     why: str
@@ -128,7 +128,7 @@ def finding(
     *,
     kind: str = "",
 ) -> Finding:
-    """Return a finding; its kind is the second part of the code of its message if none is given."""
+    """Return a finding; its default kind is the second part of its message code."""
     kind = kind or message.code.split(".")[1]
     return Finding(kind, level, str(message), list(photos), list(points), values or {}, message)
 

@@ -1,4 +1,4 @@
-"""Gross errors seen from the initial stations: photos, observations, exchanged names, control (Appendix H).
+"""Gross errors at initial stations: photos, observations, names, control (Appendix H).
 
 Coarse stations leave large residuals with a pattern; a break in the pattern indicates an error.
 """
@@ -50,7 +50,7 @@ class Suspects:
 
 
 def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
-    """Find bad photos, gross errors of observations, exchanged names, and distant control.
+    """Find bad photos, gross errors, exchanged names, and distant control.
 
     `unit` is the printed unit of image coordinates.
     """
@@ -74,7 +74,7 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
 
 
 def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Bools:
-    """Return (m,) suspected observations of :func:`gross` that fit from the adjusted stations.
+    """Return (m,) suspects of :func:`gross` that fit from the adjusted stations.
 
     A wrong station affects the intersections of its neighbours, so that good observations seem wrong.
     `adjusted` is a converged adjustment without the suspects. Photos missing in it are not in the return.
@@ -92,7 +92,7 @@ def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Bools:
 
 
 def without(block: Block, findings: list[Finding], images: Bools) -> list[Finding]:
-    """Return the findings of :func:`gross` that do not depend on the given observations alone."""
+    """Return findings of :func:`gross` that do not depend on given observations alone."""
 
     def stands(finding: Finding) -> bool:
         photos = np.isin(np.array(block.photo_ids)[block.image_photos], finding.photos)
@@ -140,7 +140,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
 
 
 def _worst(rays: Rays, medians: Floats, known: Indices) -> tuple[int, float, Rays] | None:
-    """Return the conspicuous photo, the median of the others without it, and the rays without it.
+    """Return the worst photo, and the median of the others and rays without it.
 
     A bad photo affects the medians of its neighbours, in a small block of all photos. So the photo is
     compared with the others after its removal.
@@ -224,7 +224,7 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
 def _parted(
     solver: _Solver, point: int, rows: Indices, before: float
 ) -> tuple[Indices, Indices, float] | None:
-    """Return two groups of a point's observations that intersect well separately, and their residual."""
+    """Return two groups of a point's rays that intersect well, and their residual."""
     best, found = PARTED * before, None
     for pair in combinations(rows.tolist(), 2):
         position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
@@ -245,7 +245,7 @@ def _parted(
 
 
 def _departures(rays: Rays, residuals: Floats) -> Floats:
-    """(m,) distance of each residual from the linear pattern of its photo, in robust standard deviations."""
+    """(m,) robust standardized distances of residuals from their photo's linear pattern."""
     block = rays.block
     rows = np.flatnonzero(rays.used & np.isfinite(residuals).all(axis=1))
     rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
@@ -305,13 +305,13 @@ class _Solver:
         return self.largest(rows[rows != row], self.changed(point, [row], []))
 
     def exchanged(self, point: int, rows: Indices, own: int, other: int) -> float:
-        """Return the largest residual of a point that uses another observation instead of its own."""
+        """Return a point's largest residual with another observation instead of its own."""
         taken = np.where(rows == own, other, rows)
         return self.largest(taken, self.changed(point, [own], [other]))
 
 
 def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, list[int]]]:
-    """Find pairs of points with exchanged names on a photo; return findings and photos of each point.
+    """Find exchanged names on a photo; return findings, and photos of each point.
 
     A name occurs in only one pair per photo, the pair that explains it best.
     """

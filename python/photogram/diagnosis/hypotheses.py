@@ -1,4 +1,4 @@
-"""Hypotheses on mistakes in the data; each can convert a block to the intended one."""
+"""Hypotheses on mistakes in the data, with conversion to the intended block."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Hypothesis:
 
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
-    """Yield possible mistakes of a block; `seen` compares its observations with predictions."""
+    """Yield possible mistakes of a block; `seen` compares it with predictions."""
     every = np.ones(len(block.photo_ids), dtype=bool)
     for name in TURNS:
         change = partial(images_turned, photos=every, turn=turn_of(name))
@@ -84,12 +84,12 @@ def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothe
 
 
 def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:
-    """Return a block with image coordinates relative to another origin and in other axes."""
+    """Return a block with image coordinates in another origin and other axes."""
     return block.replace(image_xy=(block.image_xy - shift) @ linear)
 
 
 def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
-    """Return another unit, origin or sense of image coordinates that the photos share; None without."""
+    """Return another common unit, origin or sense of image coordinates, or None."""
     half = np.ptp(block.image_xy, axis=0).max() / 2
     scale, shift = float(np.median(seen.scale)), np.median(seen.shift, axis=0)
     turn = np.round(np.median(seen.turn, axis=0))
@@ -124,7 +124,7 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
 
 
 def _of_format(block: Block) -> Iterator[Hypothesis]:
-    """Yield a corner as origin, and pixels as unit, derived from the extent of the observations."""
+    """Yield a corner as origin, and pixels as unit, from the observed extent."""
     lowest, highest = block.image_xy.min(axis=0), block.image_xy.max(axis=0)
     middle, half = (lowest + highest) / 2, float((highest - lowest).max() / 2)
     distance = float(block.camera_scales().max())
@@ -145,7 +145,7 @@ def _of_format(block: Block) -> Iterator[Hypothesis]:
 
 
 def attitude_readings(block: Block) -> dict[str, tuple[Phrase, Floats]]:
-    """Return (P, 3, 3) attitudes, photo to object, from other readings of the angles, with the mistakes."""
+    """Return (P, 3, 3) attitudes from other definitions of angles, with the mistakes."""
     angles = block.photo_attitudes
     ground: Representation = "omega_phi_kappa"
     photo: Representation = "omega_phi_kappa_photo_to_ground"
@@ -183,7 +183,7 @@ def quaternion_readings(matrices: Floats) -> dict[str, tuple[Phrase, Floats]]:
 
 
 def read_as(block: Block, name: str) -> Block:
-    """Return a block whose attitudes use another reading; see :func:`attitude_readings`."""
+    """Return a block with another angle definition; see :func:`attitude_readings`."""
     _, matrices = attitude_readings(block)[name]
     form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
     return block.replace(photo_attitudes=Attitudes(matrices).values(form))
@@ -216,7 +216,7 @@ def _exchanged(block: Block, *, points: bool) -> Block:
 
 
 def _centres(block: Block, axes: Floats) -> Block:
-    """Return a block whose positions are C = -R't of translations t; R = F A', F' = `axes`."""
+    """Return a block with positions C = -R't of translations t; R = F A', F' = `axes`."""
     form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
     to_photo = Attitudes.of(form, block.photo_attitudes).matrices.transpose(0, 2, 1)
     turned = block.photo_positions @ axes

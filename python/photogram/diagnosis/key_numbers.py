@@ -1,4 +1,4 @@
-"""Key numbers of the adjustment of a check (Appendix H), and the observations excluded from it."""
+"""Key numbers of the adjustment of a check (Appendix H), and its exclusions."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _weights(result: Result, words: Words, section: Section) -> None:
 
 
 def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:
-    """Return findings on excluded points that affect the others, unless they are named elsewhere."""
+    """Return findings on excluded points that affect others, unless already named."""
     block = result.block
     found = []
     for point, reason in result.dropped.items():
@@ -107,7 +107,7 @@ def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:
 
 
 def held_values(result: Result) -> list[Finding]:
-    """Return the finding on the fixed station or point that best explains the residuals."""
+    """Return the finding on the fixed station or point that best explains residuals."""
     tests = [each for each in result.verdict.tests if each.statistic in "wtTF"]
     if not tests:
         return []
@@ -121,7 +121,7 @@ def held_values(result: Result) -> list[Finding]:
 
 
 def disagreeing(result: Result) -> list[Finding]:
-    """Return the finding on check points that disagree with the adjustment, as in its verdict."""
+    """Return the finding on disagreeing check points, as in the verdict."""
     evidence = Evidence(result._findings())
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
     for level, limit in levels:

@@ -1,4 +1,4 @@
-"""Wrong lens parameters: radial terms with a wrong sign or unit, a principal point half a pixel off."""
+"""Wrong lens parameters: sign or unit of radial terms, half-pixel offsets."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _hypotheses(block: Block, adjusted: Adjuster) -> Iterator[tuple[Phrase, Bloc
 
 
 def _scaled(block: Block, factors: list[float], power: int) -> Block:
-    """Multiply radial terms by factor^(power number), or by the factor if `power` is 0."""
+    """Multiply radial terms by factor^(power number), or the factor if `power` is 0."""
     cameras = []
     for camera, factor in zip(block.cameras, factors, strict=True):
         changed = dict(camera.parameters)
@@ -105,7 +105,7 @@ def _scaled(block: Block, factors: list[float], power: int) -> Block:
 
 
 def _free_ratio(block: Block, adjusted: Adjuster) -> float:
-    """Return the ratio of the estimated and the given first radial term; 0 if not significant."""
+    """Return estimated over given first radial term; 0 if not significant."""
     row = next(row for row, camera in enumerate(block.cameras) if _given_terms(camera))
     camera, terms = block.cameras[row], _given_terms(block.cameras[row])
     name = min(terms, key=lambda each: terms[each])
@@ -123,7 +123,7 @@ def _free_ratio(block: Block, adjusted: Adjuster) -> float:
 
 
 def half_pixel(result: Result, adjusted: Adjuster) -> list[Finding]:
-    """Find principal points that are half a pixel off, because pixel centres or edges were counted."""
+    """Find principal points with half-pixel offsets by different pixel origins."""
     block = result.block
     if block.image_unit != "px":
         return []

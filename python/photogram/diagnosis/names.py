@@ -33,7 +33,7 @@ MEDIAN_OF_LARGER = 1.05  # Median of the larger of two absolute normal variables
 
 
 def with_exchanges(result: Result) -> Result:
-    """Add probable exchanges of names to a result with gross errors and no other mistake."""
+    """Add probable exchanges of names to a result that only has gross errors."""
     block = result.block
     doubtful = result.loss is None and not result.hints and not block.mounts and not block.timed
     if not doubtful:
@@ -65,7 +65,7 @@ def _around_worst(result: Result, sizes: Floats) -> list[Indices]:
 
 
 def _sizes(result: Result) -> Floats:
-    """(m,) sizes of the errors of observations; zero for observations that fit after a common scaling.
+    """(m,) errors of observations; zero if they fit after a common scaling.
 
     Without convergence there are no redundancy numbers, and scaled residuals are used, which are smaller than
     test values. Observations of points that were excluded as harmful are the worst.
@@ -97,7 +97,7 @@ def _neighbours(block: Block, photo: int) -> Indices:
 
 
 def _among(block: Block, photos: Indices, sizes: Floats) -> list[Exchange]:
-    """Return exchanged names on some photos, which are oriented by image observations alone."""
+    """Return exchanged names on photos oriented by image observations alone."""
     kept = np.zeros(len(block.photo_ids), dtype=bool)
     kept[photos] = True
     try:

@@ -1,4 +1,4 @@
-"""Photos with a wrong sign of the principal distance, wrong kappa (Appendix H), or mirrored plates."""
+"""Photos with wrong sign of the principal distance or kappa, or mirrored plates."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MIRRORS = {name: turn_of(name) for name in ("mirrored", "y down", "exchanged", "
 
 
 def orientation(block: Block, words: Words, unit: str = "mm") -> tuple[Section, Block]:
-    """Test whether photos fit with the opposite principal distance, rotated, or mirrored.
+    """Test photos with opposite principal distance, rotated, or mirrored.
 
     Returns the section, and the block with the accepted explanations, so that other errors become visible.
     """
@@ -99,7 +99,7 @@ def _above(rays: Rays, met: Intersection) -> list[Finding]:
 def _unexplained(
     above: list[Finding], explanations: list[Finding], whole: Block, last: Block
 ) -> list[Finding]:
-    """Remove the points above a camera that mirrored plates, or the kappa of a single photo, explain.
+    """Remove points above cameras explained by mirrored plates or a photo's kappa.
 
     A wrong sign or kappa of many photos explains nearly all. The guide requires the points in this case as
     well.
@@ -116,7 +116,7 @@ def _unexplained(
 
 
 def spare_explained(section: Section, block: Block, photos: Bools) -> None:
-    """Remove findings of a section that bad photos explain: points above a camera, rays that do not meet."""
+    """Remove findings explained by bad photos: points above a camera, divergent rays."""
     rays = Rays.of(block).without(photos[block.image_photos])
     met = rays.intersect()
     above = {name for finding in _above(rays, met) for name in finding.points}
@@ -132,7 +132,7 @@ def spare_explained(section: Section, block: Block, photos: Bools) -> None:
 
 
 def _doubt(rays: Rays, met: Intersection) -> tuple[float, float]:
-    """Return the misfit of the rays of a block, and of its observations to control: 0 to 1.
+    """Return the misfit of rays of a block, and of observations to control: 0 to 1.
 
     Within a strip the rays intersect even if all photos are mirrored across the flight. Only control reveals
     it.
@@ -150,7 +150,7 @@ def _doubt(rays: Rays, met: Intersection) -> tuple[float, float]:
 
 
 def _costs(rays: Rays, met: Intersection) -> Floats:
-    """(m,) cost of each observation: its residual as a part of half the frame, 1 behind the camera."""
+    """(m,) costs of observations: residual over half the frame, 1 behind the camera."""
     radius = frame_radius(rays.block) / 2
     costs = np.minimum(met.sizes / radius, 1)
     return np.where(np.isfinite(met.sizes) & ~met.in_front, 1.0, costs)
@@ -172,7 +172,7 @@ def _turned(block: Block, photos: Bools, turn: int) -> Block:
 
 
 def _whole_block(block: Block, before: float, words: Words, explanations: list[Finding]) -> Block:
-    """Find one explanation for all photos, or for all with the same principal distance."""
+    """Find an explanation for all photos, or all with the same principal distance."""
     trials = _trials(block, words)
     tried = [Rays.of(trial.block) for trial in trials]
     costs = [sum(_doubt(rays, rays.intersect())) for rays in tried]
@@ -252,7 +252,7 @@ def _one_photo(block: Block, explanations: list[Finding]) -> Block | None:
 
 @dataclass(frozen=True)
 class _PhotoTrial:
-    """One explanation for a single photo: code and fields of its message, and the changed block."""
+    """An explanation for a photo: message code and fields, and the changed block."""
 
     code: str
     fields: dict[str, Any]

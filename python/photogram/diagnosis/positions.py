@@ -1,4 +1,4 @@
-"""Observed positions of photos as a set: each systematic mistake has a typical form.
+"""Observed photo positions as a set: each systematic mistake has a typical form.
 
     feet for metres, exchanged axes                             the intended coordinates
     heights above the ellipsoid instead of the geoid            C + A l + (0, 0, N)
@@ -39,7 +39,7 @@ WORST = 1e6  # Assumed ratio to the worst hypothesis of a block that cannot be a
 
 @dataclass(frozen=True)
 class _Trial:
-    """A hypothesis: its message, the adjustment with it, its parameters, and the correct positions."""
+    """A hypothesis: message, adjustment, parameters, and the correct positions."""
 
     kind: str
     message: Phrase
@@ -188,7 +188,7 @@ def _code_of_arm(given: Floats, meant: Floats) -> str:
 
 
 def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
-    """Try positions of another time; three adjustments determine the minimum of the parabola Omega."""
+    """Try positions of another time by the parabola Omega of three adjustments."""
     axes = local_axes(block)
     number = {name: row for row, name in enumerate(block.photo_ids)}
     centres = axes.positions(block.photo_positions)[[number[each.photos[0]] for each in given]]

@@ -1,4 +1,4 @@
-"""Leave-out predictions: control compared with the prediction from the other observations.
+"""Leave-out predictions: control compared with predictions by the others.
 
 A prediction is the adjusted position of a free point. It contains neither the error of the point nor errors
 of other free points.
@@ -28,7 +28,7 @@ def freed(block: Block, points: Indices) -> Block:
 
 
 def exchange(block: Block, one: int, other: int) -> Block:
-    """Return a block in which two points have exchanged coordinates and standard deviations."""
+    """Return a block with exchanged coordinates and standard deviations of two points."""
     order = np.arange(len(block.point_ids))
     order[[one, other]] = other, one
     return block.replace(point_positions=block.point_positions[order], point_sd=block.point_sd[order])
@@ -37,7 +37,7 @@ def exchange(block: Block, one: int, other: int) -> Block:
 def tests_of_predictions(
     result: Result, given: Block, points: Indices, spread: float
 ) -> tuple[Floats, Floats]:
-    """Return (k, 3) given minus predicted coordinates of points, and their standardized values.
+    """Return (k, 3) given minus predicted coordinates, and standardized values.
 
     `result` is an adjustment in which the points are free, and `given` is the block with their coordinates.
     `spread` is the robust standard deviation of its test values. NaN if a component is free or cannot be
@@ -50,7 +50,7 @@ def tests_of_predictions(
 
 
 def exchanged_pair(result: Result, given: Block, points: Indices, spread: float) -> tuple[int, int] | None:
-    """Return the two points that agree with each other's predictions but not with their own, if any.
+    """Return the two points that agree only with each other's predictions, or None.
 
     The test is :func:`are_exchanged`, without correlations between the predictions of two points. The
     parameters are described at :func:`tests_of_predictions`.
@@ -67,7 +67,7 @@ def exchanged_pair(result: Result, given: Block, points: Indices, spread: float)
 
 
 def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
-    """Return the two control points that are exchanged according to the initial stations, if any.
+    """Return two control points exchanged according to the initial stations, or None.
 
     This is for blocks that do not converge and have too few control points for predictions. Covariances of
     coarse stations are unknown. So the exchange must explain the differences of control and intersections,
@@ -98,7 +98,7 @@ def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
 def _disagreement(
     result: Result, given: Block, coordinates: list[int], places: list[int], spread: float
 ) -> tuple[float, int]:
-    """Return chi-square of given coordinates against predictions of some points, and its dimension."""
+    """Return chi-square of coordinates against predictions, and its dimension."""
     total, freedom = 0.0, 0
     for point, place in zip(coordinates, places, strict=True):
         held = np.flatnonzero(np.isfinite(given.point_sd[point]))

@@ -1,4 +1,4 @@
-"""Observed image coordinates compared with predictions from the given poses, points and camera.
+"""Observed image coordinates compared with predictions from given data.
 
 (x, y) observed = R2 (x, y) predicted + t,     R2 = k V,  V orthogonal,  k = sqrt|det R2|
 m = rms(observed - predicted) / rms(observed - mean),     e = rms(residual of this) / rms(observed - mean)
@@ -31,7 +31,7 @@ class Regression:
 
 
 def view(block: Block, photos: Indices) -> Block:
-    """Return the part of a block needed to compare some photos: their points, nothing weighted.
+    """Return the unweighted part of a block for comparing some photos.
 
     It has all observations of these points, except observations of given points on other photos.
     """
@@ -91,7 +91,7 @@ def control_misfit(block: Block) -> float:
 
 
 def control_residuals(block: Block) -> Floats:
-    """(k,) relative residuals of observations of given points; infinite without prediction."""
+    """(k,) relative residuals of given points; infinite without prediction."""
     rows = _control_rows(block)
     xy = block.image_xy[rows]
     spread = float(np.sqrt(((xy - xy.mean(axis=0)) ** 2).sum(axis=1).mean()))
@@ -118,7 +118,7 @@ def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
 
 
 def relative(residuals: Floats, observed: Floats) -> float:
-    """Return the rms of residuals relative to the observed values about their mean; may not be finite."""
+    """Return the rms of residuals relative to the observations about their mean."""
     return float(np.sqrt((residuals**2).sum() / ((observed - observed.mean(axis=0)) ** 2).sum()))
 
 

@@ -1,4 +1,4 @@
-"""Patterns of the residuals: by rays, of points, of photos, across the frame (Appendix H)."""
+"""Patterns of residuals: by rays, points, photos, across the frame (Appendix H)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHOWN = 5
 
 
 def residuals(result: Result, spread: float) -> Section:
-    """Describe residuals and test them for patterns; `spread` is the robust sd of the test values."""
+    """Describe residuals and test patterns; `spread` is the robust sd of test values."""
     section = Section(
         "Patterns of the residuals",
         "Residuals should have no pattern. They grow with the number of rays: two rays leave all parallax"
@@ -109,7 +109,7 @@ def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
 
 
 def _frame_pattern(result: Result, plain: Block, spread: float, section: Section) -> None:
-    """Find a pattern that all photos share: lens, film, or the reduction of the plates."""
+    """Find a common pattern of all photos: lens, film, or plate reduction."""
     block, used = result.block, result.used_images
     size = frame_radius(plain)
     unit, factor = small_unit(block.image_unit)

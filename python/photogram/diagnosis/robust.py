@@ -32,7 +32,7 @@ def normal_of_chi_square(value: float, freedom: int) -> float:
 
 
 def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
-    """Return (k, d) coefficients by Tukey's biweight, after initial least absolute deviations.
+    """Return (k, d) coefficients by Tukey's biweight after least absolute deviations.
 
     `design` is (n, k), n > k; the rows of `values`, (n, d), are outliers as a whole. NaN if squares overflow.
     """

@@ -44,7 +44,7 @@ OTHER: dict[Direction, Direction] = {"down": "up", "up": "down", "right": "left"
 
 
 def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> list[Message]:
-    """Try other readouts of rolling shutters if the adjustment failed or residuals are too large."""
+    """Try other rolling shutter readouts if the adjustment failed or fits badly."""
     if not any(each.shutter is not None for each in block.timed):
         return []
     if first is not None and first.converged and (first.loss or not is_suspected(first)):
@@ -134,7 +134,7 @@ READ = {(1, True): "down", (1, False): "up", (0, True): "right", (0, False): "le
 
 
 def rolling_hints(result: Result) -> list[Message]:
-    """Report cameras with the residuals of a rolling shutter, if the global test rejects the residuals.
+    """Report cameras with rolling shutter residuals if the global test rejects.
 
     Photos must be in the order of their exposures: along strips the distance between two photos is the
     velocity. Photos on trajectories are skipped.
@@ -156,7 +156,7 @@ def rolling_hints(result: Result) -> list[Message]:
 
 
 def _ways(result: Result) -> Floats:
-    """(P, 3) displacement of each photo until the next exposure, in metric axes; 0 if unknown."""
+    """(P, 3) displacements until the next exposure, in metric axes; 0 if unknown."""
     adjusted = as_adjusted(result)
     places = local_axes(adjusted).positions(adjusted.photo_positions)
     rest = np.flatnonzero(~timed_photos(adjusted))
@@ -202,7 +202,7 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> Ph
 
 
 def _column(block: Block, motion: Floats, own: Bools, axis: int, down: bool) -> Floats:
-    """(m, 2) partials by tau of a readout along an axis over the extent of observations, in sd."""
+    """(m, 2) partials by tau of a readout along an axis of the observations, in sd."""
     along = block.image_xy[own, axis] * (-1.0 if axis == 1 and not down else 1.0)
     shares = (along - along.min()) / max(float(np.ptp(along)), 1e-300)
     column = np.zeros_like(block.image_xy)
@@ -211,7 +211,7 @@ def _column(block: Block, motion: Floats, own: Bools, axis: int, down: bool) -> 
 
 
 def _affinities(block: Block, own: Bools) -> Floats:
-    """(2, m, 2) partials by a stretch and a shear of the image, in standard deviations."""
+    """(2, m, 2) partials by stretch and shear of the image, in standard deviations."""
     x, y = (block.image_xy[own] - block.image_xy[own].mean(axis=0)).T
     columns = np.zeros((2, *block.image_xy.shape))
     columns[:, own] = np.array([[x, -y], [y, x]]).transpose(0, 2, 1) / block.image_sd[own]
@@ -219,6 +219,6 @@ def _affinities(block: Block, own: Bools) -> Floats:
 
 
 def _significance(result: Result, fall: float) -> float:
-    """Return the significance of a decrease of the sum of squares, in sd of the remaining unit weight."""
+    """Return the significance of a decrease of Omega, in sd of the remaining unit weight."""
     omega, freedom = result.sum_and_freedom
     return float(externally_studentized(math.sqrt(max(fall, 0.0)), omega, freedom))

@@ -1,4 +1,4 @@
-"""Stations off the path of their strip, and heights of two-ray points off their neighbours (Appendix H)."""
+"""Stations off the path of their strip, and outlying two-ray heights (Appendix H)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
 
 
 def stations(block: Block, result: Result | None, misleading: Collection[str] = ()) -> Section:
-    """Compare every station with the smooth path of its strip and with its initial values.
+    """Compare stations with the smooth path of their strip and initial values.
 
     `misleading` are photos that observe points whose good observations seemed wrong from the initial
     stations. If one of them has moved, its initial values are wrong.
@@ -66,13 +66,13 @@ def stations(block: Block, result: Result | None, misleading: Collection[str] = 
 
 
 def flown(block: Block) -> bool:
-    """Whether most photos look down, as from an aircraft; otherwise path and ground are undefined."""
+    """Whether most photos look down; otherwise path and ground are undefined."""
     return float(np.median(local_axes(block).cameras()[:, 2, 2])) > UPRIGHT
 
 
 @dataclass(frozen=True)
 class _Path:
-    """Departures (k, 5) of the photos of a strip from its path, and the independent sizes of its fit.
+    """Departures (k, 5) of strip photos from their path, and sizes of its fit.
 
     A robust fit passes through as many photos as it has coefficients. `free` are the other sizes (k - 2, 5),
     or (k - 3, 5) of a curved path.
@@ -193,7 +193,7 @@ PER_CELL = 4  # Points of a cell of the search grid, on average
 
 
 def two_ray_heights(result: Result) -> Section:
-    """Compare the height of every two-ray point with the plane of its nearest neighbours."""
+    """Compare two-ray point heights with the plane of their nearest neighbours."""
     section = Section(
         "Heights of two-ray points",
         "With two rays an error along the flight line becomes an error of height and leaves no residual.",
@@ -228,7 +228,7 @@ def two_ray_heights(result: Result) -> Section:
 
 
 def _above_planes(plan: Floats, heights: Floats, rows: Indices, near: Indices) -> tuple[Floats, Floats]:
-    """Return (k,) heights above the planes of the neighbours, without the neighbour that fits worst.
+    """Return (k,) heights above planes of neighbours, without the worst neighbour.
 
     Also returns (k,) the uncertainty of the plane at the point: the root of 1 + its cofactor, which is large
     outside the neighbours.
@@ -247,7 +247,7 @@ def _above_planes(plan: Floats, heights: Floats, rows: Indices, near: Indices) -
 
 
 def _planes(design: Floats, z: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Return (n, 3) coefficients of the planes, and (n,) cofactors of their height at the origin."""
+    """Return (n, 3) plane coefficients, and (n,) cofactors of height at the origin."""
     normal = np.einsum("nki,nk,nkj->nij", design, weights, design)
     # Neighbours in a row do not define a plane: a small weight on a level plane gives the mean.
     normal[:, 1:, 1:] += 1e-6 * np.eye(2)
@@ -257,7 +257,7 @@ def _planes(design: Floats, z: Floats, weights: Floats) -> tuple[Floats, Floats]
 
 
 def neighbours(plan: Floats, rows: Indices, count: int) -> Indices:
-    """Return (k, count) nearest points in plan of each of some points, excluding the point itself.
+    """Return (k, count) other points nearest in plan to each of some points.
 
     Points are sorted into square cells. The search visits rings of cells around a point, so that its work is
     proportional to the number of evenly distributed points.

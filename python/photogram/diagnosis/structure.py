@@ -1,4 +1,4 @@
-"""Structure of a block: rays, ties and bandwidth (GIANT guide, Appendices A and H)."""
+"""Structure of a block: rays, ties and bandwidth (Appendices A and H)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The check of a block with photos on trajectories: its adjustment and data snooping.
+"""The check of a block on trajectories: its adjustment and data snooping.
 
 The other checks assume one pose per photo. Observations of a moving photo do not fit one pose, and any tried
 unit, axis or angle would be blamed for it.

@@ -1,4 +1,4 @@
-"""Mistakes in the data of photos on trajectories, found by trial with the rule for photos at rest.
+"""Mistakes in the data of photos on trajectories, found by trial.
 
 Observations are predicted from given tables, points and cameras. The misfit of observed positions is their
 difference from the trajectory at their time, relative to their spread.
@@ -40,7 +40,7 @@ from photogram.words import Phrase, phrase
 
 
 def flown_hints(block: Block) -> list[Message]:
-    """Return mistakes in tables and times of trajectories, and in the numbers of scanner lines."""
+    """Return mistakes in tables and times of trajectories, and in scan line numbers."""
     with np.errstate(all="ignore"):
         return [Message(each.message) for each in (*_of_images(block), *_of_records(block))]
 
@@ -69,7 +69,7 @@ def _of_records(block: Block) -> list[Verdict]:
 
 
 def _records_misfit(block: Block) -> Floats:
-    """(1,) m of all observed positions on trajectories; 0 without any, very large if most are outside."""
+    """(1,) m of positions on trajectories; 0 without any, very large if most are outside."""
     records: dict[int, list[tuple[Moment, Position]]] = {}
     for each in block.observations:
         if isinstance(each, Position) and (moment := each.moment) is not None:
@@ -103,7 +103,7 @@ KILOMETRE = 1000.0
 
 
 def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Hypothesis]:
-    """Yield possible mistakes of a block without observations, for `photos` on trajectories."""
+    """Yield possible mistakes for `photos` on trajectories, without observations."""
     if any(each.trajectory is not None for each in block.timed):
         yield from _of_tables()
         for message, seconds in shifts("images"):
@@ -228,7 +228,7 @@ SEEN = 0.8  # Least part of the points of a photo that its trajectory passes
 
 
 def flown_view(block: Block) -> tuple[Block, Indices]:
-    """Return the part of a block needed to compare some photos on trajectories, and these photos."""
+    """Return the part of a block for comparing photos on trajectories, and these photos."""
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     usable = (given_points(block) | (rays > 1))[block.image_points]
     counts = np.bincount(block.image_photos[usable], minlength=len(block.photo_ids))
@@ -264,7 +264,7 @@ def flown_misfits(block: Block, photos: Indices) -> Floats:
 
 
 def flown_predictions(block: Block, photos: Indices) -> Floats:
-    """(m, 2) predicted image coordinates of some photos; NaN for others and invisible points."""
+    """(m, 2) predicted image coordinates of some photos; NaN if invisible."""
     places = _places(block)
     found = np.full(block.image_xy.shape, np.nan)
     wanted = set(photos.tolist())

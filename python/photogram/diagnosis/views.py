@@ -1,4 +1,4 @@
-"""A block as the first steps of a check use it: straight rays of cameras without distortion."""
+"""A block for the first steps of a check: straight rays without distortion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Standard deviations that an adjustment contradicts, by type: one step of variance components."""
+"""Contradicted standard deviations by type: one step of variance components."""
 
 from __future__ import annotations
 

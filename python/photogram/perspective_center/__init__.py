@@ -1,4 +1,4 @@
-"""Perspective centre of a projector from grid measurements (USGS Computer Contribution 2, 1969)."""
+"""Perspective centre of a projector (USGS Computer Contribution 2, 1969)."""
 
 from photogram.arguments.annotations import check_arguments
 from photogram.perspective_center.batch import Run, Stop, run_deck

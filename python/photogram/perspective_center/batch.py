@@ -78,7 +78,7 @@ def run_deck(
     together: bool = False,
     unknown: Sequence[str] = (),
 ) -> Run:
-    """Process a deck like the program, up to the first set that cannot be read or solved.
+    """Process a deck like the program, up to the first unreadable or unsolved set.
 
     A set that does not converge does not stop the run. Earlier results are returned.
 

@@ -148,7 +148,7 @@ class Job:
 
 
 class Deck:
-    """A deck that is read set by set, so that earlier sets are not affected by later errors."""
+    """A deck that is read by set, so that errors do not affect earlier sets."""
 
     def __init__(self, path: Path) -> None:
         self._source = Source.read(path)
@@ -231,7 +231,7 @@ class Deck:
         )
 
     def _readings(self, job: Job) -> list[Floats]:
-        """Read all readings of all points, (k, 3) each, and the flag card (specification, 5.1)."""
+        """Read all readings, (k, 3) for each point, and the flag card (5.1)."""
         readings: list[Floats] = []
         card, point, xyz = self._reading(job)
         for expected in job.numbers:

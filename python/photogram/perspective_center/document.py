@@ -1,4 +1,4 @@
-"""The document of a run through a deck of grid measurements; tables of several sets are layers."""
+"""The document of a run through a deck; tables of several sets are layers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ UNITS = {
 def run_document(
     results: Sequence[PerspectiveCenter], messages: Sequence[Message], stop: Judgement | None
 ) -> Document:
-    """Return the document of the sets of a run, with warnings and the reason of a stop."""
+    """Return the document of the sets of a run, with warnings and stop reason."""
     sets = [set_document(result) for result in results]
     values = {
         "units": UNITS,

@@ -21,7 +21,7 @@ MINUTES_PER_RADIAN = 3437.7468  # CONV of the program, too large by 8.5e-9
 
 
 def single(values: Floats) -> Floats:
-    """Return numbers as REAL*4 words of the System/360: six hexadecimal digits, truncated."""
+    """Return numbers as REAL*4 words of the System/360: six hex digits, truncated."""
     _, binary = np.frexp(values)
     step = 2.0 ** (4.0 * np.ceil(binary / 4.0) - 24.0)
     found: Floats = np.trunc(values / step) * step
@@ -126,7 +126,7 @@ class Grid(Brief):
 
 
 def joined(grids: Sequence[Grid]) -> Grid:
-    """Join the sets of one projector at several heights; point names include the set number.
+    """Join sets of one projector at several heights; names include the set number.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def reduce(
     title: str = "",
     number: int = 1,
 ) -> Grid:
-    """Reduce readings to a grid: means, standard deviations (divisor k - 1), corrections.
+    """Reduce readings to a grid: means, sd (divisor k - 1), corrections.
 
     Parameters
     ----------

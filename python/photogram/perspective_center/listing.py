@@ -1,4 +1,4 @@
-"""The listing of program W5344, item by item (report, Attachment D; specification, section 6).
+"""The listing of program W5344, item by item (report, Attachment D; section 6).
 
 Columns follow the FORMAT statements of the program's listing. Columns of the input table, whose FORMAT is
 lost, follow the sample printout. The first character of a FORTRAN record was its carriage control and was not
@@ -74,7 +74,7 @@ _INTERIOR = {"c": "PRINCIPAL DISTANCE (MM)", "xp": "PRINCIPAL POINT X (MM)", "yp
 
 
 def listing(run: Run) -> str:
-    """Return the listing of a run; pages begin with a form feed, lines end with a newline.
+    """Return the listing of a run; pages begin with form feeds, lines with newlines.
 
     Without redundancy, a sentence replaces the items that divide by the degrees of freedom.
     """
@@ -140,7 +140,7 @@ def _written(form: str, *values: Any) -> str:
 
 
 class _Fixed(float):
-    """A number in the form of IBM's Fw.d: 0.0 for an exact zero, asterisks for overflow."""
+    """A number in IBM's Fw.d: 0.0 for an exact zero, asterisks for overflow."""
 
     def __format__(self, form: str) -> str:
         width, decimals = map(int, form.split("."))

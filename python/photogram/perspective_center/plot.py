@@ -1,4 +1,4 @@
-"""Plots of a run: residual vectors in the model and radial distortion on the plate, a row for each set."""
+"""Plots of a run: residual vectors and radial distortion, a row for each set."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def set_name(result: PerspectiveCenter) -> str:
 
 
 def _residual_vectors(result: PerspectiveCenter, longest: float) -> Panel:
-    """Return measured minus projected; `longest` is the residual that has the longest vector."""
+    """Return measured minus projected; `longest` residual has the longest vector."""
     places, known = result.projected, round_length(longest)
     extent = float(np.ptp(places, axis=0).max()) or 1.0
     scale = LONGEST_RESIDUAL * extent / longest if longest > 0 else 1.0
@@ -46,7 +46,7 @@ def _residual_vectors(result: PerspectiveCenter, longest: float) -> Panel:
 
 
 def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:
-    """Return distortion over radius; `largest` is the distortion (um) that the axis covers.
+    """Return distortion over radius; `largest` is the axis range (um).
 
     The curve omits a point at the principal point, because the sign of its distortion is undefined.
     """

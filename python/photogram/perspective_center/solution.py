@@ -1,4 +1,4 @@
-"""Perspective centre and attitude of a projector from a grid (USGS Computer Contribution 2, 1969).
+"""Perspective centre of a projector from a grid (USGS CC 2, 1969).
 
 Plate coordinates are the observations. Mean model coordinates are assumed to be errorless, as in the report.
 The covariance and the test values follow from the residuals of the adjustment. `docs/perspective-center.md`
@@ -47,7 +47,7 @@ STEEPEST = 1e-10  # Ratio of singular values of scaled columns below which they 
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """One cycle of the iteration: position, correction, and angles after it in minutes."""
+    """One iteration cycle: position, correction, and angles after it in minutes."""
 
     position: Floats
     correction: Floats
@@ -56,7 +56,7 @@ class Cycle:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PerspectiveCenter(Judged, Brief):
-    """Perspective centre and attitude of a projector, with their quality, from n points.
+    """Perspective centre and attitude of a projector, with quality, from n points.
 
     Lengths in the model are in its unit, on the plate in millimetres; angles are omega, phi, kappa.
 
@@ -162,7 +162,7 @@ class PerspectiveCenter(Judged, Brief):
         return None if self.covariance is None else np.sqrt(np.diagonal(self.covariance)[6:])
 
     def _findings(self) -> Findings:
-        """Return the tests: residuals are tested by t, because standard deviations are not given."""
+        """Return tests of residuals by t, because standard deviations are not given."""
         freedom, status = self.degrees_of_freedom, "converged" if self.converged else "not converged"
         values = np.where(self.redundancy >= TESTABLE, self.studentized, np.nan)
         names = [[f"{axis} of point {name}" for axis in "XY"] for name in self.grid.ids]
@@ -460,7 +460,7 @@ def _tests(
     to_model: Floats,
     residual: Floats,
 ) -> tuple[Floats, Floats]:
-    """Return redundancy numbers, and standardized residuals in the model for unit weight.
+    """Return redundancy numbers, and standardized residuals in the model.
 
     The residuals on the plate have the cofactors P^-1 - A Q A^T. After transformation of P^-1 and of the
     cofactors to the model, the quotient of their diagonals is the visible part of an error of X or Y.

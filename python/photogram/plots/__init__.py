@@ -1,4 +1,4 @@
-"""Plots of adjusted networks: `result.plot.network()` and others return a :class:`Plot`."""
+"""Plots of adjusted networks: `result.plot.network()` and others."""
 
 from photogram.plots.accessor import Plots
 from photogram.show.sketch.plot import Plot

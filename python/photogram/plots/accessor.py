@@ -34,7 +34,7 @@ PLOTS: dict[str, Callable[[Any], Plot]] = {
 
 
 class _Method(Generic[P]):
-    """A function of a result as a method of `Plots`, with the docstring and arguments of the function."""
+    """A function of a result as a method of `Plots`, with docstring and arguments."""
 
     def __init__(self, function: Callable[Concatenate[Any, P], Plot]) -> None:
         self._function = function

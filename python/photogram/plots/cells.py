@@ -41,7 +41,7 @@ class Cells:
 
 
 def cells(xy: Floats, longer: int) -> Cells:
-    """Return nearly square cells over (m, 2) image points, `longer` along the longer side."""
+    """Return nearly square cells over (m, 2) image points, `longer` on the long side."""
     low, high = xy.min(axis=0), xy.max(axis=0)
     extent = np.maximum(high - low, 1e-12 + 1e-9 * np.abs(high))
     columns, rows = np.maximum(1, np.round(longer * extent / extent.max())).astype(int).tolist()

@@ -19,7 +19,7 @@ MAX_CAMERAS = 3
 
 
 def distortion(result: Any) -> Plot:
-    """Plot the radial distortion of cameras: the curve, its balanced form, and their standard deviations.
+    """Plot radial distortion of cameras: curve, balanced form, standard deviations.
 
     Bands show one standard deviation to either side. Dashed lines are beyond all observations.
 
@@ -37,7 +37,7 @@ def distortion(result: Any) -> Plot:
 
 
 def side_by_side(cameras: Sequence[Curves]) -> list[Panel | None]:
-    """Return the panels of cameras, one column each: curves, and their standard deviations below."""
+    """Return panels of cameras by column: curves, and standard deviations below."""
     columns = [_column(each) for each in cameras]
     rows = max(map(len, columns))
     return [own[row] if row < len(own) else None for row in range(rows) for own in columns]
@@ -76,7 +76,7 @@ def _column(curves: Curves) -> list[Panel]:
 
 
 def _reach(curves: Curves, curve: Curve) -> tuple[float, float]:
-    """Return the limits of a curve; extreme curves of single photos do not affect the scale."""
+    """Return the limits of a curve, without effect of extreme single photos."""
     factor, _ = curves.shown_as
     if not len(curves.others):
         bands = (factor * (curve.values + sign * sd) for sd in curve.bands.values() for sign in (-1, 1))

@@ -1,4 +1,4 @@
-"""Residuals of fiducial marks and patterns of films, as vectors over the frame of a camera."""
+"""Fiducial residuals and film patterns as vectors over the camera frame."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LONGEST_VECTOR = 0.11  # Longest vector, as a part of the extent of the points
 
 
 def films(result: Any) -> Plot:
-    """Plot residuals of fiducial marks, mean over the photos of each camera, and patterns of films.
+    """Plot fiducial residuals, mean over photos of each camera, and film patterns.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The network in plan: photos, footprints, points, control and check points, error ellipses."""
+"""The network in plan: photos, footprints, points, control, error ellipses."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PLANES = {"XY": (0, 1, 2), "XZ": (0, 2, 1), "YZ": (1, 2, 0)}
 
 
 def network(result: Any, *, plane: str | None = None) -> Plot:
-    """Plot photos, footprints, points by number of rays, control, check points and error ellipses.
+    """Plot photos, footprints, points by rays, control, checks and error ellipses.
 
     The plot shows a part of a large network, and its notes state which part.
 
@@ -113,7 +113,7 @@ def _areas(places: Floats) -> dict[str, float]:
 
 
 def _limits(plan: Plan, seen: tuple[int, int, int], outlines: Floats | None = None) -> Floats:
-    """Return (2, 2) lower and upper limits: all stations and control, and nearly all points.
+    """Return (2, 2) lower and upper limits of stations, control and nearly all points.
 
     They include footprints, unless these are far larger than the network.
     """
@@ -204,7 +204,7 @@ def _class(number: int, rays: Indices) -> str:
 def _ellipses(
     drawn: Pictured, seen: tuple[int, int, int], limits: Floats, marks: list[Mark], said: list[str]
 ) -> list[ScaleBar]:
-    """Add error ellipses of points, for many points the median one of each cell; return their scale."""
+    """Add error ellipses of points, or medians by cell; return their scale."""
     plan, pair = drawn.plan, list(seen[:2])
     inside = ((plan.points[:, pair] >= limits[0]) & (plan.points[:, pair] <= limits[1])).all(axis=1)
     rows = np.flatnonzero(inside)
@@ -299,7 +299,7 @@ def _vectors(
 
 
 def _usual(differences: Floats) -> float:
-    """Return a size that nine tenths of (k, 3) differences do not exceed; 0 without differences."""
+    """Return a size above nine tenths of (k, 3) differences; 0 without any."""
     sizes = np.sqrt(np.nansum(differences**2, axis=1))
     return float(np.quantile(sizes[sizes > 0], 0.9)) if (sizes > 0).any() else 0.0
 

@@ -129,7 +129,7 @@ class VectorField:
 
 
 class Pictured(Protocol):
-    """The data of the plots of an adjusted network; each part is computed when it is used."""
+    """The plot data of an adjusted network; each part is computed on demand."""
 
     @property
     def title(self) -> str:
@@ -140,7 +140,7 @@ class Pictured(Protocol):
         """The network."""
 
     def covariances(self, points: Indices) -> Floats:
-        """Return (k, 3, 3) covariances of points along the axes of the plan; NaN if missing."""
+        """Return (k, 3, 3) point covariances along the plan axes; NaN if missing."""
 
     @property
     def footprints(self) -> Floats:

@@ -1,4 +1,4 @@
-"""Redundancy numbers over the frame and over the network, which show where errors are detectable."""
+"""Redundancy numbers over frame and network, which show detectable errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SHADES = Shades(0.0, 1.0, "redundancy number, 0 to 1")
 
 
 def redundancy(result: Any) -> Plot:
-    """Plot redundancy numbers of observations over the frame, and of points over the network.
+    """Plot redundancy numbers of observations over frames, and of points in plan.
 
     A redundancy number is the part of an error that is visible in the residual of its own observation, from 0
     (nothing) to 1 (all). Values are means of x and y.
@@ -46,7 +46,7 @@ def redundancy(result: Any) -> Plot:
 
 
 def _over_frame(images: Images, values: Floats) -> Panel:
-    """Return observations over frames; over samples and lines only if all are of scanners."""
+    """Return observations over frames, or samples and lines if all are scanned."""
     scanned = bool(images.scanned.any() and images.scanned.all())
     kept = ~images.scanned if images.scanned.any() and not scanned else np.ones(len(values), dtype=bool)
     xy, shown = images.xy[kept], values[kept]
@@ -65,7 +65,7 @@ def _over_frame(images: Images, values: Floats) -> Panel:
 
 
 def _over_network(drawn: Pictured, values: Floats) -> Panel:
-    """Return points coloured by their least redundancy number; for many points, means of cells."""
+    """Return points coloured by least redundancy number, or means of cells."""
     plan, images = drawn.plan, drawn.images
     least = np.full(len(plan.points), np.inf)
     np.minimum.at(least, images.points, values)

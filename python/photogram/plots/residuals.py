@@ -25,7 +25,7 @@ LEVEL = 0.01  # Probability of a false alarm in any cell of a panel
 
 
 def residuals(result: Any) -> Plot:
-    """Plot image residuals over the frame of each camera; means of cells if they are many.
+    """Plot image residuals over the frame of each camera, or means of cells.
 
     Significant means are coloured (1 percent for all cells together).
     """
@@ -46,7 +46,7 @@ def residuals(result: Any) -> Plot:
 
 
 def largest_cameras(images: Images, most: int = MAX_CAMERAS) -> tuple[list[int], str]:
-    """Return the cameras with the most observations, in their order, and a remark on the others."""
+    """Return the cameras with most observations, and a remark on the others."""
     counts = np.bincount(images.cameras, minlength=len(images.names))
     there = int((counts > 0).sum())
     chosen = np.sort(np.argsort(-counts, kind="stable")[: min(most, there)]).tolist()
@@ -55,7 +55,7 @@ def largest_cameras(images: Images, most: int = MAX_CAMERAS) -> tuple[list[int],
 
 
 def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
-    """Return a panel of the frame of a camera with equal scales and a margin, y as in the camera.
+    """Return a panel of a camera frame with equal scales and a margin.
 
     Samples and lines of a scanner increase upwards, so that residuals have the direction of its focal plane.
     """

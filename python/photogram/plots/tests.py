@@ -1,4 +1,4 @@
-"""Test values of all observations against the normal distribution: histogram and quantiles."""
+"""Test values of observations against the normal distribution."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MAX_TEST_VALUE = 6.0  # The histogram counts test values beyond at its ends
 
 
 def tests(result: Any) -> Plot:
-    """Plot test values w of all observations: histogram and quantiles against the normal.
+    """Plot test values w: histogram and quantiles against the normal distribution.
 
     w = residual / (standard deviation x root of redundancy number) is standard normal if the given standard
     deviations are correct and the data are free of gross errors.
@@ -51,7 +51,7 @@ def tests(result: Any) -> Plot:
 
 
 def _speaking(group: Tested) -> Tested:
-    """Return a group without components of negligible size, which would be a peak at 0."""
+    """Return a group without components of negligible size, which peak at 0."""
     sizes = np.nan_to_num(np.abs(group.values))
     silent = sizes.reshape(len(sizes), -1).max(axis=0, initial=0.0) < SPEAKING
     return replace(group, values=np.where(silent.reshape(sizes.shape[1:]), np.nan, group.values))
@@ -130,7 +130,7 @@ def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: flo
 
 
 def _rows(n: int) -> Any:
-    """Return the rows of n ordered values to draw: all extreme ones, and a selection between."""
+    """Return the rows of n ordered values to draw: all extremes, some between."""
     if n <= MAX_QUANTILES:
         return np.arange(n)
     inner = np.linspace(END_VALUES, n - END_VALUES - 1, MAX_QUANTILES - 2 * END_VALUES)

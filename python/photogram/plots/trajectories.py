@@ -1,4 +1,4 @@
-"""Corrections of a trajectory by the adjustment, over time, with standard deviations."""
+"""Trajectory corrections over time, with standard deviations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TICK_HEIGHT = 0.03  # Of the times of observations, as a part of the height of t
 
 
 def trajectory(result: Any, *, name: str | None = None) -> Plot:
-    """Plot the corrections of a trajectory over time, with bands of one standard deviation about them.
+    """Plot trajectory corrections over time, with one standard deviation bands.
 
     The left panel shows positions, the right one rotations about the axes of the photo. Lines below mark the
     times of further observations of the trajectory.

@@ -1,4 +1,4 @@
-"""Statistics of an adjustment: tests, critical values, reliability, degrees of freedom, error radii."""
+"""Statistics of an adjustment: tests, reliability, degrees of freedom, radii."""
 
 import lazy_loader
 

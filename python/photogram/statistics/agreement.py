@@ -1,4 +1,4 @@
-"""Agreement of known values with an adjustment that did not use them: check points.
+"""Agreement of check points with an adjustment that did not use them.
 
 Differences d (adjusted minus given) of n points have the covariance C = s^2 Q + S. Q are the joint cofactors
 of the adjusted points, including cross blocks, because these share the errors of the block. S is the
@@ -74,7 +74,7 @@ def _blocks(matrix: Floats, width: int) -> Floats:
 
 
 def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
-    """Return d' C^+ d and the rank of C: (NaN, NaN) if C is unknown, (NaN, 0) if all are exact."""
+    """Return d' C^+ d and rank C; (NaN, NaN) if C is unknown, (NaN, 0) if exact."""
     if not np.isfinite(covariance).all():
         return math.nan, math.nan
     scale = scale_of(covariance)
@@ -99,7 +99,7 @@ def scale_of(covariance: Floats) -> Floats:
 
 
 def root_of(scaled: Floats) -> Floats | None:
-    """Return the Cholesky factor of a matrix with unit diagonal, possibly bordered; None if singular."""
+    """Return the Cholesky factor of a unit-diagonal, possibly bordered matrix, or None."""
     try:
         root = np.asarray(np.linalg.cholesky(scaled), dtype=np.float64)
     except np.linalg.LinAlgError:

@@ -1,4 +1,4 @@
-"""Variance components: joint estimation of variance factors of groups of observations.
+"""Variance components: joint estimation of factors of groups of observations.
 
 Observations belong to groups g with the variances theta_g sd^2. For given theta, an adjustment results in the
 weighted sum of squares q_g and the sum r_g of redundancy numbers of each group. R maps errors to residuals,
@@ -248,7 +248,7 @@ class _Run:
         self.units, self.held = units, held
 
     def _pool(self, siblings: list[int], least: float) -> list[int]:
-        """Return the weak groups and as many others as they need; empty without weak groups."""
+        """Return the weak groups and the others that they need; empty without any."""
         pool = [g for g in siblings if self._why([g], least)]
         others = sorted(set(siblings) - set(pool), key=lambda g: float(self.state.redundancy[g]))
         while pool and others and self._why(pool, least):
@@ -256,7 +256,7 @@ class _Run:
         return sorted(pool) if len(pool) > 1 else []
 
     def _why(self, members: list[int], least: float) -> Phrase | None:
-        """Return the reason for not estimating a joint component of groups; None if it can be estimated."""
+        """Return the reason for not estimating a joint component of groups, or None."""
         r, n = float(self.state.redundancy[members].sum()), int(self.state.counts[members].sum())
         if r < min(REFUSED, least):
             return Phrase("held.unchecked", {"redundancy": r})

@@ -31,14 +31,14 @@ LEVEL = 0.05  # Level of the global test, and of all single tests together
 
 
 def critical_normal(level: float) -> float:
-    """Return the value that the absolute value of a standard normal variable exceeds with the level."""
+    """Return the two-sided critical value of a standard normal variable."""
     from statistics import NormalDist  # takes long to import
 
     return -NormalDist().inv_cdf(probability("level", level) / 2)
 
 
 def critical_student(level: float, dof: float) -> float:
-    """Return the value that the absolute value of Student's variable exceeds with the level.
+    """Return the two-sided critical value of Student's variable.
 
     The normal distribution is used if `dof` is infinite. Infinite if `dof` is not positive.
     """
@@ -52,7 +52,7 @@ def critical_student(level: float, dof: float) -> float:
 
 
 def critical_tau(level: float, dof: float) -> float:
-    """Return the critical value of an internally studentized residual w / s (two-sided).
+    """Return the two-sided critical value of an internally studentized w / s.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def lambda0(level: float = 0.001, power: float = 0.80, dimension: float = 1, dof
 
 
 def b_method(dimension: float, level: float = 0.001, power: float = 0.80) -> tuple[float, float]:
-    """Return level and chi-square limit of a test that finds the same error as the test of one observation.
+    """Return level and chi-square limit that find the same error as a single test.
 
     Parameters
     ----------
@@ -161,14 +161,14 @@ def b_method(dimension: float, level: float = 0.001, power: float = 0.80) -> tup
 
 
 def bonferroni(level: float, tests: int) -> float:
-    """Return the level of each of several tests that limits the probability of any false rejection."""
+    """Return the level of each test for a joint probability of a false rejection."""
     return probability("level", level) / max(tests, 1)
 
 
 def benjamini_hochberg(
     probabilities: ArrayLike, level: float = LEVEL, *, dependent: bool = False
 ) -> NDArray[np.bool_]:
-    """Return the rejected tests with a limited expected share of good ones (false discovery rate).
+    """Return rejected tests with a limited expected share of good ones.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Radii that errors do not exceed with a probability: linear (LE), circular (CE) and spherical (SE).
+"""Radii of errors for a probability: linear (LE), circular (CE), spherical (SE).
 
 *From a covariance*, radii are integrals of the normal distribution; *from a sample*, they are order
 statistics. A radius *from moments* uses the matrix of mean products, `sum d d' / n`, which includes a bias. A
@@ -35,7 +35,7 @@ INDEFINITE = 1e-9  # Largest negative variance or asymmetry by rounding, as a pa
 
 
 def linear_error(sd: ArrayLike, probability: float) -> Floats:
-    """Return the bound of the absolute value of a normal error for a probability: LE90 is 1.6449 sd.
+    """Return the bound of a normal error for a probability: LE90 is 1.6449 sd.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def linear_error(sd: ArrayLike, probability: float) -> Floats:
 
 
 def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLike | None = None) -> Floats:
-    """Return the radii of the circles that contain errors in the plane with a probability (CE90, CE95).
+    """Return circle radii that contain plane errors with a probability (CE90, CE95).
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLik
 
 
 def spherical_error(covariances: ArrayLike, probability: float) -> Floats:
-    """Return the radii of the spheres that contain errors in space with a probability (SE90).
+    """Return sphere radii that contain spatial errors with a probability (SE90).
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def spherical_error(covariances: ArrayLike, probability: float) -> Floats:
 
 
 def mixture_circular(covariances: ArrayLike, probability: float) -> float:
-    """Return the radius that contains the error in the plane of a point drawn at random.
+    """Return the radius that contains the plane error of a random point.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def mixture_circular(covariances: ArrayLike, probability: float) -> float:
 
 
 def mixture_linear(sd: ArrayLike, probability: float) -> float:
-    """Return the bound of the absolute error of a point drawn at random for a probability.
+    """Return the bound of the absolute error of a random point for a probability.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def mixture_linear(sd: ArrayLike, probability: float) -> float:
 
 
 def sample_radius(values: ArrayLike, probability: float) -> tuple[int, float]:
-    """Return the order statistic that bounds a share of the sizes of errors, without interpolation.
+    """Return the order statistic that bounds a share of the sizes of errors.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def sample_radius(values: ArrayLike, probability: float) -> tuple[int, float]:
 
 
 def upper_order(count: int, probability: float, confidence: float = 0.95) -> int | None:
-    """Return the order statistic that is an upper bound of a quantile with a confidence.
+    """Return the order statistic that bounds a quantile above with a confidence.
 
     The values are assumed to be independent.
 
@@ -218,7 +218,7 @@ def _deviations(sd: ArrayLike) -> Floats:
 
 
 def _principal(covariances: ArrayLike, offsets: ArrayLike | None, size: int) -> tuple[Floats, Floats]:
-    """Return (n, k) standard deviations along the principal axes, largest first, and means along them."""
+    """Return (n, k) principal standard deviations, largest first, and means along them."""
     given = numbers("covariances", covariances, missing=True)
     if given.ndim != 3 or given.shape[1:] != (size, size):
         raise argument_error("covariances", "shape", shape=f"(n, {size}, {size})", actual=given.shape)
@@ -262,7 +262,7 @@ def _radii(sds: Floats, means: Floats, probability: float) -> Floats:
 
 
 def _mixture(sds: Floats, probability: float) -> float:
-    """Return the radius with a mean probability over points: (n, k) standard deviations."""
+    """Return the radius with a mean probability over (n, k) standard deviations."""
     if not len(sds) or not np.isfinite(sds).all():
         return math.nan
     moving = sds[:, 0] > 0
@@ -282,12 +282,12 @@ def _mixture(sds: Floats, probability: float) -> float:
 
 
 def _widest(probability: float, size: int) -> float:
-    """Return the radius if all axes are 1, which is an upper bound if the largest axis is 1."""
+    """Return the radius for unit axes, an upper bound if the largest axis is 1."""
     return math.sqrt(_photocore.chi_square_quantile(probability, size, upper=False))
 
 
 def _approximate(sds: Floats, means: Floats, probability: float) -> Floats:
-    """Return (n,) radii as if their squares were chi-square of the same mean and variance (Satterthwaite).
+    """Return (n,) radii of chi-square with the same mean and variance (Satterthwaite).
 
     The quantile is approximated by Wilson and Hilferty.
     """
@@ -300,7 +300,7 @@ def _approximate(sds: Floats, means: Floats, probability: float) -> Floats:
 def _solved(
     function: Callable[[Floats], tuple[Floats, Floats]], starts: Floats, bounds: Floats, probability: float
 ) -> Floats:
-    """Solve increasing functions, each returned with its derivative, between 0 and bounds."""
+    """Solve increasing functions with derivatives, between 0 and bounds."""
     low, high, trial = np.zeros_like(bounds), bounds, starts
     for _ in range(STEPS if bounds.size else 0):
         inside, density = function(trial)
@@ -337,7 +337,7 @@ def _within(lengths: Floats, sds: Floats, means: Floats) -> tuple[Floats, Floats
 
 
 def _window(lengths: Floats, sds: Floats, means: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the y up to which the bracket is 1, and beyond it the start and length of t."""
+    """Return the y up to which the bracket is 1, and start and length of t beyond."""
     a, b, mean = sds[..., 0], sds[..., -1], np.abs(means[..., -1])
     rest = np.linalg.norm(means[..., :-1], axis=-1)
     whole = _leg(lengths, rest + REACH * a)

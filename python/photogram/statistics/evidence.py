@@ -1,4 +1,4 @@
-"""Quantities for the conditions of a verdict: critical values, exceedances and their sizes."""
+"""Quantities for conditions of verdicts: critical values, exceedances, sizes."""
 
 from __future__ import annotations
 
@@ -105,13 +105,13 @@ class Evidence:
 
     @cached_property
     def robust(self) -> float | None:
-        """The factor of the median test value, not affected by a quarter of gross errors; None for few."""
+        """The factor of the median test value, robust to a quarter of gross errors, or None."""
         values = [_relative(each) for each in self.found.observations if each.statistic in "wT"]
         together = np.concatenate(values) if values else np.zeros(0)
         return float(np.median(together)) if together.size >= ENOUGH else None
 
     def beyond(self, factor: float = 1.0) -> list[Beyond]:
-        """Return rejected tests for standard deviations multiplied by a factor, in the order of p."""
+        """Return rejected tests for scaled standard deviations, in the order of p."""
         found: list[tuple[float, int, tuple[int, ...], Tested]] = []
         for order, each in enumerate(self.found.observations):
             found += [(log_p, order, place, each) for log_p, place in each.beyond(self.level, factor)]
@@ -133,7 +133,7 @@ class Evidence:
         return self.gross if self.high or "gross-errors" in self.codes else self.single
 
     def places(self) -> dict[Text, list[tuple[int, ...]]]:
-        """Return the indices of the outliers by type: rows of observations, and components of single ones."""
+        """Return indices of outliers by type: rows, and components of single ones."""
         found: dict[Text, list[tuple[int, ...]]] = {}
         for _, each, place in self.outlying:
             own = place if each.rows is None else (int(each.rows[place[0]]),)
@@ -185,7 +185,7 @@ class Evidence:
         return Evidence(replace(self.found, observations=studentized)).beyond()
 
     def _common(self, robust: float) -> float:
-        """Return the common factor of all standard deviations for the tests of observations.
+        """Return the common factor of all standard deviations for tests of observations.
 
         If the median indicates a factor, and all residuals indicate nearly the same, the factor of all
         residuals is used. The median of a few hundred may be wrong by a tenth.
@@ -194,7 +194,7 @@ class Evidence:
         return self.factor if alike else max(robust, 1.0)
 
     def disagreement(self, level: float) -> list[Phrase]:
-        """Return check points that disagree at a level, singly or together; empty without disagreement."""
+        """Return check points that disagree at a level, singly or together."""
         checks = self.found.checks
         if checks is None:
             return []
@@ -213,7 +213,7 @@ class Evidence:
 
     @cached_property
     def lens(self) -> bool:
-        """Whether a lens explains nearly all of the excess, and no single observation much of it.
+        """Whether a lens explains nearly all of the excess, and no single observation.
 
         Then the residuals are caused by a wrong lens, not by gross errors. But a few huge errors distort all
         residuals, and the distortion resembles a lens as well.
@@ -232,7 +232,7 @@ class Evidence:
 
     @cached_property
     def _falls(self) -> tuple[float, float]:
-        """Decreases of the weighted sum of squares with a lens, and without one observation."""
+        """Decreases of the sum of squares with a lens, and without one observation."""
         return (
             max(
                 (each.fall for each in self.found.systematic if each.significant and each.large), default=0.0
@@ -286,7 +286,7 @@ class Evidence:
         return [Phrase("line.tests", fields)]
 
     def tests(self) -> list[Test]:
-        """Return the global test, the largest of every observation type, and tests of patterns."""
+        """Return the global test, largest tests by type, and tests of patterns."""
         whole = [] if self.test is None else [_whole(self.test)]
         largest = [_largest(each, self.level, self.number) for each in self.found.observations]
         if (checks := self.found.checks) is not None:
@@ -312,13 +312,13 @@ def factor_of(test: GlobalTest) -> Phrase:
 
 
 def _as_fall(tested: Tested, place: tuple[int, ...]) -> float:
-    """Return the decrease of the weighted sum of squares without an observation; 0 of t and F."""
+    """Return the decrease of Omega without an observation; 0 for t and F."""
     value = float(tested.values[place])
     return {"w": value**2, "T": value}.get(tested.statistic, 0.0)
 
 
 def _relative(tested: Tested) -> Floats:
-    """Return test values divided by the median of their distribution, as factors of standard deviations."""
+    """Return test values over the median of their distribution, as sd factors."""
     values = tested.values[~np.isnan(tested.values)]
     if tested.statistic == "w":
         return np.asarray(np.abs(values) / MEDIAN)

@@ -1,4 +1,4 @@
-"""Findings for the verdict on an adjustment: tests of observations by type, and other information.
+"""Findings for the verdict on an adjustment: tests by type, other information.
 
 Every program provides the same :class:`Findings`; :func:`photogram.statistics.verdict.verdict` assesses them.
 """
@@ -25,7 +25,7 @@ Text = str | Phrase
 
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """Tests of the observations of one type: of single components, or of groups that may err together."""
+    """Tests of observations of one type: single components, or groups."""
 
     kind: Text  # Observation type, in the plural
     values: Floats  # Test values in any shape; NaN if nothing is tested
@@ -53,7 +53,7 @@ class Tested:
         )
 
     def largest(self) -> tuple[int, ...] | None:
-        """Return the index of the least probable value, the first of equal ones; None without values."""
+        """Return the first index of the least probable value; None without values."""
         sizes = np.abs(self.values) if self._alike else -self.log_probability()
         sizes = np.where(np.isnan(sizes), -math.inf, sizes)
         if not sizes.size or sizes.max() == -math.inf:
@@ -61,7 +61,7 @@ class Tested:
         return tuple(int(each) for each in np.unravel_index(int(sizes.argmax()), sizes.shape))
 
     def beyond(self, level: float, factor: float = 1.0) -> list[tuple[float, tuple[int, ...]]]:
-        """Return logarithms of p-values below the level with their indices; see :meth:`log_probability`."""
+        """Return log p-values below the level with indices; see :meth:`log_probability`."""
         if self._alike:
             # All have one limit: only values beyond it need a probability.
             dimension, second = float(np.asarray(self.dimension)), float(np.asarray(self.second))
@@ -101,7 +101,7 @@ class Tested:
         return log_fisher(squares, self.dimension, self.second)
 
     def studentized(self, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Self:
-        """Return the tests with the unit weight of the other observations: t for w, F for T."""
+        """Return tests with the unit weight of other observations: t for w, F for T."""
         omega, f = weighted_sum_of_squares, degrees_of_freedom
         if self.statistic == "w":
             t = externally_studentized(self.values, omega, f)

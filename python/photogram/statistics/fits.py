@@ -1,4 +1,4 @@
-"""Small linear fits with any covariance: whitened, by QR on scaled columns, without normal equations.
+"""Small linear fits with any covariance by whitening and QR.
 
 Values x with the covariance S = L L' are fitted by x = A p + v. With A~ = L^-1 A = B U, B'B = I,
 
@@ -67,7 +67,7 @@ class Fit:
 
     @property
     def standardized(self) -> Floats:
-        """(n,) Baarda's w, (W v)_i / sqrt((W Q_vv W)_ii), W = S^-1; NaN without redundancy."""
+        """(n,) Baarda's w, (W v)_i / sqrt((W Q_vv W)_ii), W = S^-1; NaN if undefined."""
         back = np.linalg.inv(self.root).T
         left = back - (back @ self.basis) @ self.basis.T
         variances = (left**2).sum(axis=1)
@@ -76,7 +76,7 @@ class Fit:
         return np.asarray(back @ self.whitened / np.sqrt(variances))
 
     def tested(self, columns: Floats) -> tuple[Floats, Floats]:
-        """Return estimates of additional columns, one at a time, with sd; NaN if inestimable."""
+        """Return estimates of single additional columns with sd; NaN if inestimable."""
         z = np.linalg.solve(self.root, columns)
         left = z - self.basis @ (self.basis.T @ z)
         squares = (left**2).sum(axis=0)

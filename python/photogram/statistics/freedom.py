@@ -1,4 +1,4 @@
-"""Degrees of freedom of combined variances, and the resulting intervals and factors.
+"""Degrees of freedom of combined variances, with intervals and factors.
 
 A sum of squares of correlated errors with the covariance C has the mean tr C and the variance 2 tr C^2. It is
 approximately chi-square with k = (tr C)^2 / tr C^2 degrees of freedom, fewer than the number of errors
@@ -26,7 +26,7 @@ ROUNDING = 1e-9
 
 
 def effective_freedom(covariance: ArrayLike) -> float:
-    """Return the degrees of freedom of a sum of squares of correlated errors: (tr C)^2 / tr C^2.
+    """Return the freedom of a sum of correlated squares: (tr C)^2 / tr C^2.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def effective_freedom(covariance: ArrayLike) -> float:
 
 
 def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[float, float]:
-    """Return the confidence interval of the expected root mean square error of a sample.
+    """Return the confidence interval of the expected RMSE of a sample.
 
     The formula is rmse sqrt(k / chi2), two-sided (section 2.1 of the specification of the statement).
 
@@ -91,7 +91,7 @@ def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[fl
 
 
 def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
-    """Return the degrees of freedom of a combined uncertainty, u^4 / sum(u_k^4 / nu_k) (JCGM 100, G.4).
+    """Return the freedom of a combined uncertainty, u^4 / sum(u_k^4 / nu_k) (G.4).
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
 
 
 def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike, given: float = 0.0) -> float:
-    """Return the degrees of freedom of a variance whose groups have estimated components.
+    """Return the degrees of freedom of a variance with estimated components.
 
     nu = 2 u^4 / (c' cov c), section 3 of the specification of the statement. Unlike the formula of Welch and
     Satterthwaite, it includes correlations of the components.

@@ -1,4 +1,4 @@
-"""Tests of groups of observations that may err together: x and y of an image point, a control point.
+"""Tests of groups that may err together: image coordinates, control points.
 
 Standardized residuals are v = (observed - computed) / sd, and R = I - A Q A'. R_g is the block of the m rows
 of a group, and R^- its pseudo-inverse. An error of an unsuspected group has (Cook and Weisberg 1982;
@@ -67,7 +67,7 @@ class GroupTests:
         return np.asarray(np.where(np.isfinite(least), least, math.nan))
 
     def guilty(self, group: int) -> list[int]:
-        """Return the most probable erroneous row of a group, and the rows that are inseparable from it.
+        """Return the most probable wrong row of a group, and inseparable rows.
 
         The first row has the largest ratio of |d| and its standard deviation. The others have estimates that
         are correlated with it by more than 0.9.
@@ -134,7 +134,7 @@ def parts_tests(
     *,
     known: bool = True,
 ) -> Floats:
-    """Return log-probabilities of parts of one group, each tested as if the other rows were good.
+    """Return log-probabilities of parts of a group as if other rows were good.
 
     For a control point, use plan and height, `parts=((0, 1), (2,), (0, 1, 2))`. The smallest value indicates
     the erroneous part.

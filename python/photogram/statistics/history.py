@@ -175,7 +175,7 @@ def history(
     freedom: float = math.inf,
     level: float = LEVEL,
 ) -> History:
-    """Compare values that were determined on several occasions: constancy, drift, steps, single ones.
+    """Compare values of several occasions: constancy, drift, steps, single ones.
 
     `values` (k, m) are m quantities on k occasions in ascending order of `times`. `covariance` is the
     covariance of one occasion (k, m, m), or of all values (k, m, k, m), estimated with `freedom` degrees of
@@ -258,7 +258,7 @@ def _log10_p(t: float, freedom: float) -> float:
 def _series(
     x: Floats, covariance: Floats, hypotheses: _Hypotheses, name: str, unit: str, freedom: float, level: float
 ) -> Series:
-    """Test one quantity, accept changes in the order of certainty, and fit them together."""
+    """Test a quantity, accept changes by certainty, and fit them jointly."""
     k = len(x)
     with np.errstate(invalid="raise", divide="raise"):
         first = fit = Fit.of(x, covariance, np.ones((k, 1)))

@@ -115,7 +115,7 @@ def are_exchanged(
     variance: float = 1.0,
     uncertain: float = 1.0,
 ) -> bool:
-    """Test whether two objects are exchanged by the formula above; `uncertain` is u, `pairs` is k."""
+    """Test whether two objects are exchanged; `uncertain` is u, `pairs` is k."""
     if not (math.isfinite(exchanged) and dimension > 0):
         return False
     fits = exchanged < uncertain * variance * critical_chi_square(EXCHANGE_LEVEL, dimension)

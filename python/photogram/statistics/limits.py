@@ -1,4 +1,4 @@
-"""Tests of an adjustment as a whole, and of its observations: the same limits for every program.
+"""Global tests of an adjustment and its observations, with common limits.
 
 Observations l with standard deviations sd have residuals v. Omega is the sum of (v / sd)^2, f the degrees of
 freedom, and r the redundancy number of an observation. w = v / (sd sqrt(r)) is its standardized residual.
@@ -40,7 +40,7 @@ With many degrees of freedom, the global test detects smaller factors, which are
 
 @dataclass(frozen=True)
 class GlobalTest:
-    """The test of all residuals together against their standard deviations (chi-square, both sides).
+    """The two-sided chi-square test of all residuals.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class GlobalTest:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Confidence interval of the true factor with the probability 1 - level; see :attr:`factor`."""
+        """Confidence interval of the true factor at 1 - level; see :attr:`factor`."""
         low, high = self.limits
         return math.sqrt(self.variance / high), math.sqrt(self.variance / low) if low > 0 else math.inf
 
@@ -162,7 +162,7 @@ def global_test(
 def externally_studentized(
     standardized: ArrayLike, weighted_sum_of_squares: float, degrees_of_freedom: float
 ) -> NDArray[np.float64]:
-    """Return residuals over their standard deviations, with the unit weight of the other observations.
+    """Return standardized residuals with the unit weight of other observations.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Tests for patterns of residuals: tails, a pattern over the frame, a trend, a bend.
+"""Tests for patterns of residuals: tails, frame pattern, trend, bend.
 
 All use standardized residuals ~v = (observed - computed) / sd and their redundancy numbers r. The residuals
 of an adjustment are correlated, ~v = R ~e. A sum over a group has the variance sum R_ij, of which sum r_i is
@@ -42,7 +42,7 @@ class Normality:
 
 
 def normality(values: Floats) -> Normality | None:
-    """Test whether values are normal, with any mean and variance (Anderson and Darling 1954).
+    """Test values for any normal distribution (Anderson and Darling 1954).
 
     Residuals combine the errors of many observations and look more normal than these. So acceptance proves
     little if redundancy is low. None of less than 20 values, or equal ones.
@@ -69,7 +69,7 @@ def normality(values: Floats) -> Normality | None:
 
 
 def _of_anderson_darling(a: float) -> float:
-    """Return the p-value of the corrected A^2 (D'Agostino and Stephens 1986, table 4.9)."""
+    """Return the p-value of corrected A^2 (D'Agostino and Stephens 1986, table 4.9)."""
     if a >= 0.6:
         return math.exp(min(1.2937 - 5.709 * a + 0.0186 * a * a, 0.0)) if a < 13 else 0.0
     if a > 0.34:
@@ -124,7 +124,7 @@ def frame_pattern(
 
 
 def _cells(xy: Floats, count: int) -> Indices:
-    """Return (m,) the cell of each observation, with `count` cells per direction over their extent."""
+    """Return (m,) cells of observations, `count` per direction over their extent."""
     low, high = xy.min(axis=0), xy.max(axis=0)
     width = np.where(high > low, high - low, 1.0)
     places = np.minimum((count * (xy - low) / width).astype(np.int64), count - 1)
@@ -141,7 +141,7 @@ _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # Upper triangle of a
 def group_patterns(
     groups: Indices, count: int, xy: Floats, residuals: Floats, redundancy: Floats
 ) -> tuple[Floats, Floats]:
-    """Test for each group whether its residuals follow a shift and a linear form of the coordinates.
+    """Test groups of residuals for a shift and a linear form of coordinates.
 
     For a photo, this indicates film or scanner errors, or a wrong axis. With b = (1, x, y) centred and
     scaled, it is the score test c' C^-1 c, c = sum b ~v, C = sum r b b', in both axes. It is chi-square with
@@ -170,7 +170,7 @@ def group_patterns(
 
 
 def _quadratic(matrices: Floats, vectors: Floats) -> Floats:
-    """Return c' C^+ c of (n, k, k) and (n, k), with pseudo-inverses if C may be singular."""
+    """Return c' C^+ c of (n, k, k) and (n, k), by pseudo-inverses if singular."""
     scale = np.sqrt(np.einsum("gii->gi", matrices))
     sound = np.linalg.det(matrices) > SINGULAR * scale.prod(axis=1) ** 2
     found = np.empty(len(vectors))
@@ -192,7 +192,7 @@ class Fit:
 
 
 def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit | None:
-    """Test whether values depend on k columns of a design, by F with k and n - k degrees of freedom.
+    """Test the dependence of values on k columns by F with k and n - k.
 
     None with fewer than k + 5 values.
     """
@@ -215,7 +215,7 @@ def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit
 
 
 def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
-    """Return Moran's I, the spatial correlation of residuals over the frame (Moran 1950).
+    """Return Moran's I, the spatial correlation of residuals over the frame.
 
         I = (n / S0) sum w_ij z_i z_j / sum z_i^2,     S0 = sum w_ij
 
@@ -240,7 +240,7 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
 
 
 def moran_index(values: Floats, lagged: Floats, total: float) -> float:
-    """Return Moran's I of values whose weighted neighbours sum to `lagged`; `total` is the sum of weights.
+    """Return Moran's I from neighbour sums `lagged`; `total` is the weight sum.
 
     I = (n / total) sum z_i lagged_i / sum z_i^2 of (n, ...) values that are about zero on average.
     """
@@ -248,7 +248,7 @@ def moran_index(values: Floats, lagged: Floats, total: float) -> float:
 
 
 def durbin_watson(photos: Indices, count: int, residuals: Floats, redundancy: Floats) -> float:
-    """Return d of the mean residuals of photos in their order (Durbin and Watson 1950).
+    """Return d of mean residuals of photos in order (Durbin and Watson 1950).
 
         d = sum (m_(p+1) - m_p)^2 / sum m_p^2,     m_p = sum ~v / root of sum r
 

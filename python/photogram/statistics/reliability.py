@@ -1,4 +1,4 @@
-"""Reliability: the size of detectable gross errors, and the effect of undetected ones (Baarda 1968).
+"""Reliability: detectable gross errors, and effects of others (Baarda 1968).
 
 An observation with the standard deviation sd and the redundancy number r has a standardized residual w = v /
 (sd sqrt(r)), which is standard normal. A gross error e shifts its expectation by e sqrt(r) / sd. The *minimal
@@ -34,7 +34,7 @@ ROUNDING = 1e-10  # Redundancy numbers below this are rounding errors of zero
 
 
 def standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
-    """Return residuals over their own standard deviations, unit weight a priori (Baarda's w).
+    """Return residuals over their sd with a priori unit weight (Baarda's w).
 
     NaN if sd is infinite or zero, or if redundancy is rounding only.
     """
@@ -90,7 +90,7 @@ def minimal_detectable_error(sd: ArrayLike, redundancy: ArrayLike, delta0: float
 
 
 def largest_effect(redundancy: ArrayLike, delta0: float | None = None) -> Floats:
-    """Return the external reliability: bounds of the effect of undetected errors on the unknowns.
+    """Return external reliability: bounds of effects of undetected errors.
 
     Parameters
     ----------

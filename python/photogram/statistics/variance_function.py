@@ -1,4 +1,4 @@
-"""Variances as functions of a quantity, for example of the distance from the principal point.
+"""Variances as functions of a quantity, such as distance from the centre.
 
 Within a group the variance is sd^2 theta_i with theta_i = x_i^T beta and x_i = (1, u_i, ...). u_i is the
 square of the radius over the largest: sigma^2 = a^2 + b^2 r^2. Let ~v be the residuals in standard deviations
@@ -57,7 +57,7 @@ class FunctionEstimate:
 
 
 def nonnegative(normal: Floats, right: Floats) -> Floats:
-    """Solve normal equations of few unknowns, with nonnegative unknowns (least squares)."""
+    """Solve small normal equations with nonnegative unknowns (least squares)."""
     count = len(right)
     best, lowest = np.zeros(count), math.inf
     for chosen in range(1, 1 << count):

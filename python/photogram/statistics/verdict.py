@@ -1,4 +1,4 @@
-"""The verdict on an adjustment: whether its result can be used, and if not, the reason.
+"""The verdict on an adjustment: whether its result can be used, and why not.
 
 The first applicable rule of an ordered list (:data:`RULES`) defines the headline, the exit code and the next
 steps. The other applicable rules follow as lines. The verdict contains every test with its distribution,
@@ -88,7 +88,7 @@ class Verdict:
         return EXIT_NOT_USABLE if strict and self.warning and self.exit == 0 else self.exit
 
     def document(self) -> dict[str, Any]:
-        """Return the verdict for JSON documents: sentences, and `messages` with codes and fields."""
+        """Return the verdict for JSON: sentences, and `messages` with fields."""
         listed: dict[str, tuple[Text, ...]] = {name: getattr(self, name) for name in _LISTED}
         return {
             "code": self.code,
@@ -123,7 +123,7 @@ class Rule:
 def fitting_rules(
     rules: Iterable[Rule], evidence: Any, codes: list[str] | None = None
 ) -> list[tuple[Rule, Phrase, int]]:
-    """Return the applicable rules with messages and exit codes; rules that forbid the use are first.
+    """Return applicable rules with messages and exit codes, forbidding ones first.
 
     `codes` receives the codes of these rules, for the conditions of later rules.
     """
@@ -238,7 +238,7 @@ def _gross_errors(e: Evidence) -> Phrase | None:
 
 
 def _common_error(e: Evidence) -> Phrase | None:
-    """Return the errors that sets of observations have in common; hints and patterns of a lens are better."""
+    """Return common errors of sets, unless hints or a lens pattern explain better."""
     if not e.found.common or "hint" in e.codes or e.lens:
         return None
     code = "verdict.common-error" if e.found.common_is_harmful else "verdict.common-error.look"
@@ -275,7 +275,7 @@ def _removed(e: Evidence) -> Phrase | None:
 
 
 def _set_aside(much: bool, e: Evidence) -> Phrase | None:
-    """Return the observations rejected by the initial orientation, for many or few of them."""
+    """Return observations rejected by initial orientation, for many or few."""
     found = e.found.set_aside
     if found is None or (found.images > MOST_IMAGES) is not much:
         return None
@@ -303,7 +303,7 @@ def _intersected(e: Evidence) -> Phrase | None:
 
 
 def _common_factor(far: bool, e: Evidence) -> Phrase | None:
-    """Return the common factor of all standard deviations: an implausible one (`far`), or a smaller one."""
+    """Return an implausible common factor of sd (`far`), or a smaller one."""
     if not e.high or e.gross or e.pattern or e.found.intersected or _is_far(e) is not far:
         return None
     if any(each.significant for each in e.found.components):

@@ -1,1 +1,1 @@
-"""Iterative data snooping: detection and removal of gross errors, for any observations."""
+"""Iterative data snooping: detection and removal of gross errors."""

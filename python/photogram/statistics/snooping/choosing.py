@@ -1,4 +1,4 @@
-"""Selection of groups to remove in a round: exact if R of all rows is available, else by a bound.
+"""Selection of groups to remove in a round: exact with complete R, else bounded.
 
 If R of all rows is too large, several groups are removed in one round. No other removed group may be on the
 same point, and each must satisfy
@@ -105,7 +105,7 @@ class Choosing:
     def _sequences(
         self, conditional: Conditional, groups: Indices, most: float = math.inf
     ) -> list[list[Chosen]]:
-        """Select groups of each block while the next is significant, or masks a significant one.
+        """Select groups of each block while the next is significant or masks one.
 
         `groups` are (n, K) numbers of the groups of each block.
         """
@@ -176,7 +176,7 @@ class Choosing:
         units: Sequence[UnitWeight],
         most: float = math.inf,
     ) -> list[Chosen]:
-        """Select in blocks of groups with known R; blocks with the same group sizes together."""
+        """Select in blocks with known R; blocks of equal group sizes together."""
         all_sizes = np.diff(self.suspects.row_starts)
         alike: dict[tuple[int, ...], list[int]] = {}
         for place, (groups, _, _) in enumerate(blocks):
@@ -243,7 +243,7 @@ def _among_all(choice: Chosen, places: Indices, offsets: Indices) -> Chosen:
 
 
 class _Load:
-    """Bound of the effect of the selected groups on other test values by photo: the sum of sqrt(h_i T_i)."""
+    """Bound of effects on other test values by photo: the sum of sqrt(h_i T_i)."""
 
     def __init__(self, suspects: Suspects, tests: Tests) -> None:
         self.suspects, self.tests = suspects, tests

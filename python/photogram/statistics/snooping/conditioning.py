@@ -1,4 +1,4 @@
-"""Conditional tests of groups, each as if the previous ones were removed, without a new adjustment.
+"""Conditional tests of groups, each after the removal of the previous ones.
 
 v and R are the residuals of unit weight of some rows and their cofactors, and S are the removed rows. Then
 
@@ -46,7 +46,7 @@ class UnitWeight:
         return statistic / dimension / left if left > 0 else math.inf
 
     def odds(self, first: tuple[float, int], second: tuple[float, int]) -> float:
-        """Return the likelihood ratio of two groups from T and m' of each (Akaike weights).
+        """Return the likelihood ratio of two groups from T and m' (Akaike weights).
 
         T refers to linear equations. A large error has a nonlinear effect of the order T^(3/2), which is
         removed from the difference of two T.
@@ -127,7 +127,7 @@ class Conditional:
         return group_tests(r, v, omega, freedom, known=self.units[0].known)
 
     def best(self, allowed: Bools) -> Indices:
-        """Return (n,) the least probable allowed group, the first of equal ones; -1 for none."""
+        """Return (n,) the first least probable allowed groups; -1 without any."""
         possible = allowed & (self.dimension > 0) & ~np.isnan(self.log_probability)
         log_p = np.where(possible, self.log_probability, math.inf)
         least = log_p.min(axis=1, initial=math.inf)
@@ -148,7 +148,7 @@ class Conditional:
     def choose(
         self, blocks: Indices, places: Indices, rows: Indices, allowed: Bools, log_limit: Floats
     ) -> list[Chosen]:
-        """Remove rows of one group of each of some blocks, and test the others without them.
+        """Remove rows of one group per block, and test the others without them.
 
         Rows are padded by -1.
         """

@@ -1,4 +1,4 @@
-"""The rounds of data snooping: select, remove, adjust, test the removed groups again."""
+"""The rounds of data snooping: select, remove, adjust, test again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The start of data snooping with many gross errors, or with errors that make the adjustment diverge.
+"""The start of data snooping with many gross errors or divergence.
 
 With many gross errors, robust factors of standard deviations and a robust adjustment are used.
 
@@ -32,7 +32,7 @@ ENOUGH = 20  # Smallest number of test values for a median
 
 
 def scales(work: TakingOut) -> tuple[dict[str, float], Floats]:
-    """Return robust factors k by type if standard deviations are too small, and k^2 by group."""
+    """Return robust factors k by type for small standard deviations, and k^2 by group."""
     suspects, tests = work.suspects, work.tests
     squares = np.ones(len(suspects))
     if not work.settings.known:
@@ -76,7 +76,7 @@ SCALES = 5  # Largest number of robust adjustments
 
 
 def needs_robust_start(work: TakingOut) -> bool:
-    """Whether too many observations disagree for tests of single groups, or the adjustment fails."""
+    """Whether too many observations disagree for single tests, or adjustment fails."""
     if work.settings.robust is not None:
         return work.settings.robust
     if work.standing.status != "converged":
@@ -91,7 +91,7 @@ def needs_robust_start(work: TakingOut) -> bool:
 
 
 def start_robustly(work: TakingOut) -> None:
-    """Exclude points whose robust weights nearly vanish, and test them against all others.
+    """Exclude points with tiny robust weights, and test them against others.
 
     A robust adjustment reveals an erroneous point, but not its erroneous ray. Both of two rays lose their
     weight, and often a good one near a large error does.
@@ -138,7 +138,7 @@ def start_without(
 
 
 def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
-    """Return sizes of residuals in a robust adjustment, and the factor of its standard deviations.
+    """Return robust residual sizes, and the factor of their standard deviations.
 
     None if no robust adjustment converges. Many gross errors increase the median of all residuals. So the
     factor is estimated again from robust residuals, until it is stable.
@@ -165,7 +165,7 @@ def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
 def _on_points_aside(
     work: TakingOut, points: list[int], candidates: Indices, first: Tests
 ) -> tuple[list[Chosen], set[int]]:
-    """Adjust without some points and all candidates; select on these points; return the tested points."""
+    """Adjust without some points and candidates; select on them; return tested points."""
     out = work.out.copy()
     out.points |= set(points)
     aside = np.isin(work.suspects.points, points)
@@ -185,7 +185,7 @@ BENT = 10.0  # Median of test values of a distorted network (sd)
 
 
 def _runs_off(work: TakingOut) -> bool:
-    """Whether the adjustment diverges, or its residuals exceed any plausible standard deviation."""
+    """Whether the adjustment diverges, or residuals exceed plausible sizes."""
     if work.standing.status != "converged":
         return True
     everything = values(work, np.ones(len(work.suspects), dtype=bool))
@@ -193,7 +193,7 @@ def _runs_off(work: TakingOut) -> bool:
 
 
 def begun(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] | None) -> TakingOut:
-    """Adjust a network for the first time; start from a consensus if the adjustment diverges.
+    """Adjust a network first; start from a consensus if it diverges.
 
     An observation of a point with other rays is tested against its prediction. If fewer than two other rays
     remain, the point is excluded, and each observation is tested as if it were included. So both of two rays
@@ -282,7 +282,7 @@ def _still_out(work: TakingOut, points: list[int], images: Indices, tests: Tests
 
 
 def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:
-    """Exclude groups; return the points with too few remaining rays, which are excluded as well."""
+    """Exclude groups; return points with too few rays, which are excluded too."""
     suspects = trial.suspects
     for group in groups:
         out.rows[suspects.rows(group)] = True
@@ -297,7 +297,7 @@ def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:
 
 
 def _predicted(work: TakingOut, groups: Indices) -> tuple[list[Removal], int]:
-    """Return entries of observations that contradict their prediction, and the number of agreeing ones."""
+    """Return contradicting predicted observations, and the number of agreeing ones."""
     level = work.level.limit(0)
     standing = work.standing
     variance = standing.weighted_sum_of_squares / max(standing.degrees_of_freedom, 1)

@@ -1,4 +1,4 @@
-"""Groups of observations that may contain a joint gross error, and the interface of their network."""
+"""Groups that may contain a joint gross error, and their network interface."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ class Tests:
     error_sd: Floats
 
     def testable(self, row_starts: Indices) -> Bools:
-        """Return (G,) groups with a direction whose errors are notable in their own residuals."""
+        """Return (G,) groups with a direction of notable errors in own residuals."""
         largest = np.maximum.reduceat(np.nan_to_num(self.redundancy), row_starts[:-1])
         return np.asarray(self.active & (self.rank > 0) & (largest > TESTABLE))
 
@@ -193,13 +193,13 @@ class Trial(Protocol):
         """Test the excluded rows of groups; None if they cannot be predicted."""
 
     def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return, for the points of some groups, all groups there, residuals of unit weight, and R."""
+        """Return all groups at points of some groups, unit-weight residuals, and R."""
 
     def response(self) -> tuple[Floats, Floats]:
         """Return residuals of unit weight (M,) and R (M, M) of all rows; zero if excluded."""
 
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return, for excluded points, all groups there with residuals and R as if included.
+        """Return all groups at excluded points with residuals and R as if included.
 
         Each point is separate, based on the unknowns from the others; empty if these are undetermined.
         """
@@ -212,4 +212,4 @@ class Trial(Protocol):
         """
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
-        """Return points with too few rays, and photos without support, after the exclusion of a group."""
+        """Return points with few rays, and unsupported photos, without a group."""

@@ -1,4 +1,4 @@
-"""A network during data snooping: exclusions, state of the rest, log, and reinstatement."""
+"""A network during data snooping: exclusions, state, log, reinstatement."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class TakingOut:
         *,
         out: int = 0,
     ) -> None:
-        """Add a round to the log: the state before it, with `out` removals, and its changes."""
+        """Add a round to the log: its previous state, `out` removals, and changes."""
         self.rounds.append(
             Round(
                 number=number,
@@ -101,7 +101,7 @@ class TakingOut:
         return allowed
 
     def testable(self) -> Bools:
-        """Return (G,) groups with a direction whose errors are notable in their own residuals."""
+        """Return (G,) groups with a direction of notable errors in own residuals."""
         return self.tests.testable(self.suspects.row_starts)
 
     def as_it_was(self, group: int, tests: Tests) -> Removal:
@@ -148,7 +148,7 @@ class TakingOut:
     def entry(
         self, group: int, rows: Indices, number: int, *, error: Floats, error_sd: Floats, **values: Any
     ) -> Removal:
-        """Return the entry of a group, or of some of its rows, in a round; see :class:`Removal`."""
+        """Return the entry of a group or some of its rows; see :class:`Removal`."""
         suspects = self.suspects
         subject, components = suspects.name(group), tuple(map(suspects.row_name, rows.tolist()))
         if len(rows) < len(suspects.rows(group)):
@@ -239,7 +239,7 @@ class TakingOut:
                 yield Phrase("snooping.single-ray", {"name": self.suspects.name(group)})
 
     def adjust(self, out: Out) -> None:
-        """Adjust without exclusions and test the rest; raise LostSupportError if undetermined."""
+        """Adjust without exclusions and test; raise LostSupportError if undetermined."""
         self.standing = self.trial.adjust(out)
         self.out = out
         self.tests = self.trial.tests()
@@ -269,7 +269,7 @@ def take_back(work: TakingOut, number: int) -> list[int]:
 
 
 def agreeing(work: TakingOut) -> list[int]:
-    """Test exclusions against the rest, and return the best agreeing one, or all independent ones."""
+    """Test exclusions; return the best agreeing one, or all independent ones."""
     places = [place for place, each in enumerate(work.log) if each.is_out and each.rows]
     if not places:
         return []
@@ -292,7 +292,7 @@ def agreeing(work: TakingOut) -> list[int]:
 
 
 def _apart(work: TakingOut, places: list[int]) -> list[int]:
-    """Return the first if each must be tested singly, otherwise the ones without a common photo."""
+    """Return the first for single tests, else the ones without a common photo."""
     if work.trial.whole:
         return places[:1]
     taken: set[int] = set()
@@ -322,7 +322,7 @@ def with_prediction(work: TakingOut, place: int) -> Removal:
 
 
 def log_probability(work: TakingOut, statistic: Floats, dimension: Indices, groups: Indices) -> Floats:
-    """Return log-probabilities of excluded observations relative to the network without them."""
+    """Return log-probabilities of exclusions relative to the network without them."""
     if work.settings.known:
         return log_chi_square(statistic / work.scales[groups], dimension)
     f = work.standing.degrees_of_freedom

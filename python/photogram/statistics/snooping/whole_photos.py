@@ -24,7 +24,7 @@ BAD_PHOTOS = 5  # Largest number of photos that are removed before tests of obse
 
 
 def take_bad_photos_out(work: TakingOut) -> None:
-    """Remove each photo whose observations all disagree: another exposure, or wrong names.
+    """Remove photos with disagreeing observations: wrong exposure or names.
 
     Such a photo affects all around it, so that single observations cannot be tested. The median of its test
     values is conspicuous, and a few gross errors do not change it. If an observed station causes it, the
@@ -77,7 +77,7 @@ def _photo_out(work: TakingOut, photo: int, number: int, reason: Phrase) -> int 
 
 
 def take_photo(work: TakingOut, out: Out, photo: int) -> list[Phrase]:
-    """Exclude a photo with all its observations; return messages on dependent exclusions."""
+    """Exclude a photo with all observations; return dependent exclusions."""
     suspects = work.suspects
     own = suspects.on_photo(photo)
     out.rows[np.concatenate([suspects.rows(group) for group in own.tolist()])] = True
@@ -95,7 +95,7 @@ def take_photo(work: TakingOut, out: Out, photo: int) -> list[Phrase]:
 def log_photo(
     work: TakingOut, photo: int, number: int, before: Standing | None, consequences: tuple[Phrase | str, ...]
 ) -> int:
-    """Log the removal of a photo, with the decrease of Omega; return the number of the entry.
+    """Log the removal of a photo with its decrease of Omega; return the entry.
 
     `before` is None if the network was never adjusted with the photo.
     """
@@ -131,14 +131,14 @@ def log_photo(
 
 
 def _largest(work: TakingOut, photo: int) -> float:
-    """Return the largest test value of the observations of a photo, in standard deviations."""
+    """Return the largest test value of a photo's observations, in sd."""
     own = work.suspects.on_photo(photo)
     own = own[(work.suspects.kinds[own] == 0) & work.testable()[own]]
     return float(np.sqrt(work.tests.statistic[own] / work.tests.rank[own]).max(initial=0.0))
 
 
 def _middles(work: TakingOut) -> Floats:
-    """Return the median of the test values of the observations of each photo, in standard deviations."""
+    """Return median test values of observations of photos, in sd."""
     suspects, tests = work.suspects, work.tests
     tested = (suspects.kinds == 0) & work.testable()
     size = np.sqrt(tests.statistic / np.maximum(tests.rank, 1))
@@ -153,7 +153,7 @@ def _middles(work: TakingOut) -> Floats:
 
 
 def _is_by_station(work: TakingOut, photo: int, middle: float) -> bool:
-    """Whether the observations of a photo agree without its observed position and attitude."""
+    """Whether a photo's observations agree without its observed pose."""
     own = work.suspects.on_photo(photo)
     stations = own[(work.suspects.kinds[own] != 0) & work.tests.active[own]]
     if not stations.size:
