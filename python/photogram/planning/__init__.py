@@ -1,4 +1,4 @@
-"""Planning: predicted quality of a network before flight, for several patterns of control."""
+"""Planning: predicted quality of a network for patterns of control."""
 
 from photogram.planning.pattern import ControlQuality, MotionQuality, Pattern, PhotoQuality, PointQuality
 

@@ -1,4 +1,4 @@
-"""The document of a plan: compared patterns of a network, with tables of each pattern as layers."""
+"""The document of a plan: compared patterns, their tables as layers."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def _pattern_members(pattern: Pattern) -> dict[str, object]:
 
 
 def points_table(pattern: Pattern) -> Table:
-    """Return the quality of new points, one row per group, also of groups without points."""
+    """Return the quality of new points, one row per group, also empty groups."""
     axes = tuple(Axis.of(axis, pattern.block.linear_unit) for axis in pattern.axes)
     groups = partial(of_each, pattern.points)
     columns = [
@@ -299,7 +299,7 @@ def _remarks(patterns: Sequence[Pattern]) -> list[str]:
 
 
 def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
-    """Return a plot with one panel per pattern, with common scales of length and colour."""
+    """Return a plot with one panel per pattern and common scales."""
     heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
     if heights.size == 0:
         raise PhotogramError(phrase("plan.new-points"))

@@ -59,7 +59,7 @@ class Plan(Documented):
         return plan_document(self.patterns)
 
     def plot(self) -> Plot:
-        """Plot the patterns in plan, with the expected standard deviation in height as colour.
+        """Plot patterns in plan, with expected height deviations as colours.
 
         Raises
         ------

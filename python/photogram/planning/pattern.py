@@ -1,4 +1,4 @@
-"""One pattern of a plan: a predicted block with standard deviations as lengths, locations and scale.
+"""One pattern of a plan: predicted block, deviations, locations, scale.
 
 Points are grouped by their location in the block, not by their distance to control. So groups of different
 patterns contain the same points. The accuracy of blocks is usually tabulated this way: it is low at the
@@ -160,7 +160,7 @@ class Pattern:
 
     @property
     def axes(self) -> tuple[str, str, str]:
-        """Names of the components of positions: X, Y, Z, or E (east), N (north), h (height)."""
+        """Component names of positions: X, Y, Z, or E (east), N (north), h (height)."""
         return ("E", "N", "h") if self.block.geographic else ("X", "Y", "Z")
 
     @cached_property
@@ -244,7 +244,7 @@ class Pattern:
 
     @cached_property
     def motion(self) -> list[MotionQuality]:
-        """Readout times, velocities and rates of photos, trajectories; empty without motion."""
+        """Readout times, velocities and rates; empty without motion."""
         block, trajectories = self.block, self.result.trajectories
         if not block.timed:
             return []
@@ -359,7 +359,7 @@ def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
 
 
 def _axes(points: Floats) -> Floats:
-    """Return the unit vectors (rows) along the sides of the smallest rectangle around points.
+    """Return unit vectors (rows) along the smallest rectangle around points.
 
     One of its sides is on the convex hull (Freeman and Shapira, 1975).
     """

@@ -1,4 +1,4 @@
-"""Names, components and units of the parts of networks, and display units of differences."""
+"""Names, components and units of parts of networks, and display units."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def point_axes(block: Block) -> tuple[Axis, ...]:
 
 
 def image_axes(unit: str) -> tuple[Axis, ...]:
-    """Return the axes of image coordinates; residuals in mm are displayed in micrometres."""
+    """Return the axes of image coordinates; residuals in mm have micrometres."""
     small, factor = ("um", 1000.0) if unit == "mm" else (unit, 1.0)
     return tuple(Axis(name, unit, "", f"_{unit}", small, factor) for name in "xy")
 
@@ -107,7 +107,7 @@ def block_terms(result: Result) -> Terms:
 
 
 def determined(result: Result) -> Determined:
-    """Return positions and poses of a block with their cofactors, geocentric if it is geographic."""
+    """Return positions and poses of a block with cofactors, geocentric if geographic."""
     block, points, stations = result.block, result.point_positions, result.photo_positions
     cofactors = result.point_cofactors
     if block.spheroid is not None:

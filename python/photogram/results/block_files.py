@@ -1,4 +1,4 @@
-"""Writing and reading the result of a block as files of a folder (`docs/results.md`)."""
+"""Writing and reading the result of a block as files (`docs/results.md`)."""
 
 from __future__ import annotations
 

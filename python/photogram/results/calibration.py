@@ -1,11 +1,11 @@
 """Results of self-calibrations: tests and correlations of camera parameters.
 
-A parameter p with cofactor q has the standard deviation s = sigma0 sqrt(q). Its test value t = (p - p_ref) /
-s has Student's distribution with the degrees of freedom of the adjustment, or the normal distribution if the
-unit weight is known a priori. p_ref is 0 for distortion terms and the given value for focal length and
-principal point. R^2 = 1 - 1 / (n q) is the squared multiple correlation with all other unknowns; n is the
-diagonal of the normal equations. For a group of g terms, p' Q^-1 p / (g sigma0^2) has Fisher's F distribution
-with g and these degrees of freedom.
+A parameter p with cofactor q has the standard deviation s = sigma0 sqrt(q). Its test value is t = (p - p_ref)
+/ s. Its distribution is Student's with the degrees of freedom of the adjustment, or normal if the unit weight
+is known a priori. p_ref is 0 for distortion terms and the given value for focal length and principal point.
+R^2 = 1 - 1 / (n q) is the squared multiple correlation with all other unknowns; n is the diagonal of the
+normal equations. For a group of g terms, p' Q^-1 p / (g sigma0^2) has Fisher's F distribution with g and
+these degrees of freedom.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ class Calibration:
 
 
 def calibrations(result: Result) -> list[Calibration]:
-    """Return the calibrations of all cameras with unknown parameters; empty without covariances.
+    """Return the calibrations of cameras with unknown parameters, if covariances exist.
 
     Correlations with photo poses require a factorization of the normal equations and a solution for each
     parameter. They are computed for the first 20 cameras, and not for blocks that were adjusted in parts.
@@ -224,7 +224,7 @@ def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> Gr
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
-    """Return groups of estimated terms: by letter, radial terms also without the first, Gruen's by degree."""
+    """Return groups of terms: by letter, radial also without the first, Gruen's by degree."""
     by_family: dict[str, list[str]] = {}
     for k in camera.estimated:
         name = camera.names[k]

@@ -1,4 +1,4 @@
-"""The section of adjusted cameras (tests, correlations, distortion) and fixed cameras."""
+"""The section of cameras: adjusted ones with tests and distortion, fixed ones."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class AdjustedCamera(Brief):
         return np.flatnonzero((sd > 0) & np.isfinite(sd)).tolist()
 
     def observed(self) -> Camera:
-        """Return the camera as an observation for other adjustments: estimated parameters and covariances.
+        """Return the camera as an observation of estimated parameters with covariances.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class AdjustedCamera(Brief):
 def adjusted_cameras(
     block: Block, solution: _photocore.BlockSolution, scale: float
 ) -> tuple[AdjustedCamera, ...]:
-    """Return the adjusted cameras of a block with scaled covariances; none for given principal distances."""
+    """Return adjusted cameras with scaled covariances; none for principal distances."""
     if not block.cameras:
         return ()
     found = []

@@ -1,4 +1,4 @@
-"""Check points of an adjusted block: known coordinates that were not used in the adjustment."""
+"""Check points of an adjusted block: known coordinates that were not used."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class CheckPoints:
 def check_points(result: Result) -> CheckPoints:
     """Return the check points of a result with single and joint tests.
 
-    Blocks that were adjusted in parts have no covariances between points, and therefore no joint test.
+    Blocks that were adjusted in parts lack covariances between points, and therefore a joint test.
     """
     block = result.block
     rows = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
@@ -97,7 +97,7 @@ def _agreement(result: Result, found: CheckPoints) -> Agreement:
 
 
 def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:
-    """Return the name of a point; a module-level function, so that results can be pickled."""
+    """Return the name of a point; module-level, so that results can be pickled."""
     return names[place[0]]
 
 
@@ -114,7 +114,7 @@ def tested_together(block: Block) -> list[int]:
 
 
 def point_kinds(block: Block) -> NDArray[np.str_]:
-    """Return (n,) types: `control` with an observed component, `check` if known only, else `pass`."""
+    """Return (n,) types: `control` if observed, `check` if known only, else `pass`."""
     held: Bools = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     held[observed_control(block)] = True
     known = np.isfinite(block.point_positions).any(axis=1)
@@ -140,7 +140,7 @@ def _apart(
 
 
 def _given(block: Block, rows: Indices, differences: Floats) -> tuple[Floats, Bools]:
-    """Return standard deviations of given coordinates, and the points with assumed ones."""
+    """Return standard deviations of given coordinates, and points with assumed ones."""
     own = np.full((len(rows), 3), math.nan)
     if block.point_check_sd is not None:
         own = block.point_check_sd[rows]

@@ -57,11 +57,11 @@ class VarianceComponents(Judged, Documented, Brief):
 
     @property
     def worth_changing(self) -> list[Component]:
-        """Components that differ from 1 significantly, and by more than 25 percent of the deviation."""
+        """Components significantly different from 1, by more than 25 percent of the sd."""
         return [each for each in self.components if each.worth_changing]
 
     def plot(self) -> Plot:
-        """Plot factors of standard deviations with 95 percent intervals; circles are fixed components."""
+        """Plot factors of standard deviations with intervals; circles are fixed components."""
         marks: list[Mark] = []
         for place, each in enumerate(self.components):
             at = np.array([[each.factor_of_sd, place]])
@@ -141,7 +141,7 @@ class VarianceComponents(Judged, Documented, Brief):
 
 
 def weighed_document(found: VarianceComponents, network: Document) -> Document:
-    """Return the document of the network with the given weights, with findings on the components."""
+    """Return the document of the network with findings on the components."""
     own = found.document()
     sections = [*own.sections, *network.sections]
     return replace(network, judgements=own.judgements, advice=own.advice, sections=sections)

@@ -1,4 +1,4 @@
-"""Covariances between any unknowns of an adjusted network, and of functions of them."""
+"""Covariances between unknowns of an adjusted network, and of functions of them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Things:
 
     @classmethod
     def of(cls, every: Sequence[Any], components: str) -> Things:
-        """Return cameras or common unknowns; an attribute contains the names of their unknowns."""
+        """Return cameras or common unknowns; an attribute has the names of unknowns."""
         names, unknowns = [each.name for each in every], [getattr(each, components) for each in every]
         return cls(names, unknowns, [each.values for each in every], [each.sd for each in every])
 
@@ -186,14 +186,14 @@ class Propagated:
 
 
 class Covariances:
-    """The covariances of an adjusted network in its datum; contains a factor of the normal equations.
+    """The covariances of an adjusted network in its datum, with a factor.
 
     A selection is a type with a name, `("point", "P12")`, several names, `("photo", ["1", "2"])`, or None for
     all that were adjusted, `("camera", None)`; or a list of selections. Types are `photo` (position, omega,
-    phi, kappa), `step` (position of a photo and rotation about its own axes, which is never singular),
-    `point`, `camera` and `unknown` (common unknowns of observations). In collections, photos and points are
-    identified by number. Types are `photo` (all parameters), `pose` and `camera` (the first six and the other
-    parameters), and `point`. Rows and columns have this order.
+    phi, kappa), `point`, `camera`, `unknown` (common unknowns of observations) and `step`. A `step` is the
+    position of a photo and its rotation about its own axes, which is never singular. In collections, photos
+    and points are identified by number. Types are `photo` (all parameters), `pose` and `camera` (the first
+    six and the other parameters), and `point`. Rows and columns have this order.
 
     Units are the units of the result: the linear unit, radians, the units of cameras.
     """
@@ -246,7 +246,7 @@ class Covariances:
         return found
 
     def combined(self, partials: Floats, selection: Selection) -> Floats:
-        """Return the (m, m) covariance matrix of m linear combinations of a selection, J Q J' scaled.
+        """Return the (m, m) covariance matrix J Q J' of linear combinations, scaled.
 
         The number of solutions is the number of combinations, for any number of unknowns.
 
@@ -286,7 +286,7 @@ class Covariances:
             return np.asarray(covariance / np.outer(left, right))
 
     def _deviations(self, selection: Selection) -> Floats:
-        """Return standard deviations; of rotation steps from the core, others from the result."""
+        """Return standard deviations; of rotation steps from the core."""
         selected = self._adjusted.selected(selection)
         if all(kind != "step" for kind, _ in selected.rows):
             return selected.sd
@@ -395,7 +395,7 @@ def _partials(function: Callable[..., Any], selected: Selected, value: Floats) -
 
 
 def _complex_partials(function: Callable[..., Any], selected: Selected, differences: Floats) -> Floats:
-    """Return J by complex steps if possible and equal to differences, else by differences."""
+    """Return J by complex steps if possible and equal to differences."""
     partials = np.zeros_like(differences)
     try:
         for k in np.flatnonzero(selected.sd > 0).tolist():

@@ -130,7 +130,7 @@ def datum_of(
 
 
 def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> list[Message]:
-    """Return messages on the datum, or the weights of photos, of a block without control."""
+    """Return messages on the datum, or the photo weights, of a block without control."""
     messages = []
     if datum.lost > NOTABLE_LOSS:
         messages.append(Message(phrase("free.rounding", share=datum.lost)))
@@ -149,7 +149,7 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
 
 
 def _levelled(block: Block, held: int) -> Phrase | None:
-    """Return the motions that a plumb line or equal heights leave undetermined without other datum."""
+    """Return motions that a plumb line or equal heights leave undetermined."""
     kinds = {type(each) for each in block.observations}
     scale = [] if Distance in kinds else ["scale"]
     beyond, kinds = held - 4 - len(scale), kinds - {Distance}

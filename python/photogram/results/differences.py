@@ -1,4 +1,4 @@
-"""Differences of two results: values in standard deviations, and standard deviations."""
+"""Differences of values and standard deviations of two results."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class Differences:
 def differences(first: Result, second: Result) -> Differences:
     """Return the differences between two results for items with equal names.
 
-    Attitudes may differ by full rotations. For unknowns that have no standard deviation or are fixed in the
-    first result, only standard deviations are compared.
+    Attitudes may differ by full rotations. For unknowns without standard deviation or fixed in the first
+    result, only standard deviations are compared.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ def _images(result: Result, camera: AdjustedCamera) -> Floats:
 
 
 def _largest_radius(xy: Floats, camera: Camera) -> float:
-    """Return the largest distance of images from the principal point: measured, or ideal if forward."""
+    """Return the largest distance of images from the principal point; ideal if forward."""
     if not len(xy):
         return 0.0
     if _is_backward(camera):
@@ -163,7 +163,7 @@ def distortion_curve(
 
 
 def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> Floats:
-    """Return (r,) standard deviations of a curve with the (r, t) partials of some parameters.
+    """Return (r,) standard deviations of a curve with (r, t) partials.
 
     `covariance` is the matrix of all parameters of the camera.
     """
@@ -187,7 +187,7 @@ def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) ->
 
 
 def radial_part(camera: Camera) -> Camera:
-    """Return a camera with radial terms only: without principal point, decentring, affinity."""
+    """Return a camera with radial terms only, without principal point."""
     keep = {"c", "f", "fx", "fy", *camera.constants, *filter(RADIAL.fullmatch, camera.names)}
     return camera.replace(
         parameters={name: value if name in keep else 0.0 for name, value in camera.parameters.items()},

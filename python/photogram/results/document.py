@@ -1,4 +1,4 @@
-"""The text report, HTML page and JSON document (`docs/json.md`) of an adjusted block."""
+"""Text report, HTML page and JSON document (`docs/json.md`) of a block."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def size_of(result: Result) -> list[tuple[str, str]]:
 
 
 def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
-    """Return the bandwidths in the 1987 program, in the order of the input and in the chosen order.
+    """Return the bandwidths in the 1987 program, in input order and in chosen order.
 
     A sentence, and names with values.
     """

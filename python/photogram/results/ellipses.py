@@ -30,7 +30,7 @@ class Ellipses:
     confidence: float | None
 
     def outlines(self, centres: Floats, scale: float = 1.0) -> Floats:
-        """Return (n, 37, 2) closed outlines about (n, 2) centres, enlarged; 36 vertices each."""
+        """Return (n, 37, 2) closed outlines about (n, 2) centres, enlarged."""
         around = np.linspace(0.0, math.tau, VERTICES + 1)
         along, across = (
             scale * np.outer(self.major, np.cos(around)),
@@ -44,7 +44,7 @@ class Ellipses:
 
 
 def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Ellipses:
-    """Return the error ellipses of (n, 2, 2) or larger covariance matrices, of east and north in this order.
+    """Return the error ellipses of (n, 2, 2) or larger covariances of east and north.
 
     The axes are the roots of the eigenvalues, times the root of the quantile of chi-square with two degrees
     of freedom, -2 ln(1 - confidence): 2.4477 for 95 %. The azimuth is half of atan2(2 s_en, s_nn - s_ee). NaN

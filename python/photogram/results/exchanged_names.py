@@ -1,4 +1,4 @@
-"""Exchanged names of two points on a photo: each image fits the position of the other point.
+"""Exchanged names of two points on a photo: each image fits the other point.
 
 For a point with its rays, one of them suspected, T is the minimum of the sum of squared residuals in standard
 deviations. Given coordinates are included, and photos are fixed at their adjustment by the other
@@ -129,7 +129,7 @@ class _Fit:
         self.start = np.concatenate([[0], np.cumsum(counts)])
 
     def of(self, wanted: list[tuple[int, int]]) -> list[tuple[float, int]]:
-        """Return T and its dimension for points with a ray through another image of the photo.
+        """Return T and its dimension for points with a ray through another image.
 
         Each pair of `wanted` is an image of the point, and the image that replaces it.
         """
@@ -159,7 +159,7 @@ class _Fit:
         return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
 
     def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
-        """(n,) minimum sums of squares of points; infinite if rays do not intersect in front of the cameras.
+        """(n,) minimum sums of squares; infinite if rays do not meet before the cameras.
 
         `rows` are the images of the points `own`.
         """

@@ -145,7 +145,7 @@ class Features:
         return quantity.frame(deviation_quantities(self))
 
     def table(self) -> pd.DataFrame:
-        """Return the quantities as a data frame: value, standard deviation, k and U = k sd of each."""
+        """Return the quantities as a data frame: value, sd, k and U = k sd of each."""
         import pandas as pd
 
         return pd.DataFrame(self.columns())
@@ -215,7 +215,7 @@ def directions(kind: str) -> tuple[str, ...]:
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return points by names and patterns, without repetition, in the order of the request."""
+    """Return points by names and patterns, without repetition, in requested order."""
     known, found = set(names), {}
     for each in wanted:
         if each in known:

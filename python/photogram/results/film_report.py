@@ -1,4 +1,4 @@
-"""Films, fiducial marks and scanners as tables, a section and members of JSON documents."""
+"""Films, fiducial marks and scanners as tables, sections and JSON members."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def film_patterns(result: Result) -> list[VectorField]:
 
 
 def _deformation(result: Result, pattern: Pattern) -> VectorField:
-    """Return D(q) over the format: the reading of an otherwise unchanged film, minus q."""
+    """Return D(q) over the format: reading of an otherwise unchanged film, minus q."""
     own = {id(each.given): each.position for each in result.unknowns}
     numbers = np.asarray(pattern.numbers)
     low, high = np.full(2, -numbers[0]), np.full(2, numbers[0])
@@ -174,7 +174,7 @@ def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
 
 
 def form_table(result: Result) -> list[Quantity]:
-    """Return the affine forms, `reading = a0 + a1 x + a2 y`, and derived values with deviations."""
+    """Return affine forms, `reading = a0 + a1 x + a2 y`, and derived values with sd."""
     forms = list(result.film_forms.values())
     unit = "px" if any(film.readings.pitch != 1.0 for _, film in result.films) else "mm"
     names = [f"{which}{k}" for which in "xy" for k in range(3)]

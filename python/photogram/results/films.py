@@ -1,4 +1,4 @@
-"""Adjusted films of photos and fiducial marks; `film_report` contains their tables."""
+"""Adjusted films of photos and fiducial marks; `film_report` has the tables."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class OnFilm:
 
     @property
     def fiducials(self) -> dict[str, AdjustedUnknown]:
-        """The fiducial marks by name of camera and mark: positions in the camera's frame, mm."""
+        """Fiducial marks by name of camera and mark: positions in the camera's frame, mm."""
         return {each.name: each for each in self.unknowns if isinstance(each.given, Mark)}
 
     @property
@@ -96,7 +96,7 @@ class OnFilm:
 
     @property
     def refined(self) -> tuple[Floats, Floats]:
-        """(m, 2) images in the frames of their cameras by the adjusted films, mm, and standard deviations.
+        """(m, 2) images in camera frames by adjusted films, mm, and standard deviations.
 
         Distortion is not removed. Standard deviations are those of the readings only, without the common
         errors of film, marks and scanner. NaN for photos without film.
@@ -114,7 +114,7 @@ class OnFilm:
 
     @property
     def film_forms(self) -> dict[str, Affine]:
-        """The affine form of the film of each photo, `reading = a0 + a1 x + a2 y`, by name of photo.
+        """Affine form of each photo's film, `reading = a0 + a1 x + a2 y`, by photo name.
 
         Other deformations of films are omitted, and the scanner is assumed to be without error. Standard
         deviations are NaN if m is common to a roll.

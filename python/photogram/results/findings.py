@@ -64,7 +64,7 @@ def network_findings(
 
 
 def block_findings(result: Result) -> Findings:
-    """Return the tests of a block; standard deviations are given, so the unit weight is known."""
+    """Return the tests of a block; the unit weight is known."""
     # Fixed temporarily to find gross errors before the adjustment of photos.
     intersected = not result.photo_given_sd.any()
     # Data snooping requires the complete block and adjusted photos.
@@ -93,7 +93,7 @@ def block_findings(result: Result) -> Findings:
 
 
 def _iterated(result: Result) -> Phrase | None:
-    """Return the remedy for an exceeded number of iterations; None for other terminations."""
+    """Return the remedy for exhausted iterations; None for other terminations."""
     if result.status != "not converged":
         return None
     weak = any(isinstance(each, Undetermined) for each in result.messages)
@@ -103,7 +103,7 @@ def _iterated(result: Result) -> Phrase | None:
 
 
 def _unproved(result: Result) -> list[Phrase]:
-    """Return the unverified properties of a block: no check points, points with two rays."""
+    """Return unverified properties of a block: no check points, two-ray points."""
     found = []
     if not (result.used_points & (result.point_kinds == "check")).any():
         found.append(Phrase("advice.check-points"))
@@ -144,7 +144,7 @@ def _left_out(result: Result) -> list[Phrase]:
 
 
 def _on_checks(result: Result) -> list[Phrase]:
-    """Return check points with assumed standard deviations, and reasons for missing tests."""
+    """Return check points with assumed sd, and reasons for missing tests."""
     checks, axes = result.check_points, point_axes(result.block)
     if not len(checks.rows):
         return []

@@ -31,7 +31,7 @@ from photogram.words import Phrase, phrase
 def features(
     result: Result, definitions: Mapping[str, Definition], *, k: float = 2.0, coverage: float | None = None
 ) -> Features:
-    """Fit features to adjusted points: distances, lines, planes, circles, spheres, cylinders.
+    """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points.
 
     A feature has the minimum sum of squared distances to its points (Gaussian associated feature). All
     standard deviations follow from the joint covariance of the points (docs/features.md).

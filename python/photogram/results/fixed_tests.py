@@ -1,6 +1,6 @@
 """Score tests of fixed stations, points and lens models, which may be wrong.
 
-Fixed values are not observations: their errors have no residuals, and appear as errors of good observations
+Fixed values are not observations: without residuals, their errors appear as errors of good observations
 nearby. B are the partials of the images by the fixed coordinates, in standard deviations; ~v are the
 residuals. With c = B' ~v and C = B' R B, the weighted sum of squares would decrease by T = c' C^-1 c if they
 were free (Rao's score, :func:`photogram.score_test`). T is chi-square with the number of coordinates.
@@ -48,7 +48,7 @@ class Held:
 
 
 def held_tested(result: Result) -> list[Tested]:
-    """Return tests of the fixed stations and points with the worst images, if residuals are too large.
+    """Return tests of fixed stations and points with the worst images, if required.
 
     Empty if the adjustment is accepted, has not converged, has no covariances, or was done in parts.
     """
@@ -64,7 +64,7 @@ def held_tests(
     suspected_by: Callable[[Floats], Sequence[Held]],
     partials_of: Callable[[], Floats],
 ) -> list[Tested]:
-    """Return the test T of each fixed item, if residuals are too large and covariances exist.
+    """Return the test T of each fixed item, if residuals are too large.
 
     `suspected_by` returns the items to test for (m,) weighted squares of the images. `partials_of` returns
     (p, m, 2) partials of the images by the unknowns of their photos; each item has indices of these.
@@ -148,7 +148,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
 
 
 def station_partials(result: Result) -> Floats:
-    """(6, m, 2) partials of the images by three coordinates and three small rotations of stations.
+    """(6, m, 2) partials of images by coordinates and small rotations of stations.
 
     Partials by point coordinates have the opposite sign. NaN for scanners, which have several stations.
     Photos with a rolling shutter are used at their first line.
@@ -187,7 +187,7 @@ def as_adjusted(result: Result, *, free: bool = False) -> Block:
 
 
 def fall_by_lens(result: Result, images: Bools) -> float:
-    """Return the decrease of the weighted sum of squares with a separate lens model for (m,) `images`.
+    """Return the decrease of Omega with a separate lens model for (m,) `images`.
 
     Rao's score (:mod:`photogram.results.scores`) of radial and tangential terms, principal point and distance
     about the centre of the frame, for any camera model; of the radial terms only if unknowns absorb others. 0
@@ -207,7 +207,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
 
 
 def lens_partials(result: Result, own: Bools) -> Floats:
-    """(7, m, 2) partials of the `own` images by typical lens parameters, in standard deviations."""
+    """(7, m, 2) partials of `own` images by typical lens parameters, in sd."""
     block = result.block
     xy = focal_images(block)[own]
     low, high = xy.min(axis=0), xy.max(axis=0)
@@ -224,7 +224,7 @@ def lens_partials(result: Result, own: Bools) -> Floats:
 
 
 def how_to_calibrate(block: Block) -> Phrase | None:
-    """Return a message on estimating the cameras of a block; None if all parameters are estimated."""
+    """Return a message on estimating cameras; None if all parameters are estimated."""
     if not block.cameras:
         return Phrase("how.camera")
     names = dict.fromkeys(name for camera in block.cameras for name in calibration_words(camera))

@@ -47,7 +47,7 @@ class Footprints:
 
 
 def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ()) -> Footprints:
-    """Return the footprints of the adjusted photos on level planes at the heights of their points.
+    """Return footprints of adjusted photos on level planes at their point heights.
 
     `sizes` are widths and heights of the images of each camera in the unit of image coordinates. The default
     is the extent of the measurements on all photos of the camera.
@@ -82,7 +82,7 @@ def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ())
 
 
 def grounds(result: Result, heights: Floats) -> Floats:
-    """Return (P,) median heights of the points in each photo; of all points for photos without points."""
+    """Return (P,) median point heights of photos; of all points without own points."""
     block = result.block
     own = np.flatnonzero(result.used_images)
     photos, seen = block.image_photos[own], heights[block.image_points[own]]
@@ -99,7 +99,7 @@ def grounds(result: Result, heights: Floats) -> Floats:
 
 
 def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = ()) -> Floats:
-    """Return (k, 4) minimum x and y, maximum x and y of the frames of the cameras of a block.
+    """Return (k, 4) minimum x and y, maximum x and y of the camera frames of a block.
 
     Pixels of cameras with y downwards are measured from the corner, all other coordinates from the centre.
     Strips of scanners are not frames.

@@ -1,4 +1,4 @@
-"""Sums of squares and redundancy numbers of groups of observations, and their tests.
+"""Sums of squares and redundancy numbers of groups, and their tests.
 
 q_g, the weighted sum of squares of a group, is a mixture of chi-square variables. Its expectation r_g is the
 sum of its redundancy numbers, its variance is 2 s_g, and s_g is the sum of R_ij^2 within the group. With c =
@@ -88,7 +88,7 @@ class GroupSum:
 
     @property
     def factor(self) -> float:
-        """Ratio of residuals to their expectation from the standard deviations; NaN without redundancy."""
+        """Ratio of residuals to their expectation by sd; NaN without redundancy."""
         return math.sqrt(self.squares / self.redundancy) if self.redundancy > 0 else math.nan
 
 
@@ -97,7 +97,7 @@ class GroupSums(Documented, Brief):
     """Groups of the observations of an adjusted network, with their tests.
 
     A group should be tested after the removal of gross errors, and jointly with the others by variance
-    components, because its sum contains the errors of the others.
+    components. Its sum contains the errors of the others.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class GroupSums(Documented, Brief):
 
     @property
     def rejected(self) -> list[GroupSum]:
-        """Groups with residuals that are too large or too small for their standard deviations."""
+        """Groups with residuals too large or too small for their standard deviations."""
         return [
             each for each in self.groups if each.test and (each.test.rejected_high or each.test.rejected_low)
         ]
@@ -123,7 +123,7 @@ class GroupSums(Documented, Brief):
         return found
 
     def groups_table(self) -> Table:
-        """Return the declared table: sums, factors of standard deviations, probabilities of sums."""
+        """Return the declared table: sums, factors of deviations, probabilities."""
         groups, tests = self.groups, [each.test for each in self.groups]
         sides = [
             (math.nan, math.nan) if test is None else (test.probability_below, test.probability_above)
@@ -156,7 +156,7 @@ class GroupSums(Documented, Brief):
 
 
 class Left:
-    """Residual statistics of groups of observations, and of all others as another group."""
+    """Residual statistics of groups, and of all others as another group."""
 
     def __init__(self, result: AdjustedNetwork, grouping: Grouping, probing: Probing) -> None:
         self.result, self.grouping, self._probing = result, grouping, probing
@@ -182,7 +182,7 @@ class Left:
 
 
 def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Floats, Floats]:
-    """Return (G,) numbers of observations, weighted sums of squares and sums of redundancy numbers."""
+    """Return (G,) observation numbers, sums of squares and sums of redundancy."""
     kinds = [*result._terms().kinds]
     size = sum(len(kind.rows) for kind in kinds)
     of_observations, shares, components = np.full(size, np.nan), np.full(size, np.nan), np.ones(size)

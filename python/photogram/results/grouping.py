@@ -1,4 +1,4 @@
-"""Groups of the observations of a network: by type, camera, strip, photo ..., or user labels."""
+"""Groups of observations: by type, camera, strip, photo ..., or user labels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _Labels = NDArray[np.object_]
 
 @dataclass(frozen=True, eq=False)
 class Observables:
-    """Possible groups of the observations of a network of P photos, n points and m images."""
+    """Possible groups of a network of P photos, n points and m images."""
 
     given: Given  # The network
     photo_cameras: Indices  # (P,) the camera of each photo, and their names
@@ -76,7 +76,7 @@ class Grouping:
         )
 
     def factors(self, factors: Floats, labels: Indices) -> Floats:
-        """Return the factor of each labelled observation from (G,) factors; 1 without group."""
+        """Return factors of labelled observations from (G,) factors; 1 without group."""
         return np.append(factors, 1.0)[labels]
 
     def summed(self, parts: Mapping[str, Floats]) -> Floats:
@@ -90,7 +90,7 @@ class Grouping:
 
 
 def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
-    """Return groups of the observations of a network; refuse other bases and invalid labels.
+    """Return groups of observations; refuse other bases and invalid labels.
 
     Groups are by `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more
     together), or `component` (x and y, plan and height of control, positions and attitudes of stations). All

@@ -67,7 +67,7 @@ MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
 @dataclass(frozen=True)
 class Effect:
-    """Effects of an undetected error on points, by the coordinate of each that changes most."""
+    """Effects of an undetected error on points, by the most changed coordinates."""
 
     points: int  # beyond the limit
     others: int  # the same without the points that the error belongs to
@@ -165,7 +165,7 @@ class Hypotheses:
         return messages
 
     def _main_component(self, own: Hypothesis, mdb: Sequence[float]) -> tuple[str, Phrase | None]:
-        """Return the size of an error, by its largest component if that is nearly all of it, and its name."""
+        """Return the size of an error, and its name if one component is nearly all of it."""
         unit = self.units(own.code)
         squares = np.square(mdb)
         parts = [each for each in self.every if each.component is not None]
@@ -179,7 +179,7 @@ class Hypotheses:
 
     @property
     def assumptions(self) -> list[Phrase]:
-        """Names of the observations that define the datum, and that no independent source tests."""
+        """Names of untested observations that define the datum."""
         untested = {each.code for each in self.every if each.code in DATUM and each.undetected >= RARE}
         sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
         codes = [codes[0] for codes in sources if untested.intersection(codes)]
@@ -187,7 +187,7 @@ class Hypotheses:
 
     @property
     def common(self) -> list[Hypothesis]:
-        """Detected errors of sets that explain more than any single observation, the most likely first."""
+        """Detected errors of sets that explain more than any single observation."""
         found = [
             each
             for each in self.every
@@ -293,7 +293,7 @@ def _column(name: str, values: Any, head: str, **more: Any) -> Quantity:
 
 
 def _size(own: Hypothesis, unit: str) -> str:
-    """Return an estimate with its standard deviation; of several parameters the largest one."""
+    """Return an estimate with standard deviation; the largest of several."""
     k = int(np.argmax(np.abs(own.estimate)))
     sd = math.sqrt(max(own.cofactors[k * (len(own.estimate) + 1)], 0.0))
     axis = f"{own.parameters[k]} " if len(own.estimate) > 1 else ""
@@ -383,7 +383,7 @@ NO_FACTS: Facts = {
 
 
 def block_facts(block: Block, places: Floats) -> Facts:
-    """Return the facts that hypotheses on a block require: velocities, sets, sizes of images.
+    """Return facts for hypotheses on a block: velocities, sets, sizes of images.
 
     `places` are the (P, 3) adjusted positions of photos.
     """

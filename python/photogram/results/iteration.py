@@ -1,4 +1,4 @@
-"""Iterations of an adjustment, and sums of squares and redundancy numbers by types."""
+"""Iterations, and sums of squares and redundancy numbers by types."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of camera unknowns: terms of the model, other terms, and comparisons of models.
+"""Tests of camera unknowns: used terms, other terms, model comparisons.
 
 * Estimated terms, k with the cofactors Q_kk (a priori unit weight): T = x' Q_kk^-1 x is the increase of the
   weighted sum of squares without them (Wald; exact for linear models).
@@ -68,7 +68,7 @@ class TermsTest:
 
     @property
     def worth_keeping(self) -> bool:
-        """Whether they are significant at 1 percent and move an image by 0.2 standard deviations."""
+        """Whether they are significant at 1 percent and affect an image by 0.2 sd."""
         return self.probability < KEPT and not self.effect <= EFFECT
 
 
@@ -270,7 +270,7 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
 
 
 def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> float:
-    """Return the largest effect of terms of a camera on an image, in its standard deviations."""
+    """Return the largest effect of camera terms on an image, in its sd."""
     block, own = result.block, rows_of_images(result, camera)
     if not own.size:
         return math.nan
@@ -302,7 +302,7 @@ def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
 
 
 def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Floats:
-    """Return (k, m, 2) numerical partials of the compared coordinates by camera parameters.
+    """Return (k, m, 2) numerical partials of compared coordinates by parameters.
 
     Forward cameras compare measured with computed images, backward ones corrected with ideal images.
     """
@@ -325,7 +325,7 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
 
 
 def _corrected(camera: Camera, measured: Floats) -> Floats:
-    """Return measured positions corrected by a backward camera: c (u1, u2) / u3 of rays."""
+    """Return measured positions corrected by a backward camera: c (u1, u2) / u3."""
     u = camera.rays(measured)
     return np.asarray(camera.parameters["c"] * u[:, :2] / u[:, 2:])
 
@@ -394,7 +394,7 @@ def _all_freedom(result: Result) -> int:
 
 
 def _is_within(small: Result, large: Result) -> bool:
-    """Whether a model is the other model with some parameters fixed at their initial values."""
+    """Whether a model is another with some parameters fixed at initial values."""
     if len(small.cameras) != len(large.cameras) or _count(small) >= _count(large):
         return False
     return all(

@@ -1,4 +1,4 @@
-"""Results of all adjustments of photos and points: arrays, covariances, test values."""
+"""Results of all adjustments: arrays, covariances, test values."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Observed:
 
     @property
     def differences(self) -> Floats:
-        """(r, k) adjusted minus given: residuals with the sign of check points, as in tables."""
+        """(r, k) adjusted minus given: residuals with the sign of check points."""
         return 0.0 - self.residuals
 
     @property
@@ -72,7 +72,7 @@ class Observed:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
-    """An adjusted network of P photos with k unknowns each, n points and m image points.
+    """An adjusted network of P photos with k unknowns, n points and m image points.
 
     All arrays are in the order of the input. Values that were excluded from the adjustment are NaN. Residuals
     are observed minus computed. Cofactors refer to a priori unit weight; covariances are cofactors times the
@@ -190,7 +190,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def _members(self) -> dict[str, Any]: ...
 
     def to_json(self) -> bytes:
-        """Return the complete result as a JSON document (UTF-8); `docs/json.md` lists its members."""
+        """Return the result as a JSON document (UTF-8); see `docs/json.md`."""
         return json.to_json(self._members())
 
     @property
@@ -237,7 +237,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
     ) -> Reliability:
-        """Return the detectable gross errors of all observations and their effects (docs/blunders.md).
+        """Return detectable gross errors and effects of others (docs/blunders.md).
 
         The computation requires a factorisation and a selected inverse at the adjusted values.
 
@@ -261,7 +261,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:
-        """The summary of reliability in reports, with the tests of all groups of observations.
+        """The reliability summary of reports, with tests of all groups.
 
         None without redundancy numbers or convergence, or with a loss.
         """
@@ -293,7 +293,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return summary.hypotheses
 
     def hypotheses(self) -> pd.DataFrame:
-        """Return errors of sets and single observations with their tests as a data frame (docs/tests.md).
+        """Return errors of sets and observations with tests as a data frame.
 
         A row for each hypothesis: code, name, number of parameters, statistic T, p, log odds against no
         error, and the estimated error in the units of the observations.
@@ -306,7 +306,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return self._hypotheses().tests().frame()
 
     def external_reliability(self) -> pd.DataFrame:
-        """Return the effects of undetected errors as a data frame with a row for each hypothesis.
+        """Return effects of undetected errors as a data frame, a row for each hypothesis.
 
         Columns are the redundancy, the minimal detectable bias (MDB), and its largest effect on any function
         of the unknowns in standard deviations. They also include the number of points that it moves by more
@@ -343,7 +343,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     def point_given_sd(self) -> Floats:
-        """(n, 3) standard deviations of coordinates as observations: infinite if free, zero if fixed."""
+        """(n, 3) a priori sd of coordinates: infinite if free, zero if fixed."""
         return self.given.point_sd
 
     @property
@@ -358,7 +358,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     def stations(self) -> Observed:
-        """Photos with an unknown that is weighted or fixed, as observations of their own unknowns."""
+        """Photos with a weighted or fixed unknown, as observations of their unknowns."""
         rows = np.flatnonzero(np.isfinite(self.photo_given_sd).any(axis=1))
         parts = (self.photo_residuals, self.photo_given_sd, self.photo_redundancy, self.photo_standardized)
         return Observed(rows, *(part[rows] for part in parts))
@@ -394,7 +394,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     def photo_covariances(self) -> Floats:
-        """(P, k, k) covariances of the unknowns of photos, scaled by the variance of unit weight.
+        """(P, k, k) covariances of photo unknowns, scaled by the unit weight variance.
 
         Blocks have k = 6: X, Y, Z in the linear unit (longitude and latitude in radians, height), then omega,
         phi, kappa in radians. These angles are the numbers of `photo_attitudes` with the definition by
@@ -457,12 +457,12 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def propagate(
         self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
     ) -> Propagated:
-        """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
+        """Return a function of unknowns with covariance; see `Covariances.propagate`."""
         return self.covariances().propagate(function, unknowns, bias=bias)
 
     @property
     def plot(self) -> Plots:
-        """Plots: `plot.network()`, `.residuals()`, `.redundancy()`, `.tests()` ... (docs/pictures.md)."""
+        """Plots: `plot.network()`, `.residuals()`, `.tests()` ... (docs/pictures.md)."""
         from photogram.plots import Plots
 
         return Plots(self)
@@ -493,31 +493,31 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         raise NotImplementedError
 
     def photo_table(self) -> pd.DataFrame:
-        """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""
+        """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""
         return self._table("photo")
 
     def point_table(self) -> pd.DataFrame:
-        """Return adjusted points as a data frame: rays, values and standard deviations, angles in degrees."""
+        """Return adjusted points as a data frame: rays, values, sd, angles in degrees."""
         return self._table("point")
 
     def image_table(self) -> pd.DataFrame:
-        """Return image observations as a data frame: residuals, redundancy numbers, test values."""
+        """Return image observations as a data frame: residuals, redundancy, tests."""
         return self._table("image")
 
     def test_table(self) -> pd.DataFrame:
         """Return the tests of all observations as a data frame, a row for each component.
 
         Columns are the type (`image`, `control`, `station`, ...), row, photo and point of the observation,
-        component and unit, residual, standard deviation, redundancy number, smallest detectable error (level
-        0.001, power 0.8), test value `w` (or `t` if the unit weight is estimated) with its probability `p`,
-        and whether the verdict considers the observation an outlier.
+        component and unit. They also include residual, standard deviation, redundancy number, smallest
+        detectable error (level 0.001, power 0.8), test value `w` (or `t` if the unit weight is estimated) and
+        its probability `p`. The last column marks the outliers of the verdict.
         """
         return self._table("test")
 
     def control_table(self) -> pd.DataFrame:
-        """Return control as a data frame: residuals of components, redundancy numbers, test values."""
+        """Return control as a data frame: residuals, redundancy, test values."""
         return self._table("control")
 
     def station_table(self) -> pd.DataFrame:
-        """Return weighted and fixed photos as a data frame: residuals, redundancy numbers, test values."""
+        """Return weighted and fixed photos as a data frame: residuals, redundancy, tests."""
         return self._table("station")

@@ -58,11 +58,11 @@ def network_document(
     work: Sequence[Fact] = (),
     details: Sequence[Section] = (),
 ) -> Document:
-    """Return the document of a network: its number of `photos`, sections on its `size` and its `given` data.
+    """Return the document of a network from its `photos`, `size` and `given` data.
 
     `more` are additional highlights, `redundancy` tables below the plot of redundancy numbers, `beside`
     sections below the plan. `datum` describes the reference of coordinates, `poses` the meaning of photo
-    poses, `work` other facts on the normal equations, `details` sections of the text report only.
+    poses. `work` are other facts on the normal equations, `details` sections of the text report only.
     """
     pictures, tests = drawings(result), Tests(result)
     worst = tests.largest(WORST)
@@ -112,7 +112,7 @@ def network_document(
 
 
 def problems_of(result: AdjustedNetwork) -> list[str]:
-    """Return the reasons against the use of the values, the most serious first, then other messages.
+    """Return reasons against the use of values, most serious first, and messages.
 
     The first reasons are missing convergence, a rejecting global test and the outliers of the verdict.
     """
@@ -129,7 +129,7 @@ def problems_of(result: AdjustedNetwork) -> list[str]:
 
 
 def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> dict[str, Any]:
-    """Return the members of the JSON documents of all networks, with more members of photos."""
+    """Return JSON members of all networks, with additional members of photos."""
     summary = result.reliability_summary
     weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
     of_photos = Quantity(result.photo_covariances, member="covariance")
@@ -216,7 +216,7 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
 
 
 def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
-    """Return the distribution of standard deviations of adjusted values; empty without any."""
+    """Return the distribution of standard deviations of values; empty without any."""
     terms, rows = result._terms(), list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
@@ -258,7 +258,7 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
 
 
 def _worst_table(tests: Tests, places: Indices) -> list[quantity.Table]:
-    """Return the table of the largest test values, which have indices `places`; empty without any."""
+    """Return the table of the largest test values by indices; empty without any."""
     if not len(places):
         return []
     names = []

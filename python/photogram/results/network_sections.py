@@ -1,4 +1,4 @@
-"""Sections on control, check points, other observations, photos, points and weakest items."""
+"""Sections on control, check points, other observations, photos and points."""
 
 from __future__ import annotations
 
@@ -35,11 +35,10 @@ NEAR = 1e-3  # Distance of points listed first from a station, relative to the m
 
 @np.errstate(all="ignore")
 def weakest_points(result: AdjustedNetwork) -> Table:
-    """Return the points with the largest ratios of standard deviations, and the nearest to a station.
+    """Return points with the largest sd ratios, and those nearest to a station.
 
-    The ratio of the largest to the smallest standard deviation in any direction is the root of the ratio of
-    the eigenvalues of the covariance matrix, or 1 with a fixed component. The table is empty without
-    cofactors.
+    The ratio of extreme standard deviations in any direction is the root of the eigenvalue ratio of the
+    covariance matrix, or 1 with a fixed component. The table is empty without cofactors.
     """
     network = result._determined()
     cofactors = network.point_cofactors
@@ -65,7 +64,7 @@ def weakest_points(result: AdjustedNetwork) -> Table:
 
 @np.errstate(all="ignore")
 def weakest_photos(result: AdjustedNetwork) -> Table:
-    """Return the photos with the largest condition numbers of their poses, the worst first.
+    """Return photos with the largest condition numbers of poses, worst first.
 
     Fixed unknowns of a photo do not count; photos without free unknowns are omitted. If all points are on a
     line, a photo can rotate about it, and the condition number is unlimited.
@@ -88,7 +87,7 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
-    """Return largest over smallest eigenvalue of (n, k, k) matrices; infinite by loss of precision.
+    """Return eigenvalue ratios of (n, k, k) matrices; infinite by precision loss.
 
     For smaller ranks only the largest eigenvalues count: the others belong to fixed unknowns.
     """
@@ -100,7 +99,7 @@ def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
 
 
 def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
-    """Return the distances of all points from the nearest station that sees them, over their median."""
+    """Return distances of points from the nearest station, over their median."""
     used = result.used_images
     if network.moving is not None:
         used = used & ~network.moving[result.given.image_photos]
@@ -127,7 +126,7 @@ def component_table(
     tests: Floats,
     deviations: Floats | None = None,
 ) -> list[Table]:
-    """Return a table of the components with the largest test values; empty without components.
+    """Return a table of the components with the largest test values, if any.
 
     `there` are the (n, k) existing components, `tests` their test values, NaN if missing.
     """
@@ -142,7 +141,7 @@ def component_table(
 
 
 def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> Section:
-    """Return control: prior, posterior, difference, test; fixed components have no test.
+    """Return control: prior, posterior, difference, test (unless fixed).
 
     `free` are the columns of free components of control.
     """
@@ -299,7 +298,7 @@ def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
 
 @np.errstate(all="ignore")
 def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
-    """Return (n, 6) statistics of the fit of images of n photos or points; `of` is the owner of each image.
+    """Return (n, 6) image fit statistics of photos or points; `of` are the owners.
 
     Columns are rms x and y, mean redundancy, longest residual, largest |w|, number of images.
     """

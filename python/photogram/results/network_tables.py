@@ -19,7 +19,7 @@ _FREE = {np.inf: "free", 0.0: "fixed"}
 
 
 def names(terms: Terms, kind: str, rows: Indices, member: str = "", *, here: bool = False) -> Quantity:
-    """Return names of photos or points with links to their rows on a page, or as link targets."""
+    """Return names of photos or points with links to rows, or as link targets."""
     every = terms.photos if kind == "photo" else terms.points
     return Quantity(
         every[rows],
@@ -64,7 +64,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
 
 
 def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantity]:
-    """Return the used images, or some of them: residuals, redundancy numbers, test values."""
+    """Return used images, or some: residuals, redundancy numbers, test values."""
     terms, used = result._terms(), np.flatnonzero(result.used_images) if rows is None else rows
     axes = terms.image_axes
     return [
@@ -79,7 +79,7 @@ def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantit
 
 
 def plan_deviations(terms: Terms, sd: Floats) -> list[Quantity]:
-    """Return standard deviations (n, 3 or more) in plan as lengths if coordinates are angles."""
+    """Return (n, 3 or more) sd in plan as lengths if coordinates are angles."""
     if terms.lengths is None:
         return []
     axes = tuple(Axis.of(name, terms.linear_unit) for name in ("east", "north"))
@@ -147,7 +147,7 @@ test_value = partial(
 
 
 def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
-    """Return numbers, sums after the corrections, largest changes, damping; optionally the start first."""
+    """Return sums after corrections, largest changes, damping; optionally the start."""
     first = [] if start is None else [(0, start, np.nan, np.nan)]
     rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in iterations]
     number, squares, change, damping = np.array([*first, *rows]).reshape(-1, 4).T

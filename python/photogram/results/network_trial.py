@@ -1,4 +1,4 @@
-"""The network for data snooping: solutions without some observations, decided by the core."""
+"""The network of data snooping: solutions without some observations."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class NetworkTrial:
         return Standing(status, omega, freedom)
 
     def correlation(self, first: int, second: int, between: Floats) -> float:
-        """Return the largest canonical correlation of two groups; `between` has the rows of the first."""
+        """Return the largest canonical correlation of two groups by R `between` them."""
         halves = []
         for group in (first, second):
             values, vectors = np.linalg.eigh(self.own_block(group))
@@ -155,7 +155,7 @@ class NetworkTrial:
         return found
 
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return, for excluded points, all their groups with residuals and R as if they were used.
+        """Return all groups of excluded points with residuals and R as if used.
 
         Empty for points with additional observations, and for those that their rays do not determine.
         """
@@ -177,7 +177,7 @@ class NetworkTrial:
         return np.where(out, 0.0, residuals), response
 
     def resist(self, scale: float) -> Floats | None:
-        """Adjust by Huber's loss, then by Cauchy's loss: (G,) lengths of residuals of unit weight.
+        """Adjust by Huber's, then Cauchy's loss: (G,) lengths of residuals.
 
         None if either diverges; the next trial then begins at the last valid state.
         """
@@ -193,7 +193,7 @@ class NetworkTrial:
         return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / least - 1.0, 0.0)))
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
-        """Return points left with too few rays, and photos without support, if a group is removed."""
+        """Return points with few rays, and unsupported photos, without a group."""
         suspects = self.suspects
         point, photo = int(suspects.points[group]), int(suspects.photos[group])
         points: set[int] = set()
@@ -351,7 +351,7 @@ def observations_of_core(block: Block) -> list[Observation]:
 
 
 class BlockSuspects(NamedSuspects):
-    """The groups of observations of a block; `parts` of some may be removed separately."""
+    """The observation groups of a block; `parts` may be removed separately."""
 
     def __init__(self, block: Block, core: _photocore.NetworkSuspects, parts: bool = True) -> None:
         axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
@@ -372,7 +372,7 @@ class BlockSuspects(NamedSuspects):
         return {name: row for row, name in enumerate(self.block.photo_ids)}
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return separately removable parts: plan, height or all of control, components of stations."""
+        """Return separately removable parts of control points and stations."""
         if not self.apart:
             return None
         kind = int(self.kinds[group])
@@ -384,7 +384,7 @@ class BlockSuspects(NamedSuspects):
         return None
 
     def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photos that an additional observation affects; all for common observations."""
+        """Return the photos that an additional observation affects; all if common."""
         if kind != OBSERVATION:
             return np.arange(len(self.block.photo_ids))
         observation = self.observations[subject]

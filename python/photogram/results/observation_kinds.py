@@ -94,7 +94,7 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
 
 
 def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
-    """Return observations of one type with different numbers of unknowns, in the order of the block."""
+    """Return observations of one type with different numbers of unknowns, in order."""
     rows = np.concatenate([first.rows, second.rows])
     order = np.argsort(rows)
     names = [*first.names, *second.names]
@@ -115,7 +115,7 @@ def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
 
 
 def named_observation(kind: str, of: str) -> Phrase:
-    """Return the name of an observation: its type, and the names of its points, photos or unknowns."""
+    """Return the name of an observation: type, and points, photos or unknowns."""
     return Phrase("named.observation", {"one": kind_words(kind), "of": of})
 
 

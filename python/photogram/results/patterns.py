@@ -1,7 +1,7 @@
 """Tests for patterns of residuals over the frame, photos, strips and control.
 
-Outliers are first clipped, and a common factor of all standard deviations is removed by the median of the
-test values, because both would appear as patterns.
+Outliers are first clipped, and the median of the test values removes a common factor of all standard
+deviations. Both would appear as patterns.
 
 Residuals are not independent: ~v = R ~e. Therefore permutations of residuals do not represent the null
 hypothesis, and sums of r as variances of sums make tests conservative. Instead, errors e of all images are
@@ -138,7 +138,7 @@ def _of_camera(
 def _systematic(
     found: Any, kind: Phrase, sentence: Phrase, law: tuple[str, str, tuple[float, ...]], **more: Any
 ) -> Systematic:
-    """Return a test by its result and its statistic, distribution and degrees of freedom."""
+    """Return a test by its result, statistic, distribution and freedom."""
     own = {"value": found.statistic, "probability": found.probability, "level": LEVEL_OF_PATTERNS}
     names = dict(zip(("statistic", "distribution", "dof"), law, strict=True))
     return Systematic(kind=kind, sentence=sentence, **{**own, **names, **more})
@@ -165,7 +165,7 @@ def _of_photos(
 
 
 def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | None:
-    """Test the normal distribution of residuals, with one value of each redundant direction.
+    """Test the normal distribution of residuals in redundant directions.
 
     The coordinates of a point on two photos repeat each other: the one with most redundancy is used.
     """
@@ -242,7 +242,7 @@ _Pattern = tuple[str, str, Callable[[Floats], float]]
 
 
 def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[DrawnPattern]:
-    """Test the image residuals of a block for patterns by simulated residuals without patterns.
+    """Test image residuals for patterns by simulated residuals without patterns.
 
     For every camera: mean residuals over the frame (B, as in the verdict), and the similarity of residuals
     of adjacent images in the frame on other photos (Moran's I 1950). For the sequence of photos: the

@@ -51,7 +51,7 @@ class PicturedNetwork(Pictured):
     @property
     @abstractmethod
     def cameras(self) -> tuple[Indices, Sequence[str], bool]:
-        """(P,) cameras of the photos, their names, and whether y is downwards in their images."""
+        """(P,) cameras of photos, their names, and whether y is downwards."""
 
     @cached_property
     def images(self) -> Images:
@@ -72,7 +72,7 @@ class PicturedNetwork(Pictured):
 
     @property
     def scanned(self) -> Bools:
-        """(P,) photos that are scanner strips, with samples and lines as image coordinates."""
+        """(P,) photos that are scanner strips: image coordinates are samples and lines."""
         return np.zeros(len(self.result.given.photo_ids), dtype=bool)
 
     @cached_property
@@ -95,7 +95,7 @@ class PicturedNetwork(Pictured):
 
 
 class PicturedBlock(PicturedNetwork):
-    """The data of an adjusted block; geographic space in axes to east, north and up at its centre."""
+    """The data of an adjusted block; local axes for geographic space."""
 
     result: Result
 
@@ -240,7 +240,7 @@ def plot_distortion(result: Result, camera: AdjustedCamera) -> Plot:
 
 
 def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
-    """Plot the displacements by all lens terms except the radial ones, with their standard ellipses.
+    """Plot displacements by all but radial lens terms, with standard ellipses.
 
     Parameters
     ----------

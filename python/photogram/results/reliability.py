@@ -1,4 +1,4 @@
-"""Reliability of observations: detectable gross errors and effects of undetected ones.
+"""Reliability of observations: detectable errors, effects of undetected ones.
 
 With R the cofactors of the residuals of unit weight, r = R_ii and lambda0 the noncentrality of the test
 (Baarda 1968):
@@ -69,7 +69,7 @@ class Moved:
 
 
 class Reliability:
-    """The reliability of all observations of an adjusted network, from row blocks of R.
+    """The reliability of all observations of a network, from row blocks of R.
 
     Arrays contain G groups of observations (`suspects`), or their M rows in the order of the groups; rows are
     in the units of the observations.
@@ -128,12 +128,12 @@ class Reliability:
 
     @property
     def external(self) -> Floats:
-        """(M,) largest effect of an undetected error on any function, in its standard deviations."""
+        """(M,) largest effect of an undetected error on any function, in its sd."""
         return largest_effect(_shown(self.redundancy), self._delta)
 
     @property
     def group_detectable(self) -> Floats:
-        """(G,) largest semi-axis of the minimal detectable error, in standard deviations; see `invisible`."""
+        """(G,) largest semi-axis of the detectable error, in sd; see `invisible`."""
         return np.asarray(np.sqrt(self._of_rank / self.tests.least))
 
     @property
@@ -149,7 +149,7 @@ class Reliability:
 
     @property
     def untestable(self) -> Bools:
-        """(G,) whether all directions have too little redundancy for detection by their own residual."""
+        """(G,) whether own residuals cannot detect errors in any direction."""
         return np.asarray(self.tests.active & ~(self.tests.least > TESTABLE))
 
     @cached_property
@@ -159,7 +159,7 @@ class Reliability:
 
     @property
     def own_point_effect(self) -> Floats:
-        """(M, 3) effect of the minimal detectable error of a row on its own point; NaN without one."""
+        """(M, 3) effect of a detectable error on the own point; NaN without one."""
         return np.asarray(self._effects[:, :3] * (self.detectable / self.sd)[:, np.newaxis])
 
     @property
@@ -168,7 +168,7 @@ class Reliability:
         return np.asarray(self._effects[:, 3:] * (self.detectable / self.sd)[:, np.newaxis])
 
     def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
-        """Return the effects of minimal detectable errors of the worst rows of groups on their own points.
+        """Return effects of detectable errors of the worst group rows on their points.
 
         In the unit of the object space; only `heights` if plan coordinates are angles. NaN without a point.
         """
@@ -185,7 +185,7 @@ class Reliability:
         return found
 
     def influence(self, selection: Selection) -> tuple[list[tuple[str, str, str]], Floats]:
-        """Return the effects of minimal detectable errors of single observations on chosen unknowns.
+        """Return effects of minimal detectable errors of single rows on unknowns.
 
         One solution for each unknown serves all observations.
 
@@ -208,7 +208,7 @@ class Reliability:
         return labels, np.asarray(found * (self.detectable / self.sd))
 
     def influence_of(self, function: Callable[..., Any], unknowns: Selection) -> Floats:
-        """Return the (k, M) effects of minimal detectable errors on the k values of a function.
+        """Return (k, M) effects of minimal detectable errors on function values.
 
         `function` and `unknowns` are as in :meth:`photogram.Result.propagate`.
         """
@@ -216,7 +216,7 @@ class Reliability:
         return np.asarray(found * (self.detectable / self.sd))
 
     def most_moved(self, count: int = SEARCHED) -> list[Moved]:
-        """Return the unknowns with the largest effects of undetected errors, the largest first.
+        """Return the unknowns with the largest effects of undetected errors.
 
         The upper bound of the effect on any unknown is `external`. At most `count` rows are examined in
         descending order of this bound, until no other row can have a larger effect.
@@ -243,7 +243,7 @@ class Reliability:
         return [self.named(*pair) for pair in self.pairs_on(points, limit)]
 
     def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return inseparable pairs on some points by group numbers, with their correlation.
+        """Return inseparable pairs on points by group numbers, with correlation.
 
         Networks have thousands.
         """
@@ -274,7 +274,7 @@ class Reliability:
 
     @cached_property
     def _delta(self) -> float:
-        """Smallest detectable error of a single row; cached because networks have thousands of pairs."""
+        """Smallest detectable error of a single row, cached for thousands of pairs."""
         return math.sqrt(self.lambda0(1))
 
     def named(self, first: int, second: int, rho: float) -> Inseparable:
@@ -286,7 +286,7 @@ class Reliability:
         return np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
 
     def observations(self) -> Table:
-        """Return the declared table of all observations; displays show the worst of each type."""
+        """Return the declared table of observations; displays show the worst."""
         suspects, groups = self.suspects, self.row_groups()
         rows = range(len(groups))
         names = np.array([str(suspects.name(group)) for group in range(len(suspects))], dtype=object)
@@ -326,7 +326,7 @@ class Reliability:
         return self.observations().frame()
 
     def lines(self) -> list[str]:
-        """Return report lines: for every type the observation with the largest undetected effect."""
+        """Return report lines: the largest undetected effect of every type."""
         table = written(self.observations())
         return [table.note, *table_text(table)]
 

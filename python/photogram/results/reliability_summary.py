@@ -1,4 +1,4 @@
-"""Summary of reliability in reports and JSON documents: types, weakest observations, pairs.
+"""Reliability summary of reports and JSON: types, weakest rows, pairs.
 
 It includes the tests of all groups of observations for the verdict, because both require one factorisation
 and selected inverse at the adjusted values.
@@ -60,7 +60,7 @@ class ReliabilitySummary:
         return Table("reliability-kinds", "Redundancy of groups of observations", self.kinds, note)
 
     def weakest_table(self, unit: str = "") -> Table:
-        """Return the declared table of the weakest observations; `unit` is the unit of the object space."""
+        """Return the declared table of weakest observations in object `unit`."""
         *columns, own_point = self.weakest
         columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
         weight = "known" if self.known else "estimated"
@@ -173,7 +173,7 @@ def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
 
 
 def _points(suspects: Suspects, tests: Tests) -> tuple[int, list[int]]:
-    """Return the number of points on two photos, and other points with possible inseparable pairs."""
+    """Return the number of two-ray points, and points with possible pairs."""
     at = suspects.points
     takes_part = tests.active & (at >= 0)
     if not takes_part.any():

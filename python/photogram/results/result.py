@@ -68,7 +68,7 @@ def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(OnFilm, AdjustedNetwork):
-    """An adjusted block; common arrays of networks are in `AdjustedNetwork`, with k = 6.
+    """An adjusted block; see also `AdjustedNetwork`, with k = 6.
 
     The unknowns of a photo are its position and omega, phi, kappa. Positions are X, Y, Z or longitude (rad),
     latitude (rad), height; angles are radians, image coordinates millimetres or the unit of the cameras.
@@ -149,7 +149,7 @@ class Result(OnFilm, AdjustedNetwork):
         messages: list[Message],
         freedom: float,
     ) -> Self:
-        """Return the result of a solution of the core; `freedom` belongs to the unit variance."""
+        """Return the result of a core solution; `freedom` is of the unit variance."""
         variance = solution.variance_of_unit_weight
         scale = 1.0 if variance is None else variance
         return cls.taken_over(
@@ -197,7 +197,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def sum_and_freedom(self) -> tuple[float, float]:
-        """The weighted sum of squares of all observations, and the degrees of freedom of the unit weight."""
+        """The weighted sum of squares, and the degrees of freedom of the unit weight."""
         return self.sums_of_squares.total, self.degrees_of_freedom
 
     @property
@@ -270,7 +270,7 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def in_datum(self, datum: InnerConstraints) -> Self:
-        """Return the result in another datum without another adjustment (S-transformation, docs/datum.md).
+        """Return the result in another datum (S-transformation, docs/datum.md).
 
         Residuals, redundancy numbers, test values and the variance of unit weight do not depend on the datum.
 
@@ -286,7 +286,7 @@ class Result(OnFilm, AdjustedNetwork):
         return self._in(datum_row(self.block, inner_datum(datum)))
 
     def relative_to(self, *, photo: str | None = None, points: Sequence[str] | None = None) -> Self:
-        """Return the result with covariances relative to a photo or to points, for any datum.
+        """Return the result with covariances relative to a photo or to points.
 
         The covariances are those for a fixed pose of the photo, or a fixed mean position and orientation of
         the points. Scale and adjusted values remain unchanged.
@@ -370,7 +370,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def photo_rotation_covariances(self) -> Floats:
-        """(P, 6, 6) covariances of positions and rotation vectors of photos, scaled as `photo_covariances`.
+        """(P, 6, 6) scaled covariances of positions and rotation vectors of photos.
 
         The order is X, Y, Z (longitude, latitude, height), then the three components of rho in radians. A
         photo rotates by rho about its own axes (x right, y up, z towards the viewer): its true attitude is A
@@ -385,7 +385,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def photo_given_sd(self) -> Floats:
-        """(P, 6) standard deviations of observed positions and attitudes: infinite if free, zero if fixed.
+        """(P, 6) a priori sd of positions and attitudes: infinite if free, zero if fixed.
 
         Given values of a photo with its own trajectory refer to the coefficients of the trajectory.
         """
@@ -399,7 +399,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     @cached_property
     def point_kinds(self) -> NDArray[np.str_]:
-        """(n,) `control` with an observed component, `check` with known components only, else `pass`."""
+        """(n,) `control` if observed, `check` if known only, else `pass`."""
         return point_kinds(self.block)
 
     @property
@@ -429,16 +429,16 @@ class Result(OnFilm, AdjustedNetwork):
         return photogram.statement(self, **asked)
 
     def check_table(self) -> pd.DataFrame:
-        """Return check points as a data frame: adjusted minus given coordinates, standard deviations."""
+        """Return check points as a data frame: adjusted minus given, deviations."""
         return self._table("check")
 
     @property
     def trajectories(self) -> dict[str, AdjustedTrajectory]:
-        """The trajectories of photos and records, by name: coefficients, poses at any time."""
+        """Trajectories of photos and records by name: coefficients, poses."""
         return adjusted_trajectories(self)
 
     def project(self, photo: str, points: ArrayLike) -> Floats:
-        """Return the image coordinates of points on a photo on a trajectory, at their own row or line times.
+        """Return image coordinates of points on a photo on a trajectory.
 
         Parameters
         ----------
@@ -459,15 +459,15 @@ class Result(OnFilm, AdjustedNetwork):
         return project(self, photo, points)
 
     def camera_table(self) -> pd.DataFrame:
-        """Return adjusted cameras as a data frame: a row for each parameter, with its unit."""
+        """Return adjusted cameras as a data frame: a row with unit for each parameter."""
         return self._table("camera")
 
     def unknown_table(self) -> pd.DataFrame:
-        """Return adjusted common unknowns as a data frame: a row for each component, with its unit."""
+        """Return common unknowns as a data frame: a row with unit for each component."""
         return self._table("unknown")
 
     def observation_table(self) -> pd.DataFrame:
-        """Return additional observations as a data frame, a row for each component, with its unit."""
+        """Return additional observations as a data frame: a row for each component."""
         return self._table("observation")
 
 

@@ -1,4 +1,4 @@
-"""Reading and writing of results as files of a folder: the common tables of networks.
+"""Reading and writing of results as files: common tables of networks.
 
 `docs/results.md` describes the files. Arrays with a row for every photo, point or image are columns of a
 table; all other data are in `summary.json`. Classes of results declare their columns as :class:`Part`.
@@ -91,7 +91,7 @@ class Part:
 
 
 def _divided(products: np.ndarray, scale: float) -> np.ndarray:
-    """Return quotients that reproduce the products exactly when multiplied by the scale."""
+    """Return quotients that reproduce products exactly when multiplied by scale."""
     near: np.ndarray = products / scale
     found = near
     for direction in (-np.inf, np.inf):
@@ -101,7 +101,7 @@ def _divided(products: np.ndarray, scale: float) -> np.ndarray:
 
 
 def _products(units: Sequence[str]) -> str:
-    """Return the unit of covariances: a common one, or units of the components in their order."""
+    """Return the unit of covariances: a common one, or units of components."""
     different = list(dict.fromkeys(units))
     return f"{different[0]}2" if len(different) == 1 else "products of " + " ".join(units)
 
@@ -168,7 +168,7 @@ class Saved:
         return own, others
 
     def members(self, name: str, kind: type) -> dict[str, Any]:
-        """Return the fields of a class from the document: of `result`, or of the given network."""
+        """Return the fields of a class from the document: `result` or given network."""
         return self.decoder.fields(self.summary["kept"][name], kind)
 
     def state(self) -> _photocore.BlockState:
@@ -188,7 +188,7 @@ _RENAMED = {"standardized": "test", "d": "difference"}  # Names in Parquet
 
 
 def sheet(table: Quantities) -> list[Column]:
-    """Return the columns of Parquet: angles in radians, names in small letters, units separate."""
+    """Return Parquet columns: angles in radians, lower-case names, separate units."""
     found = []
     for each in table:
         if each.name is None:
@@ -304,7 +304,7 @@ def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any
 
 
 def read_summary(folder: Path) -> Mapping[str, Any]:
-    """Read the document of a folder; refuse missing documents and other programs or versions."""
+    """Read the document of a folder; refuse missing, other and later ones."""
     path = folder / SUMMARY
     try:
         document = orjson.loads(read_bytes(path))

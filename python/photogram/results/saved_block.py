@@ -16,7 +16,7 @@ from photogram.results.result_files import read_saved, rows_of
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
-    """Return the result of a block from a folder; refuse missing, damaged or inconsistent files."""
+    """Return the result from a folder; refuse missing, damaged or wrong files."""
     saved = read_saved(folder, saved_classes(), document)
     given = saved.members("block", Block)
     images, names = saved.sheets["images"], {}

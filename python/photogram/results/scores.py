@@ -48,14 +48,14 @@ class Scores:
 
     @property
     def taken_up(self) -> bool:
-        """Whether the unknowns of the network absorb some scores, or images do not depend on them."""
+        """Whether unknowns absorb some scores, or images do not depend on them."""
         if not (self.sizes > 0).all():
             return True
         scaled = self.matrix / np.outer(self.sizes, self.sizes)
         return not (np.linalg.eigvalsh(scaled) > TAKEN_UP).all()
 
     def estimate(self, groups: Indices) -> tuple[float, float]:
-        """Return the first-order estimate of the first unknown only, and its standard deviation.
+        """Return the first-order estimate of the first unknown, and its sd.
 
         It follows from the differences of (m,) groups of images in it, c_g - x C_g, which include individual
         deformations of each group. It is arbitrary if unknowns absorb it.
@@ -70,7 +70,7 @@ class Scores:
         return value, float(np.sqrt(((c - value * own) ** 2).sum())) / total
 
     def fall(self, first: int = 0) -> float:
-        """Return T = c' C^-1 c of the scores from index `first` on, without parts absorbed by the network."""
+        """Return T = c' C^-1 c of scores from `first` on, without absorbed parts."""
         own = np.flatnonzero(self.sizes[first:] > 0) + first
         values, vectors = np.linalg.eigh(
             self.matrix[np.ix_(own, own)] / np.outer(self.sizes[own], self.sizes[own])
@@ -81,7 +81,7 @@ class Scores:
 
 
 def score(factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> float | None:
-    """Return T = c' C^-1 c; None if the unknowns absorb the partials; see :meth:`Scores.of`."""
+    """Return T = c' C^-1 c; None if absorbed; see :meth:`Scores.of`."""
     found = Scores.of(factor, partials, residuals)
     return None if found.taken_up else quadratic(found.matrix, found.vector)
 

@@ -1,4 +1,4 @@
-"""The result of data snooping: the adjusted network without gross errors, and the log."""
+"""The result of data snooping: network without gross errors, and log."""
 
 from __future__ import annotations
 
@@ -124,11 +124,11 @@ class Snooped(Brief, Documented):
         }
 
     def to_json(self) -> bytes:
-        """Return the complete result, its verdict and the log, `snooping`, as JSON document (UTF-8)."""
+        """Return result, verdict and log (`snooping`) as one JSON document (UTF-8)."""
         return json.to_json({**self.result._members(), "snooping": self.members()})
 
     def document(self) -> Document:
-        """Return the document of the network without the removed observations, with the log."""
+        """Return the network's document without removed observations, with the log."""
         network, log, count = self.result.document(), self.log, len(self.removed)
         remarks = [
             *([] if log else ["Nothing was taken out."]),

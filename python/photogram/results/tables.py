@@ -35,7 +35,7 @@ _EITHER = "standard deviation that was given, or is assumed: {}"
 
 
 def check_points(result: Result) -> list[Quantity]:
-    """Return check points: adjusted minus given, standard deviations of both, tests with probabilities."""
+    """Return check points: adjusted minus given, deviations, tests."""
     checks = result.check_points
     statistic, p = checks.statistics
     return [
@@ -104,7 +104,7 @@ _NOTHING = ObservedKind(
 
 
 def redundancy_by_kind(result: Result) -> list[Quantity]:
-    """Return number, redundancy, weighted sum of squares and standard deviation factor of every type.
+    """Return number, redundancy, sum of squares and sd factor of every type.
 
     The redundancies sum to the degrees of freedom; empty without them, or with a loss.
     """
@@ -134,7 +134,7 @@ def redundancy_by_kind(result: Result) -> list[Quantity]:
 
 
 def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
-    """Return the components of common unknowns; given standard deviations are infinite if free."""
+    """Return components of common unknowns; given sd are infinite if free."""
     axes = tuple(
         component_axis(*both) for each in every for both in zip(each.components, each.units, strict=True)
     )
@@ -154,7 +154,7 @@ def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
 
 
 def camera_parameters(every: Sequence[AdjustedCamera]) -> list[Quantity]:
-    """Return camera parameters; given standard deviations are infinite if free, 0 if fixed."""
+    """Return camera parameters; given sd are infinite if free, 0 if fixed."""
     axes = tuple(Axis(name, each.camera.unit_of(name)) for each in every for name in each.names)
     rows: dict[str, Any] = {"of": np.arange(len(axes))}
     names, units = component(axes, **rows)

@@ -1,4 +1,4 @@
-"""The tests of all observations of an adjusted network: one table for verdict, documents and plots."""
+"""Tests of all observations: one table for verdict, documents and plots."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Tests:
 
     @property
     def groups(self) -> list[Tested]:
-        """The tests of all groups by type: T if the unit weight is known, else F; none with a loss."""
+        """Tests of groups by type: T if the unit weight is known, else F."""
         result, summary = self._result, self._result.reliability_summary
         if summary is None:
             return []
@@ -134,7 +134,7 @@ class Tests:
 
     @cached_property
     def outliers(self) -> list[Bools]:
-        """The components of each type that are outliers of the verdict, or belong to such groups."""
+        """Components of each type that are outliers, or belong to outlying groups."""
         verdict, found = self._result.verdict, []
         for tests in self.normal:
             marks = verdict.marks(tests.kind, tests.values.shape)
@@ -144,7 +144,7 @@ class Tests:
         return found
 
     def largest(self, count: int) -> Indices:
-        """Return the (n, 3) indices of the largest test values: type, observation and component."""
+        """Return (n, 3) indices of largest test values: type, observation, component."""
         found = []
         for order, tests in enumerate(self.components):
             sizes = np.nan_to_num(np.abs(tests.values)).ravel()
@@ -158,7 +158,7 @@ class Tests:
         return np.array(places, dtype=np.int64).reshape(-1, 3)
 
     def columns(self, places: Indices | None = None) -> list[Quantity]:
-        """Return the columns of all observed components, or of the (n, 3) indices `places`."""
+        """Return columns of all observed components, or of (n, 3) indices."""
         types = self.components
         if places is None:
             observed = [np.argwhere(tests.observed) for tests in types]
@@ -216,7 +216,7 @@ def _component_tests(
     values: tuple[Floats, Floats, Floats, Floats],
     groups: Mapping[str, slice],
 ) -> ComponentTests:
-    """Return the tests of one type by its residuals, standard deviations, redundancy numbers and w."""
+    """Return tests of a type by residuals, sd, redundancy numbers and w."""
     residuals, sd, shares, w = values
     return ComponentTests(
         kind=title,

@@ -105,7 +105,7 @@ class AdjustedTrajectory:
         return replace(self.given, **changes) if changes else self.given
 
     def poses(self, times: ArrayLike) -> TrajectoryPoses:
-        """Return poses at (n,) times in seconds: Q_pose = T Q T', T = diag(B I, Jr B I) (docs/moving.md).
+        """Return poses at (n,) times in seconds: Q_pose = T Q T' (docs/moving.md).
 
         Raises
         ------
@@ -136,7 +136,7 @@ class AdjustedTrajectory:
         return TrajectoryPoses(times, positions, attitudes.reshape(-1, 3, 3), covariances)
 
     def corrections(self, times: ArrayLike) -> tuple[Floats, Floats]:
-        """Return (n, 3) corrections of positions, and (n, 3) rotation vectors r(t), at times in seconds.
+        """Return (n, 3) position corrections and rotation vectors r(t) at times (s).
 
         Raises
         ------
@@ -159,7 +159,7 @@ class AdjustedTrajectory:
 def corrections(
     trajectory: Trajectory, times: Floats, position: Floats, rotation: Floats
 ) -> tuple[Floats, Floats]:
-    """Return (n, 3) sums of coefficients (K, 3) of positions, and of rotations, at valid times."""
+    """Return (n, 3) sums of (K, 3) position and rotation coefficients."""
     *_, of_position, of_rotation = trajectory.flown(times, position, rotation)
 
     def sums(active: list[tuple[int, list[float]]], own: Floats) -> Floats:
@@ -172,7 +172,7 @@ def corrections(
 
 
 def project(result: Result, photo: str, points: ArrayLike) -> Floats:
-    """Return the images of (n, 3) points on a photo on a trajectory; see :meth:`photogram.Result.project`."""
+    """Return images of (n, 3) points on a photo; see :meth:`photogram.Result.project`."""
     block = result.block
     timed = {each.photo: row for row, each in enumerate(block.timed)}
     if photo not in timed:
@@ -230,7 +230,7 @@ def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
 def restarted_motion(
     block: Block, adjusted: Iterable[AdjustedTrajectory], turns: Mapping[str, Floats] | None = None
 ) -> Block:
-    """Return a block with adjusted free coefficients of trajectories; others remain as given."""
+    """Return a block with adjusted free coefficients of trajectories."""
     turns = turns or {}
     found = {id(each.given): each for each in adjusted}
     # A prior observes the given value of its unknown.
@@ -280,7 +280,7 @@ LISTED = 20  # Rows of longer lists of coefficients and trajectories
 
 
 def trajectories_table(result: Result) -> Table:
-    """Return positions and rotations of trajectories: their largest corrections and test values.
+    """Return trajectory positions and rotations: largest corrections and tests.
 
     They are in the order of the block; if there are many, those with the largest test values.
     """
@@ -324,7 +324,7 @@ def trajectories_table(result: Result) -> Table:
 def _correction(
     trajectory: Trajectory, part: int, basis: Basis, own: Sequence[AdjustedUnknown]
 ) -> tuple[str, int, float, float, float, float, float]:
-    """Return basis, number of coefficients, span, largest correction with time, largest test value."""
+    """Return basis, coefficients, span, largest correction and time, largest test."""
     first, last = trajectory.table.span
     times, values = _times(basis, first, last), np.array([each.position for each in own])
     # The others do not count.
@@ -339,7 +339,7 @@ def _correction(
 
 
 def _times(basis: Basis, first: float, last: float) -> Floats:
-    """Return times over a span: some in each interval of knots, or for each coefficient of a polynomial."""
+    """Return times over a span: some per knot interval, or per coefficient."""
     if isinstance(basis, Polynomial):
         return np.linspace(first, last, STEPS * basis.count + 1) if last > first else np.array([first])
     knots, p = np.asarray(basis.knots, dtype=float), basis.degree

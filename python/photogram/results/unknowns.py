@@ -26,7 +26,7 @@ _ARRAYS = ("change", "position", "attitude", "cofactors", "covariance", "with_fo
 
 @dataclass(frozen=True, eq=False)
 class AdjustedUnknown:
-    """A common adjusted unknown of observations with k components. Arrays are read-only."""
+    """An adjusted common unknown with k components. Arrays are read-only."""
 
     given: Unknown
     # (k,) names and units: the linear unit, the linear unit a second, radians, radians a

@@ -53,7 +53,7 @@ class Bin:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VarianceFunction(Documented, Brief):
-    """The variance of image coordinates as a function: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
+    """Variance of image coordinates: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class VarianceFunction(Documented, Brief):
         return float(a + b * (value / self.largest) ** 2)
 
     def plot(self) -> Plot:
-        """Plot the factors of ten quantiles with their 95 percent intervals, and the function."""
+        """Plot factors of ten quantiles with 95 percent intervals, and the function."""
         places = np.array([[each.value, each.factor] for each in self.bins])
         low, high = np.array([each.interval for each in self.bins]).T
         x = np.linspace(0.0, self.largest, 100)
@@ -114,7 +114,7 @@ class VarianceFunction(Documented, Brief):
         return self.bins_table().frame()
 
     def bins_table(self) -> Table:
-        """Return the declared table: mean of the bin, redundancy, factors by residuals and function."""
+        """Return the declared table: bin means, redundancy, both factors."""
         low, high = np.array([each.interval for each in self.bins]).reshape(-1, 2).T
         columns = [
             of_each(self.bins, "value", name=self.name, head=self.name.capitalize(), figures=4),

@@ -1,4 +1,4 @@
-"""Conversion of declared tables to cells: one column per component, or one row; formats numbers."""
+"""Conversion of declared tables to cells of formatted numbers."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _unit(each: Quantity, axis: Axis) -> str:
 
 
 def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:
-    """Return the decimals of components: two digits of the median deviation, for degrees four more.
+    """Return decimals of components: two digits of the median sd, degrees more.
 
     None if unknown: in a column of several components without standard deviation.
     """

@@ -43,7 +43,7 @@ def to_json(document: Document) -> bytes:
 
 
 def text(document: Document) -> str:
-    """Return a document as a text report: verdict, next steps, highlights, sections, details."""
+    """Return the text report: verdict, next steps, highlights, sections."""
     judged = [
         (title, [textwrap.fill(sentence, WIDTH) for sentence in sentences])
         for title, sentences in _judged(document)
@@ -56,7 +56,7 @@ def text(document: Document) -> str:
 
 
 def titled_lines(document: Document, *keys: str) -> list[TitledLines]:
-    """Return titles and lines: verdict, next steps, key figures, and sections with the given keys.
+    """Return titles and lines: verdict, next steps, key figures, sections.
 
     Without keys, all sections are returned; with keys, sections are without introduction.
     """
@@ -74,7 +74,7 @@ def _judged(document: Document) -> list[TitledLines]:
 
 
 def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
-    """Return the lines of key figures and sections with their titles; empty ones are omitted."""
+    """Return lines of key figures and non-empty sections with titles."""
     figures = fact_lines([*document.head, *document.highlights])
     whole = replace(document, sections=[*document.sections, *document.details])
     titled = [("Key figures", figures)] + [
@@ -118,7 +118,7 @@ def part_lines(part: Part, title: str = "") -> list[str]:
 
 
 def summary(document: Document, *keys: str) -> list[str]:
-    """Return the lines of a summary: verdict, next steps, tables with these keys, highlights."""
+    """Return summary lines: verdict, next steps, tables with keys, highlights."""
     lines = [f"verdict: {each.headline}" for each in document.judgements]
     lines += [f"next: {sentence}" for sentence in document.advice]
     for table in document.tables(layers=True):
@@ -131,7 +131,7 @@ def summary(document: Document, *keys: str) -> list[str]:
 
 
 def table_text(table: Table) -> list[str]:
-    """Return the lines of a table: names left-aligned, numbers right-aligned, `*` after marked numbers."""
+    """Return table lines: names left, numbers right, `*` after marked numbers."""
     columns = [[f"{column.head} {column.unit}".rstrip().translate(PLAIN)] for column in table.columns]
     for row in table.rows:
         for texts, column, cell in zip(columns, table.columns, row, strict=True):

@@ -26,7 +26,7 @@ ACROSS = 3  # Number of charts in a row
 
 
 def history_part(history: History, whose: str, about: str = "", **members: object) -> Document:
-    """Return the document of one history: changes with the introduction `about`, all values, members."""
+    """Return the document of a history: changes, introduction, values, members."""
     own = quantity.members(history, "occasions", "times", "tests", "level", "limit")
     names, p = ("variance", "degrees_of_freedom"), "probability_above"
     constancy = quantity.members(history.constancy, *names, probability=p)
@@ -39,7 +39,7 @@ def history_part(history: History, whose: str, about: str = "", **members: objec
 
 
 def series(history: History, about: str = "") -> Table:
-    """Return one row per quantity: mean, drift, the largest test of a step, and the changes."""
+    """Return one row per quantity: mean, drift, largest step test, changes."""
     own = history.series
     axes = tuple(Axis.of(each.name, each.unit) for each in own)
     of, found = np.arange(len(own)), [", ".join(change.kind for change in each.changes) for each in own]
@@ -104,7 +104,7 @@ def history_document(
     more: Sequence[Section] = (),
     **fields: Any,
 ) -> Document:
-    """Return the document of calibrations in the order of their dates, with changes and `more` sections.
+    """Return the document of dated calibrations, with changes and `more`.
 
     `parts` are the documents of the histories; their tables become layers. `fields` are further fields.
     """
@@ -138,7 +138,7 @@ _CHARTS = (
 
 
 def control_charts(history: History, title: str) -> Plot:
-    """Return every quantity over time: values with standard deviations, mean, limits and changes.
+    """Return quantities over time: values with sd, mean, limits, changes.
 
     Dashed lines show values whose |t| against the others equals the critical value of all tests. Values
     beyond are marked.

@@ -22,7 +22,7 @@ NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # Numbers that the script of a
 
 
 def page_html(page: Document) -> bytes:
-    """Return a page as an HTML file (UTF-8) that needs neither a network nor other files.
+    """Return a page as self-contained HTML (UTF-8).
 
     It requires jinja2 (`pip install 'photogram[report]'`).
     """

@@ -55,7 +55,7 @@ def verdict_table(verdict: Verdict, words: Words | None = None) -> Table:
 
 
 def tests_section(verdict: Verdict) -> Section:
-    """Return the section of all tests of a verdict; empty, and so hidden, without tests."""
+    """Return the section of verdict tests; hidden without tests."""
     return Section("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [])
 
 

@@ -1,4 +1,4 @@
-"""Common methods of results: verdict, document, and a summary in a terminal or notebook.
+"""Common methods of results: verdict, document, and summary.
 
 Their methods `document` and `_findings` import the modules that create the document or the findings.
 """
@@ -29,7 +29,7 @@ class Judged:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Verdict: whether the result can be used, and if not, the reason; see `docs/tests.md`."""
+        """Whether the result can be used, and if not, the reason (`docs/tests.md`)."""
         from photogram.statistics.verdict import verdict  # imported on demand
 
         return verdict(self._findings())
@@ -39,7 +39,7 @@ class Judged:
 
 
 class Documented:
-    """Base class of results with a document, from which all output formats are created."""
+    """Base class of results with a document, the source of all output formats."""
 
     def document(self) -> Document:
         """Return the document: verdict, sections, tables."""
@@ -52,7 +52,7 @@ class Documented:
         return text(self.document())
 
     def to_json(self) -> bytes:
-        """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
+        """Return the result as a JSON document (UTF-8); its page lists the members."""
         from photogram.show.forms import to_json
 
         return to_json(self.document())
@@ -73,7 +73,7 @@ class Brief:
     """Base class with a short summary, for data classes declared with `repr=False`."""
 
     def brief(self) -> tuple[str, Rows]:
-        """Return a title and rows of a summary, most important first; by default all fields."""
+        """Return a title and rows of a summary; by default all fields."""
         named = [each.name for each in fields(self)]  # type: ignore[arg-type]
         return type(self).__name__, [(name, told(getattr(self, name))) for name in named]
 

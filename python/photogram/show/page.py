@@ -102,7 +102,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Layers:
-    """Alternative parts of which one is shown at a time; all on paper and without scripts."""
+    """Alternatives shown one at a time; all on paper and without scripts."""
 
     name: str
     parts: Sequence[Drawing | Picture | Table | quantity.Table]
@@ -194,7 +194,7 @@ class Document:
         return [part for part in self.parts(layers=True) if isinstance(part, Drawing)]
 
     def parts(self, *, layers: bool = False) -> list[Part]:
-        """Return the parts of all sections and details; parts of layers instead of layers on request."""
+        """Return parts of sections and details; on request parts of layers."""
         parts = [part for section in (*self.sections, *self.details) for part in section.parts]
         if layers:
             parts = [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]
@@ -216,7 +216,7 @@ def layered_tables(name: str, tables: Sequence[quantity.Table]) -> Sequence[Laye
 
 
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:
-    """Return one document of several with the same tables, which become layers of a section.
+    """Return one document of several with the same tables as layers.
 
     Layers, verdicts and highlights have the titles of their documents; `more` are further fields.
     """
@@ -239,14 +239,14 @@ def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -
 
 
 def number_text(value: float | str | None, decimals: int | None, figures: int = 4) -> str:
-    """Return a value with decimals or significant figures; integers and texts are unchanged."""
+    """Return a value with decimals or figures; integers and texts unchanged."""
     if value is None or isinstance(value, str | int):
         return "" if value is None else f"{value}"
     return significant(value, figures) if decimals is None else fixed(value, decimals)
 
 
 def fixed(value: float, decimals: int) -> str:
-    """Return a number in fixed point, zero without a sign; very long numbers with an exponent."""
+    """Return a fixed-point number, zero unsigned; long ones with an exponent."""
     if not abs(value) < 1e15:
         return significant(value)
     text = f"{value:.{decimals}f}"
@@ -267,14 +267,14 @@ def significant(value: float, figures: int = 4) -> str:
 
 
 def probability_written(value: float) -> str:
-    """Return a probability with two figures, with an exponent if it is small; `< 1e-99` below that."""
+    """Return a probability with two figures; `< 1e-99` if below that."""
     return f"{value:.2g}" if not value < LEAST_PROBABILITY else f"< {LEAST_PROBABILITY:g}"
 
 
 def decimals_of(
     deviations: Floats, *, smallest: bool = False, unknown: int = 4, most: int = MOST_DECIMALS
 ) -> int:
-    """Return the number of decimals of values with these standard deviations, in their unit.
+    """Return the decimals of values with these standard deviations.
 
     The smallest or the median deviation has two significant figures. `unknown` is returned if none is known,
     `most` is the maximum.

@@ -28,7 +28,7 @@ LONGEST = 30  # Longest word that is not broken, characters
 
 
 def page_pdf(page: Document, *, author: str = "") -> bytes:
-    """Return a document as PDF: tagged, with bookmarks, page numbers and embedded fonts.
+    """Return a document as tagged PDF with bookmarks and embedded fonts.
 
     `author` is a property of the file.
     """

@@ -56,7 +56,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Link:
-    """Photos or points (`kind`) of names: `rows` among all; `here` if the page row is their own."""
+    """Photos or points (`kind`) of names: all `rows`; `here` for own page rows."""
 
     kind: str
     rows: Indices
@@ -103,7 +103,7 @@ class Quantity:
         return axis.small
 
     def outward(self) -> Floats:
-        """Return the numbers in the units of reports; angles are in degrees for the notation `deg` only."""
+        """Return numbers in report units; angles in degrees only for `deg`."""
         values = np.asarray(self.values, dtype=float)
         if self.seen is not None:
             values = np.where(self.seen, values, np.nan)
@@ -113,7 +113,7 @@ class Quantity:
         return values
 
     def at(self, rows: Indices, axes: Indices | None = None) -> Quantity:
-        """Return the quantity of some items; with `axes`, one component of each if it has several."""
+        """Return the quantity of some items; with `axes`, one component of each."""
         one = axes is not None and not self.single
         parts: dict[str, Any] = {
             name: np.asarray(part)[(rows, axes) if one else rows]
@@ -143,7 +143,7 @@ class Table:
 
     @property
     def visible(self) -> bool:
-        """Whether reports show it; tables without rows or heads are in JSON and files only."""
+        """Whether reports show it; other tables are in JSON and files only."""
         rows = self.columns[0].values if self.shown is None else self.shown
         return len(rows) > 0 and any(column.head for column in self.columns)
 
@@ -154,7 +154,7 @@ class Table:
         return pd.DataFrame(frame(self.columns))
 
     def record(self) -> list[dict[str, Any]] | dict[str, dict[str, Any]]:
-        """Return the rows of a JSON document: a list, or an object with the names of the first column."""
+        """Return rows for JSON: a list, or an object with first column names."""
         if self.keyed:
             names = np.asarray(self.columns[0].values).tolist()
             return dict(zip(names, records(self.columns[1:]), strict=True))
@@ -177,7 +177,7 @@ def of_each(
 def attribute(
     thing: object, name: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
 ) -> Quantity:
-    """Return an attribute of a result, an array with n rows, as a quantity with the same name."""
+    """Return an attribute, an array with n rows, as a quantity of that name."""
     return Quantity(attrgetter(name)(thing), axes, kind, **{"name": name, "member": name, **more})
 
 
@@ -231,12 +231,12 @@ def joined(tables: Sequence[Quantities]) -> list[Quantity]:
 
 
 def frame(table: Quantities) -> dict[str, Any]:
-    """Return the columns of files and data frames: angles in degrees, other units in the names."""
+    """Return columns of files: angles in degrees, other units in names."""
     return {name: values for name, _, values in _columns(table)}
 
 
 def units(table: Quantities) -> dict[str, list[str]]:
-    """Return the names of the columns of `frame` by unit, if the unit is not in the name."""
+    """Return column names of `frame` by unit, if not in the name."""
     names: dict[str, list[str]] = {}
     for name, unit, _ in _columns(table):
         names.setdefault(unit, []).append(name)
@@ -266,7 +266,7 @@ def _columns(table: Quantities) -> Iterator[tuple[str, str, Any]]:
 
 
 def members(thing: object, *names: str, **others: str) -> dict[str, Any]:
-    """Return attributes as members of JSON: by name, and others (`a.b`) with other names."""
+    """Return attributes as JSON members, others (`a.b`) with other names."""
     attributes = {**dict(zip(names, names, strict=True)), **others}
     values = {name: attrgetter(attribute)(thing) for name, attribute in attributes.items()}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
@@ -279,7 +279,7 @@ def members_of_each(things: Sequence[object], *names: str, **others: str) -> lis
 
 
 def records(table: Quantities) -> list[dict[str, Any]]:
-    """Return the rows of a JSON document: longitudes and latitudes in degrees, other angles in radians."""
+    """Return JSON rows: longitudes and latitudes in degrees, else radians."""
     columns: dict[str, Any] = {}
     for each in table:
         values = each.values

@@ -41,7 +41,7 @@ class Run:
 
 
 def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
-    """Return regular files with sizes and SHA-256 sums, at most `LISTED`, and the number of others."""
+    """Return at most `LISTED` files with sizes and SHA-256, and the rest's number."""
     found = []
     every = [each for each in dict.fromkeys(paths) if each.is_file()]
     for path in every[:LISTED]:
@@ -52,7 +52,7 @@ def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
 
 
 def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
-    """Return the last section of a report: a command's run, or None, and seconds per engine phase."""
+    """Return the last report section: a command's run, and engine seconds."""
     made = [Fact("photogram", _photocore.__version__), Fact("Python", platform.python_version())]
     if run is not None:
         stamp = run.began.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S")

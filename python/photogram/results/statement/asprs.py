@@ -1,4 +1,4 @@
-"""Figures and classes of the ASPRS Positional Accuracy Standards, Edition 2 (2023; Version 2, 2024).
+"""Figures and classes of the ASPRS standards, Edition 2 (2023; Version 2, 2024).
 
 See section 2.2 of the specification of the statement, which lists confirmations by other texts and open
 checks against the standard. Differences contain the errors of the product and of the check survey. The
@@ -50,7 +50,7 @@ class Remark:
 
 
 def points_asked_for(area: float) -> int:
-    """Return the required check points of an area (km2), for each of NVA and VVA (7.13, table C.1).
+    """Return required check points of an area (km2), for NVA and VVA (7.13, table C.1).
 
     Ten more for every 1,000 km2. Minimum and maximum are confirmed, the steps between are not.
     """
@@ -103,7 +103,7 @@ def wording(count: int) -> str:
 
 
 def survey_good_enough(survey: float, limit: float) -> bool:
-    """Return whether a check survey is at least twice as accurate as the class (7.12): RMSE_2 <= N/2.
+    """Return whether a check survey has RMSE_2 <= N/2, half of the class (7.12).
 
     RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
     """
@@ -113,7 +113,7 @@ def survey_good_enough(survey: float, limit: float) -> bool:
 def control_good_enough(
     plan: float, height: float, class_h: float, class_v: float | None = None
 ) -> tuple[bool, bool]:
-    """Return whether the control of a triangulation is accurate enough in plan and in height (7.9).
+    """Return whether control is accurate enough in plan and in height (7.9).
 
     `plan` and `height` are root mean squares of its standard deviations, radial in plan, in the linear unit.
     The limits are half of the horizontal and vertical classes; the full horizontal class for height without a
@@ -125,7 +125,7 @@ def control_good_enough(
 def remarks(
     differences: Floats, class_h: float | None = None, class_v: float | None = None
 ) -> tuple[Remark, ...]:
-    """Return necessary investigations before a class is stated (7.2); nothing is removed.
+    """Return necessary investigations before a class is stated (7.2).
 
     Limits are a quarter of the class for means and three times the class for differences; in plan by axis,
     with the class divided by the root of 2. `differences` are (n, 3) east, north, height: adjusted minus

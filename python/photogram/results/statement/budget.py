@@ -170,7 +170,7 @@ def _largest(rows: Rows, squares: Floats, t: Floats, share: float) -> Iterable[S
 
 
 def budget_line(texts: Texts, found: Budget) -> str:
-    """Return value, standard deviation (two significant digits) and expanded uncertainty in a sentence."""
+    """Return a sentence with value, sd (two digits) and expanded uncertainty."""
     factor, unit = (1.0, found.unit) if found.unit != "rad" else (math.degrees(1.0), "°")
     sd = found.sd * factor
     decimals = decimals_of(np.array([sd]), unknown=6)
@@ -225,7 +225,7 @@ _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", AT
 
 
 class Rows:
-    """All M observations in G groups, each an image or a control point, with items and names."""
+    """All M observations in G groups, images or control points, with names."""
 
     def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
         self.block = result.block
@@ -263,7 +263,7 @@ class Rows:
         return list(found), number
 
     def sources(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return level, name, number of rows and contribution of every source, from (M,) squares."""
+        """Return level, name, row number and contribution of sources, from (M,) squares."""
         sums, sizes = np.add.reduceat(squares, self._starts[:-1]), self._sizes
         yield from _sums("kind", self._kinds, self._of_kind, sums, sizes)
         own, rows, photo = sums[self._images], sizes[self._images], self.suspects.photos[self._images]
@@ -340,7 +340,7 @@ def kind_of(label: str) -> str:
 def _sums(
     level: str, names: Sequence[str], of: Indices, sums: Floats, sizes: Indices, most: int | None = None
 ) -> Iterable[tuple[str, Phrase | str, int, float]]:
-    """Return the sums over groups with rows in their order; or the largest, and the sum of others."""
+    """Return sums over non-empty groups in order; or the largest, and the rest."""
     if of.min(initial=0) < 0:
         inside = of >= 0
         of, sums, sizes = of[inside], sums[inside], sizes[inside]

@@ -1,4 +1,4 @@
-"""Check points of an adjusted block: differences and joint covariance in east, north, up.
+"""Check points: differences and joint covariance in east, north, up.
 
 For n check points d_i = adjusted - given; their joint covariance is C = s2 Q + S. Q are the joint cofactors
 of the adjusted points, including cross blocks. S is the covariance of the survey, which the variance of unit
@@ -124,8 +124,8 @@ class Compared:
 def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared:
     """Return the check points of a result with its covariances.
 
-    Refused are a chosen datum, which has no comparable coordinates, and points without standard deviations of
-    their survey, with only one plan axis, or that are control.
+    It refuses a chosen datum, because coordinates are not comparable. It also refuses points that are
+    control, have only one plan axis, or lack standard deviations of their survey.
     """
     block, checks = result.block, result.check_points
     rows = in_order(block, checks.rows)
@@ -179,7 +179,7 @@ def in_order(block: Block, rows: Indices) -> Indices:
 
 
 def turned_to_east(block: Block, positions: Floats) -> Floats:
-    """Return (n, 3, 3) J: the transformation of differences at (n, 3) positions to east, north, up."""
+    """Return (n, 3, 3) J: transformation at (n, 3) positions to east, north, up."""
     if block.spheroid is not None:
         return np.asarray(np.eye(3) * lengths_of_units(_finite(positions), block.spheroid)[:, :, np.newaxis])
     if block.frame.kind == "geocentric":
@@ -189,7 +189,7 @@ def turned_to_east(block: Block, positions: Floats) -> Floats:
 
 
 def turned_jointly(turn: Floats, joint: Floats) -> Floats:
-    """Return J C J' of the (3 n, 3 n) joint covariance of points, J from :func:`turned_to_east`."""
+    """Return J C J' of a (3 n, 3 n) covariance, J from :func:`turned_to_east`."""
     n = len(turn)
     blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
     return np.asarray(blocks.reshape(3 * n, 3 * n))
@@ -211,7 +211,7 @@ def _turned(turn: Floats, differences: Floats) -> Floats:
 
 
 def plan_positions(block: Block, positions: Floats) -> Floats:
-    """Return (n, 3) positions as east, north, height; at the centre of the stations on the earth."""
+    """Return (n, 3) positions as east, north, height about the station centre."""
     if block.spheroid is not None:
         return local_axes(block).positions(positions)
     if block.frame.kind != "geocentric":
@@ -225,7 +225,7 @@ def plan_positions(block: Block, positions: Floats) -> Floats:
 def _survey(
     block: Block, rows: Indices, differences: Floats, names: Sequence[str], asked: tuple[float, ...] | None
 ) -> Floats:
-    """Return (n, 3) standard deviations of the survey, which are angles in geographic blocks."""
+    """Return (n, 3) survey standard deviations, angles in geographic blocks."""
     own = np.full((len(rows), 3), np.nan)
     if block.point_check_sd is not None:
         units = lengths_of_units(_finite(block.point_positions[rows]), block.spheroid)
@@ -245,7 +245,7 @@ def _survey(
 
 
 def _survey_covariance(sd: Floats, asked: Asked) -> Floats:
-    """Return S: variances by point, and the common error unless it cancels in the differences."""
+    """Return S: point variances, and the common error unless it cancels."""
     known = np.nan_to_num(sd).ravel()
     survey = np.diag(known**2)
     if not asked.survey_common_in_control:
@@ -258,7 +258,7 @@ def _survey_covariance(sd: Floats, asked: Asked) -> Floats:
 
 
 def _control_positions(block: Block) -> dict[str, Floats]:
-    """Return (3,) given coordinates of control points by name: weighted, fixed or jointly observed."""
+    """Return (3,) given coordinates of control by name, also jointly observed."""
     held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
     found = {block.point_ids[row]: block.point_positions[row] for row in held.tolist()}
     observed = [each for each in block.observations if isinstance(each, Control)]
@@ -312,7 +312,7 @@ NOTHING = Survey((), (), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), N
 
 
 def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
-    """Return control and check points of a block, in a system or in the block's own axes."""
+    """Return control and check points in a system or in the block's axes."""
     block = result.block
     if system is None:  # The axes of the block, longitudes and latitudes in degrees
         axes = point_axes(block)
@@ -342,7 +342,7 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
 
 
 def _carried(system: System, positions: Floats) -> Floats:
-    """Return positions in a system; missing coordinates are allowed only in the block's own axes."""
+    """Return positions in a system; only block axes allow missing coordinates."""
     if not system.crs:
         return system.carried(positions)
     found = np.full(positions.shape, np.nan)

@@ -78,7 +78,7 @@ _LAYOUT = {
 
 
 def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
-    """Return number, redundancy and weighted sum of squares of every type, including cameras."""
+    """Return number, redundancy and sum of squares of every type and cameras."""
     grouping = grouped(observables(result), "kind")
     counts, squares, redundancy = sums_of(result, grouping)
     found = {

@@ -1,4 +1,4 @@
-"""Plots of a statement: differences at check points, and photos per ground position."""
+"""Plots of a statement: check point differences, and photos per position."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ CELLS = 120  # Along the longer side of the map of overlap
 
 
 def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
-    """Draw (k, 3) control, check points, their differences in plan, and in height as colours."""
+    """Draw (k, 3) control, check points and differences, heights as colours."""
     if not len(found) and not len(control):
         return None
     places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
@@ -91,7 +91,7 @@ def _points(panel: Panel, found: Compared, extent: float, texts: Texts) -> Panel
 
 
 def lengths(found: Lengths, texts: Texts) -> Plot:
-    """Draw errors of calibrated lengths by length, with one standard deviation, and their limits."""
+    """Draw errors of calibrated lengths by length, with sd and limits."""
     test, order = found.test, np.argsort(found.calibrated, kind="stable")
     places = np.column_stack([found.calibrated, test.errors])
     ends = [test.errors - test.sd, test.errors + test.sd]
@@ -111,7 +111,7 @@ def lengths(found: Lengths, texts: Texts) -> Plot:
 
 
 def overlap(result: Result, texts: Texts) -> Plot | None:
-    """Draw the number of adjusted photos of each ground position; None without footprints."""
+    """Draw the number of photos of ground positions; None without footprints."""
     outlines = footprints(result).outlines[:, :, :2]
     outlines = outlines[np.isfinite(outlines).all(axis=(1, 2))]
     if not len(outlines):
@@ -130,7 +130,7 @@ def overlap(result: Result, texts: Texts) -> Plot | None:
 
 
 def photos_per_place(outlines: Floats, x: Floats, y: Floats) -> Floats:
-    """Return (len(y), len(x)) numbers of (P, k, 2) closed outlines that contain each grid position."""
+    """Return (len(y), len(x)) numbers of closed outlines around grid positions."""
     counts = np.zeros((len(y), len(x)))
     for outline in outlines:
         columns = np.flatnonzero((x >= outline[:, 0].min()) & (x <= outline[:, 0].max()))
@@ -142,7 +142,7 @@ def photos_per_place(outlines: Floats, x: Floats, y: Floats) -> Floats:
 
 
 def _inside(places: Floats, outline: Floats) -> Bools:
-    """Return the positions inside an outline: lines to the east cross it an odd number of times."""
+    """Return positions inside an outline by odd crossings of lines to the east."""
     x, y = places[:, :1], places[:, 1:]
     (x0, y0), (x1, y1) = outline[:-1].T, outline[1:].T
     crosses = (y0 > y) != (y1 > y)

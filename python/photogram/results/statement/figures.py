@@ -1,4 +1,4 @@
-"""Accuracy figures of check points: by component, horizontal and 3D, with intervals and radii.
+"""Accuracy figures of check points by component, horizontal and 3D.
 
 RMSE of n differences is the root of their mean square and includes a bias. Horizontal figures use points with
 both plan coordinates, 3D figures points with all three.
@@ -39,7 +39,7 @@ INSIDE = 0.95
 
 @dataclass(frozen=True)
 class Sized:
-    """The differences of a component (`e`, `n`, `h`), radial in plan (`plan`) or in space (`all`)."""
+    """Differences of a component (`e`, `n`, `h`), or radial (`plan`, `all`)."""
 
     n: int  # Number of differences
     # Of components; NaN for radial figures; the sd is NaN for one point
@@ -99,14 +99,14 @@ class Figures:
         return math.hypot(self.rmse_h, self.rmse_v)
 
     def without_survey(self, part: str) -> float:
-        """Return `sqrt(RMSE_1^2 - RMSE_2^2)` of `h` or `v`; NaN if below the survey's own accuracy."""
+        """Return `sqrt(RMSE_1^2 - RMSE_2^2)` of `h` or `v`; NaN below the survey."""
         first, second = (self.rmse_h1, self.rmse_h2) if part == "h" else (self.rmse_v1, self.rmse_v2)
         square = first**2 - second**2
         return math.sqrt(square) if square >= 0 else math.nan
 
 
 def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
-    """Return the figures of check points, biases with expanded uncertainties; None without any."""
+    """Return figures of check points, and biases with uncertainties, or None."""
     if not len(found):
         return None
     k = critical_student(1.0 - coverage, found.second)

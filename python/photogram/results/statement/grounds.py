@@ -50,7 +50,7 @@ class RemovedObservation:
 
 
 def removed_observations(result: Result, earlier: Sequence[Phrase | str]) -> tuple[RemovedObservation, ...]:
-    """Return all removed observations, including those removed `earlier` by the caller."""
+    """Return all removed observations, with those removed `earlier`."""
     snooped = () if result.snooped is None else [each["subject"] for each in result.snooped.removed]
     of_reason = {"snooping": snooped, "first values": result.set_aside, "earlier": earlier}
     return tuple(RemovedObservation(name, reason) for reason, names in of_reason.items() for name in names)

@@ -1,4 +1,4 @@
-"""Tests of predicted accuracy: differences at check points against their joint covariance.
+"""Tests of predicted accuracy by differences and their joint covariance.
 
 For all and each component T = d' C^-1 d is chi-square with the number of rows as degrees of freedom. T / m is
 approximately F(m, f) if s2 is posterior, because the survey's part of C is not estimated. The bias has z = n
@@ -65,7 +65,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Bias:
-    """The mean difference of a component, with its standard deviation by all covariances, or variances."""
+    """Mean difference of a component, with sd by covariances, or variances."""
 
     mean: float
     sd_of_mean: float
@@ -133,12 +133,12 @@ class PointTests:
 
     @property
     def limit(self) -> float:
-        """Probability below which one of the n points or its position is wrong (Bonferroni)."""
+        """Probability limit for one wrong point of n (Bonferroni)."""
         return LEVEL / max(len(self.T), 1)
 
 
 def prediction(found: Compared, part: str) -> Prediction | None:
-    """Test a part of the components, `e`, `n`, `h`, `plan` or `all`; None without differences."""
+    """Test a part (`e`, `n`, `h`, `plan`, `all`); None without differences."""
     d, covariance = found.of(part)
     if not d.size:
         return None
@@ -191,7 +191,7 @@ def _inverse(covariance: Floats) -> Floats:
 
 
 def bias(found: Compared, component: str, k: float) -> Bias | None:
-    """Test the mean of a component, `e`, `n` or `h`, with the coverage factor k; None without differences."""
+    """Test the mean of `e`, `n` or `h` with coverage factor k, or None."""
     d, covariance = found.of(component)
     if not d.size:
         return None
@@ -209,7 +209,7 @@ def bias(found: Compared, component: str, k: float) -> Bias | None:
 
 
 def surface(found: Compared) -> Surface | None:
-    """Fit 1, x, y, x^2 + y^2 to height differences; None if fewer than 6, or all on a line."""
+    """Fit 1, x, y, x^2 + y^2 to heights; None if fewer than 6, or on a line."""
     d, covariance = found.of("h")
     if len(d) < LEAST:
         return None

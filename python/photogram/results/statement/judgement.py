@@ -1,4 +1,4 @@
-"""The verdict of a statement: headline, exit code, sentences, assumptions, messages."""
+"""The verdict of a statement: headline, exit code, sentences, messages."""
 
 from __future__ import annotations
 
@@ -131,13 +131,13 @@ def _whole(of_all: Figures) -> Prediction | None:
 
 
 def _rejected(of_all: Figures | None) -> tuple[bool, bool]:
-    """Return whether the whole test finds differences larger, or smaller, than predicted."""
+    """Return whether differences are larger, or smaller, than predicted."""
     whole = None if of_all is None else _whole(of_all)
     return (False, False) if whole is None else (whole.rejected_high, whole.rejected_low)
 
 
 def _doubtful(of_all: Figures | None) -> bool:
-    """Return whether check points are missing, or a component, mean, surface or point does not agree."""
+    """Return whether check points are missing, or some test does not agree."""
     if of_all is None:
         return True
     parts = [each for each in of_all.prediction.values() if each is not None]

@@ -1,4 +1,4 @@
-"""Distribution of check points in a block: quadrants, spacing, coverage of area and heights.
+"""Distribution of check points: quadrants, spacing, area, heights.
 
 Requirements are a fifth of the points in each quadrant and a spacing of a tenth of the diagonal (NSSDA,
 FGDC-STD-007.3-1998); others are in section 4 of the specification of the statement. Failures are messages.
@@ -48,7 +48,7 @@ class Layout:
 
 
 def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
-    """Return the distribution of check points; None if all block positions are equal in plan.
+    """Return the distribution of check points; None for equal plan positions.
 
     `points` are (n, 3) east, north, height of the check points, n at least 1, NaN for unknown heights;
     `extent` (m, 3) are the positions of the block, which define its box and hull; `control` (k, 3).
@@ -72,7 +72,7 @@ def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
 
 
 def area_in_plan(positions: Floats) -> float:
-    """Return the area of the hull of (n, 2) or (n, 3) positions in plan, in the square of their unit."""
+    """Return the hull area of (n, 2) or (n, 3) positions in squared plan units."""
     return area(hull(positions[:, :2])) if len(positions) else 0.0
 
 
@@ -87,7 +87,7 @@ def _least_spacing(plan: Floats) -> float:
 
 
 def _far(plan: Floats, block: Floats, limit: float) -> float:
-    """Return the share of the area of a block that is farther from all points than a limit."""
+    """Return the share of block area farther from all points than a limit."""
     low, extent = block.min(axis=0), np.ptp(block, axis=0)
     middles = (np.arange(CELLS) + 0.5) / CELLS
     grid = low + extent * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)

@@ -43,7 +43,7 @@ class LeftOut:
 
 
 def leave_one_out(result: Result) -> list[LeftOut]:
-    """Return every used control point predicted by the others, in the order of their names."""
+    """Return used control points predicted by the others, in order of names."""
     block, found = result.block, []
     observed = {each.point: each for each in block.observations if isinstance(each, Control)}
     held_by = np.asarray(np.isfinite(block.point_sd).any(axis=1))
@@ -77,12 +77,12 @@ def leave_one_out(result: Result) -> list[LeftOut]:
 
 
 def limit_of(found: Sequence[LeftOut]) -> float:
-    """Return the probability below which a control point disagrees with the others (Bonferroni)."""
+    """Return the probability limit for disagreeing control (Bonferroni)."""
     return LEVEL / max(len(found), 1)
 
 
 def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats, result: Result) -> LeftOut:
-    """Return a point from residuals v of its components, a root F of their covariance, cofactors q."""
+    """Return a point from residuals v, a root F of their covariance, cofactors q."""
     inverse = np.linalg.inv(factor)
     residual, redundancy = inverse @ v, np.eye(len(v)) - inverse @ q @ inverse.T
     values, vectors = np.linalg.eigh((redundancy + redundancy.T) / 2)

@@ -110,14 +110,14 @@ def measured_lengths(positions: Floats, joint: Floats, pairs: Indices) -> tuple[
 
 
 def angle_to_diagonal(steps: Floats, extent: Floats) -> float:
-    """Return the smallest angle (radians) between (m, 3) non-zero steps and the diagonals of a (3,) box."""
+    """Return the smallest angle (radians) of (m, 3) non-zero steps to box diagonals."""
     sizes = np.linalg.norm(steps, axis=1) * float(np.linalg.norm(extent))
     # The nearest of the four diagonals has the component signs of the step.
     return math.acos(min(float((np.abs(steps) @ np.abs(extent) / sizes).max()), 1.0))
 
 
 def at_reference(lengths: Floats, temperatures: Floats, expansion: float) -> Floats:
-    """Return the (m,) lengths of a body at 20 degrees Celsius from other temperatures (deg C).
+    """Return (m,) lengths of a body at 20 degrees from other temperatures (deg C).
 
     `expansion` is its coefficient of thermal expansion, per kelvin: 11.5e-6 for steel. A coefficient that
     gives a length of zero is refused.
@@ -140,7 +140,7 @@ def length_test(
     off_diagonal: float = math.nan,
     freedom: float = math.inf,
 ) -> LengthTest:
-    """Test (m,) measured lengths against calibrated ones, both at 20 degrees (:func:`at_reference`).
+    """Test (m,) measured lengths against calibrated ones, both at 20 degrees.
 
     `covariance` is the (m, m) matrix of the measured lengths (:func:`measured_lengths`), `sd` are (m,)
     standard deviations of the calibrated ones, `lines` (m,) names of their lines. `diagonal` and

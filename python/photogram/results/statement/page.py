@@ -261,7 +261,7 @@ def _measured(texts: Texts, value: Any) -> str:
 
 
 def _features(texts: Texts, features: Features) -> Table:
-    """Return the quantities of features, with two figures of the smallest deviation per unit."""
+    """Return feature quantities with two figures of the least deviation per unit."""
     columns = Columns(texts)
     every = [(feature, own) for feature in features for own in feature.quantities]
     names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]

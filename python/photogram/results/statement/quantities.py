@@ -140,7 +140,7 @@ def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
 
 
 def _geocentric(x: Any, a: float, b: float) -> Any:
-    """Return geocentric coordinates of longitude, latitude, height; also for complex numbers."""
+    """Return geocentric coordinates of geographic ones; also complex numbers."""
     sp, cp = np.sin(x[1]), np.cos(x[1])
     across = a / (1 - (1 - (b / a) ** 2) * sp**2) ** 0.5
     level = (across + x[2]) * cp

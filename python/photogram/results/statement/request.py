@@ -28,7 +28,7 @@ _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
 @dataclass(frozen=True)
 class Asked:
-    """The options of a statement; lengths in the linear unit of the block, areas in its square.
+    """The options of a statement; lengths and areas in the block's linear unit.
 
     Attributes
     ----------
@@ -248,7 +248,7 @@ def lengths_in(unit: str) -> float:
 
 
 def length_of(given: str, unit: str, *, area: bool = False) -> float:
-    """Return a length such as `5cm`, or an area such as `12.5km2`, in the linear unit or its square.
+    """Return a length (`5cm`) or area (`12.5km2`) in the linear unit.
 
     Raises
     ------

@@ -99,7 +99,7 @@ class Asprs:
 
 @dataclass(frozen=True)
 class Nssda:
-    """Accuracy of n check points at 95 %, in the linear unit; missing figures are None."""
+    """Accuracy of n check points at 95 %, linear unit; missing values None."""
 
     count: int  # n
     ratio: float | None  # Smaller RMSE of an axis over the larger
@@ -301,7 +301,7 @@ def iso_measures(
 def measures(
     values: Mapping[str, object], element: str, *, unit: str, date: str, scope: str
 ) -> list[dict[str, Any]]:
-    """Return figures as measures of data quality, for JSON: by their keys in `MEASURES`, without None."""
+    """Return figures as data quality measures for JSON by keys in `MEASURES`."""
     return [
         {
             "element": element,
@@ -319,7 +319,7 @@ def measures(
 
 
 def _ellipse(moments: Floats) -> list[float] | None:
-    """Return semi-axes, and the azimuth of the larger one (rad, from north to east), of errors in plan."""
+    """Return semi-axes of plan errors, and the larger axis' azimuth (rad)."""
     if not np.isfinite(moments).all():
         return None
     values, vectors = np.linalg.eigh(moments)

@@ -72,7 +72,7 @@ class Statement(Grounds, Brief):
 
     @property
     def exit(self) -> int:
-        """The exit code. 0: without objections; 4: the statement must not be used as it is.
+        """The exit code: 0 without objections, 4 if the statement must not be used.
 
         The code is 4 if a class is missed, differences are larger than predicted, or the verdict of the
         adjustment requires it. With `strict` it is also 4 for a warning of that verdict, smaller

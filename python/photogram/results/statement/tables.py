@@ -27,7 +27,7 @@ decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
 
 
 class Columns:
-    """Columns with headers in the language of a statement; names in files are those in JSON documents."""
+    """Columns with headers in a language; file names as in JSON documents."""
 
     def __init__(self, texts: Texts) -> None:
         self.texts = texts

@@ -96,7 +96,7 @@ class Texts(Words):
         return sign.replace("-", "−") + whole + head + (point and self._table["number.decimal"]) + decimals
 
     def length(self, value: float, figures: int = 2) -> str:
-        """Return a length with its unit: centimetres if less than a metre, millimetres for less."""
+        """Return a length with unit: metres, centimetres or millimetres by size."""
         unit, factor = self.small(value)
         return f"{self.significant(value * factor, figures)} {unit}"
 
@@ -132,7 +132,7 @@ class Texts(Words):
         return self.text(Phrase(f"{family}.{name}"))
 
     def kind(self, name: str) -> str:
-        """Return the name of a type in the plural: `images`, `prior, lever arm`, `.., 4 coefficients`."""
+        """Return the plural of a type: `images`, `prior, lever arm`, ..."""
         names = []
         for part in name.split(", "):
             count, blank, rest = part.partition(" ")
@@ -141,7 +141,7 @@ class Texts(Words):
         return ", ".join(names)
 
     def observation(self, parts: Sequence[str]) -> str:
-        """Return the name of an observation from its type, the names of its items, and its component."""
+        """Return the name of an observation from type, items, and component."""
         kind, *things, component = parts
         one = ", ".join(self.word("one", part) for part in kind.split(", "))
         return " ".join([one, *things, self.word("axis", component)])

@@ -1,4 +1,4 @@
-"""Layout of the panels of a plot: margins follow from text widths, and boxes use the remaining space.
+"""Layout of panels: margins follow from text widths, boxes use the rest.
 
 All units are points, from the upper left corner, downwards.
 """
@@ -174,7 +174,7 @@ def _opened(panel: Panel) -> Panel:
 
 
 def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float, float]:
-    """Return the widths of numbers, names at the left and elements at the right in a cell."""
+    """Return widths of numbers, left names and right elements of a cell."""
     across, up = _ticks(panel, 0.75 * wide, high)
     named = LABEL + 6.0 if up.named(panel.up) else 0.0
     right = GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))

@@ -39,7 +39,7 @@ def widest(texts: Sequence[str], size: float) -> float:
 
 
 def wrapped(text: str, size: float, room: float) -> list[str]:
-    """Return the lines of a text within a width, broken between words and at line breaks."""
+    """Return lines of a text within a width, broken between words."""
     lines: list[str] = []
     for given in text.split("\n"):
         own: list[str] = []
@@ -74,7 +74,7 @@ def free_names(
 def first_free(
     boxes: Iterable[Box], room: Box, taken: list[Box], places: Floats = NOWHERE, gap: float = 0.0
 ) -> Box | None:
-    """Return the first box within `room` that covers no point and has a gap from the boxes `taken`.
+    """Return the first box within `room` that avoids points and the boxes `taken`.
 
     It is added to `taken`.
     """
@@ -99,7 +99,7 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True, eq=False)
 class Ticks:
-    """Values along an axis with their texts; `power`, if any, is added to the name of the axis."""
+    """Values along an axis with texts; `power` is added to the axis name."""
 
     values: Floats
     texts: list[str]
@@ -115,7 +115,7 @@ class Ticks:
 
 
 def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool = False) -> Ticks:
-    """Return the ticks of an axis with (2,) limits; `length` of the axis and `size` of letters are points.
+    """Return ticks of an axis with (2,) limits; `length` and `size` in points.
 
     With `across`, numbers are next to each other. Logarithmic axes have 1, 2, 5 times powers of ten.
     """
@@ -141,7 +141,7 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool
 
 
 def _ratios(low: float, high: float, length: float, size: float, *, across: bool) -> Ticks | None:
-    """Return ticks of a logarithmic axis within the available space; None if fewer than two."""
+    """Return ticks of a logarithmic axis; None if fewer than two fit."""
     powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
     for steps in ((1.0, 2.0, 5.0), (1.0, 5.0), (1.0,)):
         every = np.outer(powers, steps).ravel()

@@ -1,4 +1,4 @@
-"""Elements of panels: marks in the units of their axes, sizes in points (1/72 inch)."""
+"""Elements of panels in units of axes, sizes in points (1/72 inch)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Labelled(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Shades:
-    """Colours of values from `low` to `high` of the map `ordered` or `signed`; `label` of the colour bar.
+    """Colours of `ordered` or `signed` values from `low` to `high`, with `label`.
 
     If `log`, equal ratios of values have equal steps of colour.
     """
@@ -66,7 +66,7 @@ class Markers(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Line(Labelled):
-    """A line through (n, 2) points, or k lines through (k, n, 2); `dash` is empty, `--` or `:`."""
+    """A line through (n, 2) points, or k through (k, n, 2); `dash` style."""
 
     places: Floats
     colour: str = INK
@@ -87,7 +87,7 @@ class Level(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Arrows(Labelled):
-    """Arrows from (n, 2) points by (n, 2) vectors, in one colour or n; `width` of the shaft in panels."""
+    """Arrows from (n, 2) points by vectors; shaft `width` in panels."""
 
     places: Floats
     vectors: Floats
@@ -97,7 +97,7 @@ class Arrows(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Polygons(Labelled):
-    """Closed outlines through (n, v, 2) points; colours and opacities of interior and edge, if any."""
+    """Closed outlines through (n, v, 2) points, with colours and opacities."""
 
     places: Floats
     face: str
@@ -110,7 +110,7 @@ class Polygons(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Ellipses(Mark):
-    """Ellipses about (n, 2) points: (n, 2) semi-axes, and (n,) degrees from the horizontal axis.
+    """Ellipses about (n, 2) points: semi-axes and degrees from horizontal.
 
     With `fill`, an opacity, ellipses are filled and without outline.
     """
@@ -125,7 +125,7 @@ class Ellipses(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Mark):
-    """Equal cells between two corners in the colours of (rows, columns) values; NaN: empty."""
+    """Equal cells between corners, coloured by values; NaN: empty."""
 
     corners: Floats
     values: Floats
@@ -170,7 +170,7 @@ class Texts(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Names(Mark):
-    """Names near (n, 2) points, if there is space; they cover no other point and none of `avoid`."""
+    """Names near (n, 2) points, if space; none covers points or `avoid`."""
 
     places: Floats
     texts: Sequence[str]
@@ -192,20 +192,20 @@ def bars(edges: Floats, heights: Floats, colour: str, opacity: float, label: str
 
 
 def boxes(low: Floats, high: Floats) -> Floats:
-    """Return (n, 4, 2) outlines of boxes from (n, 2) lower left to (n, 2) upper right corners."""
+    """Return (n, 4, 2) outlines of boxes from lower left to upper right."""
     corners = [low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])]
     return np.stack(corners, axis=1)
 
 
 def ellipse_axes(covariances: Floats) -> tuple[Floats, Floats]:
-    """Return (n, 2) semi-axes and (n,) degrees of the standard ellipses of (n, 2, 2) covariances."""
+    """Return (n, 2) semi-axes and (n,) degrees of (n, 2, 2) covariances."""
     variances, turns = np.linalg.eigh(covariances)
     angles = np.degrees(np.arctan2(turns[:, 1, 1], turns[:, 0, 1]))
     return np.sqrt(np.maximum(variances[:, ::-1], 0.0)), angles
 
 
 def error_bars(places: Floats, low: Floats, high: Floats) -> Floats:
-    """Return (n, 2, 2) ends of vertical bars through (n, 2) points, from (n,) values to (n,) others."""
+    """Return (n, 2, 2) ends of vertical bars through (n, 2) points."""
     return np.stack([np.column_stack([places[:, 0], each]) for each in (low, high)], axis=1)
 
 
@@ -227,7 +227,7 @@ def stops(name: str) -> tuple[Floats, Floats]:
 
 
 def rgb(shades: Shades, values: Floats) -> Indices:
-    """Return (..., 3) red, green and blue, 0 to 255, of values; colours are clipped at the ends."""
+    """Return (..., 3) red, green, blue, 0 to 255; clipped at the ends."""
     places, colours = stops(shades.map)
     parts = shades.parts(values)
     return np.stack([np.interp(parts, places, own) for own in colours.T], axis=-1).round().astype(np.int64)
@@ -310,7 +310,7 @@ def spread(*values: Floats | float) -> tuple[float, float]:
 
 
 def around(places: Floats, part: float = 0.08) -> Floats:
-    """Return (2, 2) limits around (n, 2) points with a margin, a part of their larger extent."""
+    """Return (2, 2) limits around (n, 2) points with a relative margin."""
     low, high = places.min(axis=0), places.max(axis=0)
     room = part * (float((high - low).max()) or 1.0)
     return np.array([low - room, high + room])

@@ -1,4 +1,4 @@
-"""Panels with their marks on matplotlib axes, an extra (`pip install 'photogram[plots]'`)."""
+"""Panels on matplotlib axes (`pip install 'photogram[plots]'`)."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def lay_out(whole: Any) -> None:
 
 
 def draw(mark: marks.Mark, axes: Any) -> None:
-    """Draw a mark on axes with final limits; `Names` are drawn after the layout of all panels."""
+    """Draw a mark on axes with final limits; `Names` after the layout."""
     given: dict[str, Any] = {"zorder": mark.layer, "label": getattr(mark, "label", "") or None}
     match mark:
         case marks.Markers():

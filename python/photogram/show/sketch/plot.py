@@ -1,4 +1,4 @@
-"""A plot for users: displayed in notebooks, saved as a file, or drawn on matplotlib axes."""
+"""A plot for users: in notebooks, in files, or on matplotlib axes."""
 
 from __future__ import annotations
 

@@ -237,7 +237,7 @@ def _png(pixels: Indices) -> bytes:
 
 
 def names(placed: Placed, taken: list[Box]) -> str:
-    """Return the names on a panel, without overlaps with each other and with boxes `taken`."""
+    """Return the names on a panel, without overlaps with boxes `taken`."""
     left, top, right, low = placed.box
     # With y upwards, so that positions above the points are tried first.
     found, taken = [], [(box[0], -box[3], box[2], -box[1]) for box in taken]
@@ -304,7 +304,7 @@ def levels_written(placed: Placed, taken: list[Box]) -> str:
 
 
 def _along(line: Floats, wide: float) -> Iterator[Box]:
-    """Yield boxes in the middle of a line and nearer to its ends; none for a short line."""
+    """Yield boxes along a line, middle first; none for a short line."""
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     for part in (0.5, 0.3, 0.7, 0.15, 0.85) if lengths[-1] >= MIN_LABELLED_LENGTH else ():
         x, y = (float(np.interp(part * lengths[-1], lengths, own)) for own in line.T)
