@@ -2,8 +2,9 @@
 
 Blocks with one practical mistake each are adjusted, and the verdict is compared with the truth: a result is
 wrong if the mistake has moved two other points by more than 5 standard deviations. No block may be accepted
-without reserve then. The blocks come from the generator below, which uses numpy only and not the simulator of the
-package; the same noise is adjusted with and without the mistake, so that the difference is the mistake's.
+without reserve then. The blocks come from the generator below, which uses numpy only and not the simulator
+of the package; the same noise is adjusted with and without the mistake, so that the difference is the
+mistake's.
 """
 
 from __future__ import annotations

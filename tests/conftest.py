@@ -6,12 +6,17 @@ import copy
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
 import browser as browsers
 from golden_data import shared
 from photogram import Block, simulate
 from photogram.cli import app
+
+# A busy machine is slow; what is slow by itself shows in the durations of the suite.
+settings.register_profile("photogram", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("photogram")
 
 
 @pytest.fixture(scope="session")

@@ -29,9 +29,13 @@ def block_of(case):
     golden, observed = GOLDEN, GOLDEN["cases"][case]["observations"]
     camera, sd = golden["camera"], golden["standard_deviations"]
     poses = np.array(golden["start"]["poses"])
-    points = np.array(golden["start"]["points"])
-    names = [str(row) for row in range(len(points))]
-    control, point_sd = golden["control_points"], np.full(points.shape, np.inf)
+    count = len(golden["start"]["points"])
+    names = [str(row) for row in range(count)]
+    control, points, point_sd = (
+        golden["control_points"],
+        np.full((count, 3), np.nan),
+        np.full((count, 3), np.inf),
+    )
     point_sd[control] = sd["control"]
     points[control] = observed["control"]
     values = {"f": camera["f"], "cx": camera["cx"], "cy": camera["cy"], "k": camera["k1"]}
@@ -129,3 +133,53 @@ def test_scores_are_correlated_as_a_dense_program_has_it(case):
         for second, value in others.items():
             if first in sets and second in sets:
                 assert correlations[sets[first], sets[second]] == pytest.approx(value, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("case", "verdict", "codes"),
+    [
+        ("clean", "accepted", []),
+        ("control heights +0.3 m", "common-error", ["control-heights"]),
+        ("lever arm (0.2, 0, 0) m", "common-error", ["time-offset", "lever-arm"]),
+        ("f wrong by 0.3 %", "common-error", ["control-heights", "camera-f"]),
+        ("control 4 Z +0.3 m", "gross-errors", []),
+    ],
+)
+def test_the_verdict_names_the_errors_that_the_data_cannot_distinguish(case, verdict, codes):
+    result = adjust(block_of(case))
+    assert result.verdict.code == verdict
+    found = [each.code for each in result._hypotheses().common]
+    assert [code for code in codes if code in found] == codes
+    assert bool(found) is bool(codes)
+
+
+def test_photos_and_points_that_were_entered_twice_are_not_accepted():
+    block = block_of("clean")
+    count = len(block.photo_ids)
+    twice = block.replace(
+        photo_ids=[*block.photo_ids, *(f"again {name}" for name in block.photo_ids)],
+        photo_positions=np.tile(block.photo_positions, (2, 1)),
+        photo_attitudes=np.tile(block.photo_attitudes, (2, 1)),
+        photo_position_sd=np.inf,
+        photo_attitude_sd=np.inf,
+        photo_cameras=np.zeros(2 * count, dtype=np.int64),
+        image_photos=np.concatenate([block.image_photos, block.image_photos + count]),
+        image_points=np.tile(block.image_points, 2),
+        image_xy=np.tile(block.image_xy, (2, 1)),
+        image_sd=np.tile(block.image_sd, (2, 1)),
+    )
+    verdict = adjust(twice).verdict
+    assert (verdict.code, verdict.exit) == ("duplicates", 4)
+
+
+def test_one_distance_alone_leaves_the_scale_unchecked():
+    block = block_of("clean")
+    distance = block.observations[-1]
+    result = adjust(block.replace(observations=[distance], point_sd=np.full((50, 3), np.inf)))
+    assert result.verdict.code == "accepted-not-checked"
+    assert (result.verdict.exit_code(strict=False), result.verdict.exit_code(strict=True)) == (0, 4)
+    effects = result.external_reliability()
+    distances = effects[effects.code == "observation"]
+    assert (distances.redundancy < 1e-6).all()
+    assert (distances.points > 40).all()
+    assert len(result.hypotheses()) == len(effects)

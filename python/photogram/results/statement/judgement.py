@@ -76,6 +76,7 @@ RULES = (
     _rule("verdict", lambda e: not e.found.result.verdict.usable, NOT_USABLE),
     _rule("missed", lambda e: "missed" in (*e.classes, *e.facts), NOT_USABLE),
     _rule("high", lambda e: "high" in e.facts, NOT_USABLE),
+    _rule("unchecked", lambda e: e.found.result.verdict.code == "accepted-not-checked", NOT_USABLE),
     _rule("warning", lambda e: e.strict and "warning" in e.facts, NOT_USABLE),
     _rule("control", lambda e: e.strict and bool(e.control), NOT_USABLE),
     _rule("lengths", lambda e: e.strict and "lengths" in e.facts, NOT_USABLE),
