@@ -13,6 +13,7 @@ import photogram
 from photogram.collection import simulate
 from photogram.formats import read
 from photogram.results.statement import tables
+from photogram.show.cells import written
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +28,8 @@ def snooped():
 def listed(stated, table="table.removed"):
     """Return the rows of the table of removed observations on the page."""
     (annex,) = [each for each in stated.document().sections if each.key == "annex-e"]
-    found = [part for part in annex.parts if getattr(part, "caption", "") == stated.texts(table)]
-    return found[0].rows if found else []
+    found = [part for part in annex.parts if getattr(part, "title", "") == stated.texts(table)]
+    return written(found[0]).rows if found else []
 
 
 def keys(stated):
