@@ -29,7 +29,7 @@ PATTERNS = {
 }
 RULES = {name: re.compile(rule, re.IGNORECASE) for name, rule in PATTERNS.items()}
 GIANT_TERMS = "stand, lie, held, kept"  # "held" and "unheld" are terms of GIANT
-CEILINGS = {"pages": 4.0, "help": 4.0, "errors": 4.0, "words": 4.0, "docstrings": 35.9, "Rust": 4.0}
+CEILINGS = {"pages": 4.0, "help": 4.0, "errors": 4.0, "words": 4.0, "docstrings": 5.0, "Rust": 4.0}
 """Patterns per 1,000 words. They may only fall."""
 TERMS = {
     "at fault": "invalid",

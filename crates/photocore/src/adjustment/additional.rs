@@ -80,8 +80,11 @@ pub struct Additional {
 /// The equations of a local block.
 #[derive(Default)]
 struct LocalRows {
-    /// Of each equation: observed minus computed, coefficients of the unknowns of the block.
-    own: Vec<(f64, Vec<f64>)>,
+    /// Number of unknowns of the block.
+    width: usize,
+    /// Of each equation: observed minus computed; the coefficients of the unknowns of the block.
+    constants: Vec<f64>,
+    own: Vec<f64>,
     /// Where the coefficients of other unknowns, and the partials by the parameters, of each equation end.
     ends: Vec<(usize, usize)>,
     others: Vec<(usize, f64)>,
@@ -100,43 +103,41 @@ struct Extended<'a> {
 }
 
 impl LocalRows {
-    fn clear(&mut self) {
+    fn clear(&mut self, width: usize) {
+        self.width = width;
+        self.constants.clear();
         self.own.clear();
         self.ends.clear();
         self.others.clear();
         self.partials.clear();
     }
 
-    /// Takes over the equation whose coefficients are in the buffer.
-    fn push(
-        &mut self,
-        to: &Extended<'_>,
-        (of, sd, constant): (EquationOf, f64, f64),
-        first: usize,
-        width: usize,
-    ) {
-        let Self { partials, scratch, coefficients, .. } = self;
+    /// Takes over the equation whose coefficients are in the buffer; `first` is the first unknown of the block.
+    fn push(&mut self, to: &Extended<'_>, (of, sd, constant): (EquationOf, f64, f64), first: usize) {
+        let Self { width, constants, own, ends, others, partials, coefficients, scratch } = self;
         scratch.clear();
         to.parameters.partials(&Equation { of, sd, coefficients }, scratch);
-        partials.extend(scratch.iter().filter(|own| own.1 != 0.0));
-        let mut own = vec![0.0; width];
-        for &(unknown, value) in self.coefficients.iter().filter(|own| !to.fixed[own.0]) {
+        partials.extend(scratch.iter().filter(|partial| partial.1 != 0.0));
+        let start = own.len();
+        own.resize(start + *width, 0.0);
+        for &(unknown, value) in coefficients.iter().filter(|own| !to.fixed[own.0]) {
             match unknown.checked_sub(first) {
-                Some(k) if k < width => own[k] = value,
-                _ => self.others.push((unknown, value)),
+                Some(k) if k < *width => own[start + k] = value,
+                _ => others.push((unknown, value)),
             }
         }
-        self.own.push((constant, own));
-        self.ends.push((self.others.len(), self.partials.len()));
+        constants.push(constant);
+        ends.push((others.len(), partials.len()));
     }
 
     /// Each equation: observed minus computed, its coefficients of the block and of others, its partials.
     #[allow(clippy::type_complexity, reason = "the parts of an equation")]
     fn rows(&self) -> impl Iterator<Item = (f64, &[f64], &[(usize, f64)], &[(usize, f64)])> {
-        self.own.iter().enumerate().map(|(k, (constant, own))| {
+        self.constants.iter().enumerate().map(|(k, &constant)| {
             let (others, partials) = if k == 0 { (0, 0) } else { self.ends[k - 1] };
             let ends = self.ends[k];
-            (*constant, &own[..], &self.others[others..ends.0], &self.partials[partials..ends.1])
+            let own = &self.own[k * self.width..][..self.width];
+            (constant, own, &self.others[others..ends.0], &self.partials[partials..ends.1])
         })
     }
 }
@@ -148,17 +149,17 @@ impl Extended<'_> {
         let layout = problem.layout();
         let range = layout.local_range(local);
         let (first, width, size) = (range.start, range.len(), layout.rows());
-        rows.clear();
+        rows.clear(width);
         self.equations.each_row(buffers, local, |row| {
             rows.coefficients.clear();
             rows.coefficients.extend(row.taken());
             let of = EquationOf::Group { group: row.number / size, local, row: row.number % size };
-            rows.push(self, (of, self.equations.deviation(row.number), row.constant), first, width);
+            rows.push(self, (of, self.equations.deviation(row.number), row.constant), first);
         });
         self.terms.rows_within(range, |unknown, row, constant| {
             rows.coefficients.clear();
             rows.coefficients.extend(row);
-            rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], constant), first, width);
+            rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], constant), first);
         });
     }
 

@@ -3,7 +3,8 @@
 use super::super::trial::Trial;
 use super::catalogue::{Catalogue, put};
 use crate::adjustment::Equation;
-use crate::geometry::Camera;
+use crate::geometry::camera::each_camera;
+use crate::geometry::{Camera, CameraModel};
 
 /// Cameras that are tested, those with the most photos.
 const MOST_CAMERAS: usize = 4;
@@ -86,10 +87,13 @@ impl Catalogue<'_> {
             Some(bent) => self.bundle.sight_bent((&self.stations, bent), image, local),
             None => station.orientation.sight(&self.stations.points[local]),
         };
-        let (_, computed) = station.camera.compare(&sight, observed.xy);
-        for &(parameter, column) in columns {
-            put(partials, column, computed.by_parameters[row][parameter] / equation.sd);
-        }
+        each_camera!(&station.camera, camera => {
+            let (_, computed) = camera.compare(&sight, observed.xy);
+            let by_parameters = computed.by_parameters[row].as_ref();
+            for &(parameter, column) in columns {
+                put(partials, column, by_parameters[parameter] / equation.sd);
+            }
+        });
     }
 }
 
