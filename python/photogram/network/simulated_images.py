@@ -108,7 +108,7 @@ def photographed(
     """
     start = cameras if start_cameras is None else checked_cameras(start_cameras)
     if len(start) != len(cameras) or start[0].unit != cameras[0].unit:
-        fields = {"given": len(start), "units": sorted({each.unit for each in start})}
+        fields = {"given": len(start), "units": sorted({str(each.unit) for each in start})}
         raise InputError(phrase("simulation.start-cameras", n=len(cameras), unit=cameras[0].unit, **fields))
     distance = truth.known_distances("the simulation")[0]
     photo_cameras = np.arange(len(truth.photo_ids)) % len(cameras)
