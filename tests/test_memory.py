@@ -146,7 +146,7 @@ def test_what_would_not_fit_is_refused(monkeypatch):
 
 def test_an_allocation_of_python_that_fails_is_named():
     with (
-        pytest.raises(OutOfMemoryError, match="reading: there is not enough memory"),
+        pytest.raises(OutOfMemoryError, match="reading requires more memory than is free"),
         memory.turned("reading"),
     ):
         raise MemoryError

@@ -75,7 +75,8 @@ def turned(what: str) -> Iterator[None]:
     except MemoryError as error:
         detail = f"; {error}" if str(error) else ""
         # The message catalogue may not fit into the remaining memory.
-        exhausted = OutOfMemoryError(f"{what}: there is not enough memory{detail}")
+        text = f"{what} requires more memory than is free{detail}. Close other programs, or use fewer data"
+        exhausted = OutOfMemoryError(text)
         exhausted.phrase = phrase("memory.exhausted", subject=what, error=str(error))
         raise exhausted from None
 

@@ -84,8 +84,8 @@ def predict(
     for kind in result.kinds.values():
         tests = np.abs(kind.residuals / kind.sd)
         if (tests > _AGREES).any():
-            name = kind.names[int(np.argwhere(tests > _AGREES)[0][0])]
-            raise InputError(phrase("predict.disagrees", kind=kind.kind, name=name))
+            name, times = kind.names[int(np.argwhere(tests > _AGREES)[0][0])], float(tests.max())
+            raise InputError(phrase("predict.disagrees", kind=kind.kind, name=name, times=times))
     return replace(result, messages=[Message(phrase("predict.computed")), *result.messages])
 
 
@@ -168,7 +168,7 @@ def _check_observations(block: Block) -> Block:
         photos = each.photos
         of_motion = each.moment is not None or isinstance(each, Smoothness)
         if not (of_motion or (isinstance(each, _OF_POSES) and moving.issuperset(photos))):
-            raise InputError(phrase("predict.observation", kind=each.KIND))
+            raise InputError(phrase("predict.observation", kind=each.KIND, name=each.name))
     return block
 
 

@@ -359,7 +359,7 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
         for parameter in own:
             value = values.get(parameter.name, parameter.default)
             if isinstance(value, int) and abs(value) > LARGEST:
-                raise misuse(_option(parameter), "large", limit=LARGEST)
+                raise misuse(_option(parameter), "large", limit=LARGEST, value=value)
         if "example" in values:
             _arrange(own, values)
         found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}

@@ -125,7 +125,7 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
 def _names(projects: list[Path]) -> dict[str, Path]:
     """Name projects by the last part of their paths, if these differ."""
     places = [Path(os.path.realpath(directory)) for directory in projects]
-    if len(set(places)) < len(places):
-        raise misuse("DIR", "project-repeated")
+    if repeated := [str(place) for place in dict.fromkeys(places) if places.count(place) > 1]:
+        raise misuse("DIR", "project-repeated", names=repeated)
     short = len({place.name for place in places}) == len(places)
     return {place.name if short else str(place): given for place, given in zip(places, projects, strict=True)}

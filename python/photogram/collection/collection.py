@@ -108,10 +108,10 @@ class Collection(Valued, Brief):
         for name, shape in shapes.items():
             object.__setattr__(self, name, shaped(name, getattr(self, name), shape))
         for name in ("photo_parameters", "point_positions", "image_xy"):
-            _check(name, np.isfinite(getattr(self, name)), "finite")
+            _check(name, values := getattr(self, name), np.isfinite(values), "finite")
         for name in ("photo_sd", "point_sd"):
-            _check(name, getattr(self, name) >= 0, "a standard deviation, from zero to infinite")
-        _check("image_sd", (self.image_sd > 0) & np.isfinite(self.image_sd), "positive and finite")
+            _check(name, sd := getattr(self, name), sd >= 0, "a standard deviation, from zero to infinite")
+        _check("image_sd", sd := self.image_sd, (sd > 0) & np.isfinite(sd), "positive and finite")
         for name, count in (("image_photos", photos), ("image_points", points)):
             object.__setattr__(self, name, indices(name, getattr(self, name), images, count))
 
@@ -240,8 +240,8 @@ class Collection(Valued, Brief):
         return 0.5 * float((((self.image_xy - self.computed_xy()) / self.image_sd) ** 2).sum())
 
 
-def _check(name: str, good: NDArray[np.bool_], what: str) -> None:
+def _check(name: str, values: Floats, good: NDArray[np.bool_], what: str) -> None:
     bad = np.argwhere(~good)
     if len(bad):
-        place = ", ".join(str(index) for index in bad[0])
-        raise InputError(phrase("collection.element", name=name, row=place, form=what))
+        place, value = ", ".join(str(index) for index in bad[0]), float(values[tuple(bad[0])])
+        raise InputError(phrase("collection.element", name=name, row=place, form=what, value=value))

@@ -75,11 +75,12 @@ def simulate(
         If there are fewer than two photos, a share is outside 0 to 1, or a value is negative.
     """
     if photos < 2 or points < 1:
-        raise InputError(phrase("collection.few-photos", photos=2, rays=2))
+        raise InputError(phrase("collection.few-photos", photos=2, rays=2, given=[photos, points]))
     if not (0 <= seen <= 1 and 0 <= outlier_share <= 1):
-        raise InputError(phrase("collection.share"))
+        raise InputError(phrase("collection.share", given=[seen, outlier_share]))
     if not (noise >= 0 and outlier_size >= 0 and seed >= 0):
-        raise InputError(phrase("collection.negative", names=["noise", "outlier_size", "seed"]))
+        fields = {"names": ["noise", "outlier_size", "seed"], "given": [noise, outlier_size, seed]}
+        raise InputError(phrase("collection.negative", **fields))
     random = np.random.default_rng(seed)
     parameters = _cameras(photos, random)
     positions = random.uniform(-SIZE / 2, SIZE / 2, (points, 3))
@@ -141,11 +142,12 @@ def simulate_turntable(
         If there are fewer than two photos or rays, no points, or a value is negative.
     """
     if photos < 2 or points < 1 or not 2 <= rays <= photos:
-        raise InputError(phrase("collection.few-photos", photos=2, rays=2))
+        raise InputError(phrase("collection.few-photos", photos=2, rays=2, given=[photos, points, rays]))
     if not (noise >= 0 and coarseness >= 0 and seed >= 0):
-        raise InputError(phrase("collection.negative", names=["noise", "coarseness", "seed"]))
+        fields = {"names": ["noise", "coarseness", "seed"], "given": [noise, coarseness, seed]}
+        raise InputError(phrase("collection.negative", **fields))
     if not distance > 2:
-        raise InputError(phrase("collection.distance"))
+        raise InputError(phrase("collection.distance", value=distance))
     random = np.random.default_rng(seed)
     parameters = _on_turntable(photos, distance, random)
     positions, angle = _pillar(points, random)

@@ -188,7 +188,7 @@ def _run(
     block: Block, options: CoreOptions, row: DatumRow | None, division: Division, threads: int | None
 ) -> Iterator[Run]:
     if not math.isfinite(options.limit):  # the JSON files of a run cannot contain it
-        raise InputError(phrase("parts.tolerance"))
+        raise InputError(phrase("parts.tolerance", value=options.limit))
     with ExitStack() as stack:
         if division.folder is None:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="photogram-")))

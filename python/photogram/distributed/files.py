@@ -82,7 +82,8 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         document = orjson.loads(path.read_bytes())
     except (OSError, orjson.JSONDecodeError) as error:
-        raise InputError(phrase("parts.not-read", error=error), file=path) from None
+        reason = getattr(error, "strerror", None) or "damaged"
+        raise InputError(phrase("parts.not-read", error=reason), file=path) from None
     if not isinstance(document, dict):
         raise InputError(phrase("parts.no-document"), file=path)
     check_sealed(document, path)
@@ -101,4 +102,5 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             return {name: found[name] for name in found.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(phrase("parts.not-read", error=error), file=path) from None
+        reason = getattr(error, "strerror", None) or "damaged"
+        raise InputError(phrase("parts.not-read", error=reason), file=path) from None

@@ -216,8 +216,8 @@ def _weighted(
 def read_manifest(run: Path) -> Manifest:
     """Read the data shared by all nodes; InputError if the version differs or the file is damaged."""
     document = read_json(run / MANIFEST)
-    if document.get("version") != _photocore.__version__:
-        raise InputError(phrase("parts.other-version", version=_photocore.__version__), file=run / MANIFEST)
+    if (started := document.get("version")) != (version := _photocore.__version__):
+        raise InputError(phrase("parts.other-version", version=version, started=started), file=run / MANIFEST)
     options = document["options"]
     loss, minimum = options["loss"], options["minimum"]
     options["loss"] = loss and tuple(loss)

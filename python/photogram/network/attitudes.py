@@ -215,7 +215,7 @@ def _check_orthonormal(matrices: Floats) -> None:
         excess = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
     bad = np.flatnonzero(~(excess <= _ORTHONORMAL))
     if bad.size:
-        raise InputError(phrase("attitude.orthonormal", row=int(bad[0])))
+        raise InputError(phrase("attitude.orthonormal", row=int(bad[0]), excess=float(excess[bad[0]])))
     mirrored = np.flatnonzero(np.linalg.det(matrices) < 0)
     if mirrored.size:
         raise InputError(phrase("attitude.mirrored", row=int(mirrored[0])))

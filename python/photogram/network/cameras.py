@@ -268,8 +268,9 @@ class Camera(Valued, Brief):
             names, matrix = self.covariance
             deviations = dict(zip(names, np.sqrt(np.diag(np.asarray(matrix))).tolist(), strict=True))
             for name in given.keys() & deviations.keys() if isinstance(self.sd, Mapping) else ():
-                if not math.isclose(given[name], deviations[name], rel_tol=1e-9):
-                    raise InputError(phrase("camera.sd-of-covariance", parameter=name, camera=self.title))
+                if not math.isclose(value := given[name], wanted := deviations[name], rel_tol=1e-9):
+                    fields = {"parameter": name, "camera": self.title, "value": value, "wanted": wanted}
+                    raise InputError(phrase("camera.sd-of-covariance", **fields))
             given |= deviations
         for name, value in given.items():
             where = f"sd of {name} of camera {self.title}"
@@ -277,7 +278,7 @@ class Camera(Valued, Brief):
             if LARGEST_SD < value < math.inf:
                 raise InputError(phrase("camera.large-sd", parameter=name, camera=self.title, value=value))
             if value > 0 and name in self.constants:
-                raise InputError(phrase("camera.constant", parameter=name, camera=self.title))
+                raise InputError(phrase("camera.constant", parameter=name, camera=self.title, value=value))
         return {name: given.get(name, 0.0) for name in self.names}
 
     def _checked_covariance(self) -> tuple[tuple[str, ...], Floats] | None:

@@ -117,8 +117,8 @@ def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Float
     sd = shaped(where, np.broadcast_to(sd, knots.shape) if sd.shape == (2,) else sd, knots.shape)
     require((sd >= 0).all(), where, "not-negative", value=float(sd.min()))
     kinds = np.sign(sd) + np.isinf(sd)
-    if (kinds[..., 0] != kinds[..., 1]).any():
-        raise InputError(phrase("block.knot-sd", camera=title))
+    if (mixed := kinds[..., 0] != kinds[..., 1]).any():
+        raise InputError(phrase("block.knot-sd", camera=title, sd=sd[mixed][0].tolist()))
     return frozen(sd)
 
 

@@ -360,7 +360,7 @@ def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
         raise InputError(phrase("block.timed.geographic", photo=own.photo))
     sd_position, sd_attitude = block.photo_position_sd[row], block.photo_attitude_sd[row]
     if np.isfinite(sd_attitude).any() and not (sd_attitude == 0).all():
-        raise InputError(phrase("block.timed.attitude-sd", photo=own.photo))
+        raise InputError(phrase("block.timed.attitude-sd", photo=own.photo, sd=sd_attitude.tolist()))
     observed = block.photo_positions_observed
     place = block.photo_positions[row]
     if observed is not None:

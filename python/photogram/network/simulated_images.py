@@ -92,7 +92,7 @@ def seen_side(
         return frame_size
     side = frame_size - 2 * abs(principal_distance) * motion.margin(height, half_angle)
     if not side > frame_size / 2:
-        raise InputError(phrase("simulation.readout"))
+        raise InputError(phrase("simulation.readout", share=(1 - side / frame_size) / 2))
     return side
 
 
@@ -108,7 +108,8 @@ def photographed(
     """
     start = cameras if start_cameras is None else checked_cameras(start_cameras)
     if len(start) != len(cameras) or start[0].unit != cameras[0].unit:
-        raise InputError(phrase("simulation.start-cameras", n=len(cameras), unit=cameras[0].unit))
+        fields = {"given": len(start), "units": sorted({str(each.unit) for each in start})}
+        raise InputError(phrase("simulation.start-cameras", n=len(cameras), unit=cameras[0].unit, **fields))
     distance = truth.known_distances("the simulation")[0]
     photo_cameras = np.arange(len(truth.photo_ids)) % len(cameras)
     of_images = photo_cameras[truth.image_photos]

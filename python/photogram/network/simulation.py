@@ -312,8 +312,8 @@ def _looks(
         spread += math.tan(motion.view_angle) * math.sin(crab)
         steepest += 4 * attitude_error
     half_angle = math.atan(spread)
-    if not _NARROWEST < half_angle < _WIDEST - steepest:
-        raise InputError(phrase("simulation.view-angle", angle=half_angle))
+    if not _NARROWEST < half_angle < (high := _WIDEST - steepest):
+        raise InputError(phrase("simulation.view-angle", angle=half_angle, low=_NARROWEST, high=high))
     require(steepest <= _FAR_MORE * half_angle, "tilt", "most", high=_FAR_MORE * half_angle / 2, value=tilt)
     return half_angle, steepest
 

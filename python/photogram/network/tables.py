@@ -179,8 +179,8 @@ def checked_cameras(cameras: object) -> tuple[Camera, ...]:
     """Return validated cameras with unique names and one unit."""
     checked = instances("cameras", cameras, Camera)
     different("cameras", [each.name for each in checked if each.name])
-    if len({each.unit for each in checked}) > 1:
-        raise InputError(phrase("block.camera-units"))
+    if len(of_unit := {each.unit: f"{each.title} in {each.unit}" for each in checked}) > 1:
+        raise InputError(phrase("block.camera-units", cameras=list(of_unit.values())))
     return checked
 
 

@@ -94,8 +94,9 @@ def plan(
     RankError
         If a pattern does not determine all unknowns; the message begins with the name of the pattern.
     """
-    if len({(block.linear_unit, block.geographic) for block in patterns.values()}) != 1:
-        raise InputError(phrase("plan.spaces"))
+    spaces = {(block.linear_unit, block.geographic): name for name, block in patterns.items()}
+    if len(spaces) != 1:
+        raise InputError(phrase("plan.spaces", n=len(spaces), blocks=list(spaces.values())))
     made = []
     for name, block in patterns.items():
         tied = np.isfinite(block.point_sd).any() or np.isfinite(block.photo_position_sd).any()

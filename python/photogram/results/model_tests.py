@@ -242,7 +242,7 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
         If there are fewer than two results, or they have different observations or no degrees of freedom.
     """
     if not isinstance(results, Mapping) or len(results) < 2:
-        raise InputError(phrase("models.few"))
+        raise InputError(phrase("models.few", value=value_field(results)))
     for result in results.values():
         _require_block(result)
     names, all_results = list(results), list(results.values())

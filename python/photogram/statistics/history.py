@@ -184,19 +184,19 @@ def history(
     """
     x = np.asarray(values, dtype=np.float64)
     if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
-        raise InputError(phrase("history.values"))
+        raise InputError(phrase("history.values", actual=str(x.shape)))
     k, m = x.shape
     c = _together(np.asarray(covariance, dtype=np.float64), k, m)
     t = np.arange(float(k)) if times is None else np.asarray(times, dtype=np.float64)
     if t.shape != (k,) or not (np.diff(t) >= 0).all():
-        raise InputError(phrase("history.times", count=k))
+        raise InputError(phrase("history.times", count=k, value=value_field(times)))
     named = tuple(occasions) or tuple(f"occasion {i + 1}" for i in range(k))
     hypotheses = _hypotheses(t, named, unit_of_time, regressors or {})
     tests = m * len(hypotheses.kinds)
     quantities = names or [f"value {j + 1}" for j in range(m)]
     of_units = units or [""] * m
-    if (len(named), len(quantities), len(of_units)) != (k, m, m):
-        raise InputError(phrase("history.names", occasions=k, quantities=m))
+    if (given := [len(named), len(quantities), len(of_units)]) != [k, m, m]:
+        raise InputError(phrase("history.names", occasions=k, quantities=m, given=given))
     series = tuple(
         _series(
             x[:, j], c[:, j, :, j], hypotheses, quantities[j], of_units[j], freedom, bonferroni(level, tests)
@@ -217,7 +217,7 @@ def _together(covariance: Floats, k: int, m: int) -> Floats:
         whole = np.zeros((k, m, k, m))
         whole[np.arange(k), :, np.arange(k), :] = covariance
     if whole.shape != (k, m, k, m) or not np.isfinite(whole).all():
-        raise InputError(phrase("history.covariance", k=k, m=m))
+        raise InputError(phrase("history.covariance", k=k, m=m, actual=str(whole.shape)))
     return whole
 
 
@@ -242,7 +242,7 @@ def _hypotheses(
         if k > 2 and np.ptp(u) > 0:
             found.append((u - u.mean(), (name, None), f"changes with the {name} by {{}} a {of_what}"))
     if not found:
-        raise InputError(phrase("history.equal-times"))
+        raise InputError(phrase("history.equal-times", count=k))
     return _Hypotheses(
         np.column_stack([column for column, _, _ in found]),
         tuple(kind for _, kind, _ in found),

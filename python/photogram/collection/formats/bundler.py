@@ -109,7 +109,7 @@ def _parameters(numbers: _Numbers, cameras: int) -> Floats:
     if len(bad):
         mirrored = apart[bad[0]] < ORTHONORMAL
         code = "bundler.mirrored" if mirrored else "bundler.rotation"
-        message = phrase(code, camera=int(bad[0]), limit=ORTHONORMAL)
+        message = phrase(code, camera=int(bad[0]), limit=ORTHONORMAL, excess=float(apart[bad[0]]))
         raise numbers.fault(first + CAMERA * int(bad[0]) + 3, message)
     return np.hstack([_photocore.rotation_vectors(matrices), rows[:, 12:], rows[:, :3]])
 
