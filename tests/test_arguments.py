@@ -370,8 +370,10 @@ def public():
     for package in PACKAGES:
         module = importlib.import_module(package)
         results = MADE_BY_THE_LIBRARY.get(package, "").split()
-        for name in module.__all__:
+        for name in getattr(module, "__all__", [name for name in vars(module) if not name.startswith("_")]):
             found = getattr(module, name)
+            if not hasattr(module, "__all__") and getattr(found, "__module__", None) != package:
+                continue
             error = inspect.isclass(found) and issubclass(found, BaseException)
             called = inspect.isclass(found) or inspect.isroutine(found) or hasattr(found, "__wrapped__")
             if called and name not in results and not error:

@@ -148,7 +148,7 @@ def test_scores_are_correlated_as_a_dense_program_has_it(case):
 def test_the_verdict_names_the_errors_that_the_data_cannot_distinguish(case, verdict, codes):
     result = adjust(block_of(case))
     assert result.verdict.code == verdict
-    found = [each.code for each in result._hypotheses().common]
+    found = [each.code for each in result._hypotheses().common()]
     assert [code for code in codes if code in found] == codes
     assert bool(found) is bool(codes)
 

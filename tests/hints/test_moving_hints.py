@@ -38,7 +38,7 @@ SCANNED = ("pushbroom_strips", "three_line", "planetary_pair", "jitter")
 def test_a_rolling_shutter(direction, millimetres):
     """What its residuals were blamed for was the lens."""
     result = adjust(flown_frames(direction=direction, millimetres=millimetres))
-    assert result.verdict.code in ("model", "gross-errors")
+    assert result.verdict.code in ("model", "gross-errors", "common-error")
     found = diagnosed(result)
     assert len(found.hints) == 1
     hint = found.messages[0].phrase
@@ -134,7 +134,8 @@ def test_a_readout_time_that_comes_out_negative():
     assert found.messages[0].code == "moving.backward-readout"
     assert found.messages[0].phrase.fields["value"] == pytest.approx(-0.03, abs=0.01)
     kinds = [each.kind for each in diagnose(result.block, result).findings]
-    assert kinds == ["moving"]
+    assert "moving" in kinds
+    assert set(kinds) <= {"moving", "accepted-not-checked"}
     assert remarks(adjust(right)) == []
 
 

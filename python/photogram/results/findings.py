@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from photogram.messages import Undetermined
 from photogram.results.axes import point_axes
 from photogram.results.duplicates import duplicates
 from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
+from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.tests import Tests
@@ -38,7 +39,7 @@ UNKNOWN = 1 / 3  # Largest standard deviation of a determined principal distance
 
 def network_findings(
     result: AdjustedNetwork,
-    fixed: Iterable[Tested],
+    fixed: Sequence[Tested],
     systematic: Sequence[Systematic],
 ) -> Findings:
     """Return the findings of all networks, with tests of fixed values and of patterns."""
@@ -57,7 +58,7 @@ def network_findings(
         snooped=result.snooped,
         remarks=[*unseen(result), *_assumptions(result)],
         unchecked=[] if summary is None else summary.hypotheses.unchecked(),
-        common=[] if summary is None else summary.hypotheses.common_errors(),
+        common=[] if summary is None else summary.hypotheses.common_errors(largest_odds(fixed)),
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -18,6 +18,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.strips import strips_of
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, records
+from photogram.statistics.findings import Tested
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -136,8 +137,13 @@ class Hypotheses:
     points: int  # number of adjusted points
     point_ids: Sequence[str]
     axes: Sequence[str]
-    units: Callable[[str], str]  # Unit of the errors of a type
+    units: Mapping[str, str]  # Units of the errors of types without a length
+    length: str  # Unit of all others
     single_odds: float  # Largest log odds of an error of a single observation, images among them
+
+    def unit(self, code: str) -> str:
+        """Return the unit of the errors of a type, behind a blank."""
+        return self.units.get(code, self.length)
 
     @property
     def harmful(self) -> list[Hypothesis]:
@@ -166,7 +172,7 @@ class Hypotheses:
 
     def _main_component(self, own: Hypothesis, mdb: Sequence[float]) -> tuple[str, Phrase | None]:
         """Return the size of an error, and its name if one component is nearly all of it."""
-        unit = self.units(own.code)
+        unit = self.unit(own.code)
         squares = np.square(mdb)
         parts = [each for each in self.every if each.component is not None]
         of_group = [each for each in parts if (each.group, each.index) == (own.group, own.index)]
@@ -185,27 +191,29 @@ class Hypotheses:
         codes = [codes[0] for codes in sources if untested.intersection(codes)]
         return [phrase(f"datum.{code}") for code in codes]
 
-    @property
-    def common(self) -> list[Hypothesis]:
-        """Detected errors of sets that explain more than any single observation."""
+    def common(self, rivals: float = -math.inf) -> list[Hypothesis]:
+        """Return detected errors of sets that explain more than any single value, the most likely first.
+
+        `rivals` are the largest log odds of an error of a fixed value.
+        """
         found = [
             each
             for each in self.every
             if each.group is None and each.code not in LENSES and each.probability < DETECTION[0]
         ]
         found.sort(key=lambda each: -each.log_odds)
-        if not found or found[0].log_odds < self.single_odds:
+        if not found or found[0].log_odds < max(self.single_odds, rivals):
             return []
         return [each for each in found if each.log_odds > found[0].log_odds - math.log(ALTERNATIVES)]
 
-    def common_errors(self) -> list[Phrase]:
+    def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first."""
-        found = self.common
+        found = self.common(rivals)
         return [
             phrase(
                 "common.error" if each is found[0] else "common.alternative",
                 named=each.name,
-                size=_size(each, self.units(each.code)),
+                size=_size(each, self.unit(each.code)),
                 odds=math.exp(found[0].log_odds - each.log_odds),
             )
             for each in found
@@ -214,7 +222,7 @@ class Hypotheses:
     @property
     def common_is_harmful(self) -> bool:
         """Whether the most likely of these errors moves a point beyond the limit."""
-        return any(each.moves() for each in self.common[:1])
+        return any(each.moves() for each in self.common()[:1])
 
     def tests(self) -> Table:
         """Return the declared table of all tests."""
@@ -345,7 +353,8 @@ def hypotheses(
         points=len(np.unique(suspects.points[images])),
         point_ids=given.point_ids,
         axes=[axis.name for axis in axes],
-        units=lambda code: units.get(code, f" {length}"),
+        units=units,
+        length=f" {length}",
         single_odds=max([of_images, *(each.log_odds for each in every if each.group is not None)]),
     )
 
@@ -357,6 +366,17 @@ def _is_checked(effect: Effect | None, check_sd: Floats | None) -> bool:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.abs(np.array(effect.checks)) / check_sd
     return bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
+
+
+def largest_odds(tests: Iterable[Tested]) -> float:
+    """Return the largest log odds of an error that tests of single values have."""
+    found = [-math.inf]
+    for each in tests:
+        values = np.square(each.values) if each.statistic == "w" else np.asarray(each.values)
+        k = np.asarray(each.dimension, dtype=np.float64)
+        odds = values / 2 - k / 2 * np.log(k + 1) - math.log(max(int(np.count_nonzero(~np.isnan(values))), 1))
+        found.append(float(np.nanmax(odds, initial=-math.inf)))
+    return max(found)
 
 
 def _log_odds(own: Hypothesis, count: int, estimated: tuple[float, float] | None) -> float:
