@@ -72,7 +72,7 @@ def path(name: str, value: object) -> Path:
     except TypeError:
         raise _refused(name, value, "a path") from None
     if not isinstance(text, str) or not text or "\0" in text:
-        raise _refused(name, value, "a path")
+        raise _refused(name, value, "a path without NUL characters" if text else "a path")
     try:
         os.fsencode(text)
     except UnicodeEncodeError:

@@ -170,14 +170,14 @@ def _turns(tree: Tree, name: str) -> Turns:
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
     """Return the framelets of a push frame camera, each exposed around its own time."""
-    height = tree["framelet_height"].number() / summing
+    own = tree["framelet_height"]
+    height = own.number() / summing
     every = tree["interframe_delay"].number()
     if not (height > 0 and every > 0):
-        raise tree["framelet_height"].error(
-            phrase("format.positive", name="framelet_height and interframe_delay", value=min(height, every))
-        )
+        name = "framelet_height and interframe_delay"
+        raise own.error(phrase("format.positive", name=name, value=min(height, every)))
     if lines % height or lines / height > FRAMELETS:
-        raise tree["framelet_height"].error(phrase("csm.framelets", lines=lines, most=FRAMELETS, height=height * summing))
+        raise own.error(phrase("csm.framelets", lines=lines, most=FRAMELETS, height=height * summing))
     first = tree["starting_ephemeris_time"].number() + 0.5 * tree["exposure_duration"].number()
     switches = [tree.get(name, False) for name in ("framelet_order_reversed", "framelets_flipped")]
     for each in switches:

@@ -83,7 +83,7 @@ def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple
         back = steps < 0 if multiple else steps <= 0
         if back.any():
             last, row = (int(rows[int(np.argmax(back)) + k]) for k in (0, 1))
-            raise table.cell_error(row, column, "plain.increase", before=float(times[last]), value=float(times[row]))
+            raise table.cell_error(row, column, "plain.increase", before=times[last], value=times[row])
     return times
 
 
