@@ -77,7 +77,7 @@ def test_formulas_by_hand(lens, way, place, expected):
 @pytest.mark.parametrize(
     ("model", "coefficients", "said"),
     [
-        ("barrel", (1.0,), "is one of radial, transverse, .*'barrel'"),
+        ("barrel", (1.0,), "must be one of radial, transverse, .*'barrel'"),
         ("radial", (1.0,), "error.numbers"),
         ("lrolrocnac", (np.nan,), "error.numbers"),
     ],

@@ -82,8 +82,8 @@ def test_documents_take_arrays_however_they_lie_and_data_classes():
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (KeyError("scale"), "the document must describe a camera: 'scale' is missing"),
-        (TypeError("not so"), "the document must describe a camera: not so"),
+        (KeyError("scale"), "the document must describe a camera, but 'scale' is missing"),
+        (TypeError("not so"), "the document must describe a camera, but a member has a wrong type"),
         (InputError("is withheld"), "is withheld"),
     ],
 )

@@ -123,8 +123,11 @@ def test_the_document_gets_the_points_too(oriented, small_chunks, tmp_path):
             "record 2: column sd_z: must be a finite number, zero or positive, got '-1'",
         ),
         ("1 2 3 A\n4 5 B\n", "record 2: the record must have 4 fields, got 3"),
-        ("id,x,y,z\nA,1,2," + "9" * 140_000 + "\n", "record 2: the record has 140006 characters"),
-        ("id,x,y,z" + "," * 420_000 + "\nA,1,2,3\n", "record 1: the record has 10000"),
+        (
+            "id,x,y,z\nA,1,2," + "9" * 140_000 + "\n",
+            "record 2: the record must have at most 100000 characters, got 140006",
+        ),
+        ("id,x,y,z" + "," * 420_000 + "\nA,1,2,3\n", "record 1: the record must have at most "),
         ("id,x,y,z,,\nA,1,2,3,,\n", "record 1: the column '' occurs twice"),
         ("id,x,y,z,x\nA,1,2,3,4\n", "record 1: the column 'x' occurs twice"),
         ('id,x,y,z\n"A\nB",1,2,3\n', "record 2: the record must have "),

@@ -84,7 +84,7 @@ def test_a_part_in_the_place_of_another_is_refused(block, run):
 
 def test_a_table_of_another_part_is_refused(block, run):
     shutil.copyfile(run / "parts" / "00001" / "points.parquet", run / "parts" / "00000" / "points.parquet")
-    refused(block, run, r"points\.parquet: the checksum differs from part\.json")
+    refused(block, run, r"points\.parquet: the checksum must agree with part\.json")
 
 
 def test_the_part_of_another_run_is_refused(block, run, tmp_path):

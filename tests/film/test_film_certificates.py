@@ -146,7 +146,7 @@ def test_certificates_that_cannot_be_are_refused(tmp_path: Path) -> None:
     assert own.block.cameras[0].parameters["c"] == -152.4
     assert "plain.marks-only" in [each.code for each in own.messages]
     project(tmp_path)
-    with pytest.raises(InputError, match=r"certificates require one of brown_forward, brown"):
+    with pytest.raises(InputError, match=r"must be one of brown_forward, brown for a certificate"):
         certified(tmp_path, text, "camera,model\nrc10,ebner\n")
     with (tmp_path / "project.toml").open("a") as settings:
         settings.write('certificate = "none.toml"\n')

@@ -175,7 +175,7 @@ def test_a_header_without_room_or_marks_is_refused(tmp_path):
     network = small()
     with refused("isis.label n=65903 size=65536"):
         binary_network(replace(network, description="x" * LABEL))
-    with pytest.raises(InputError, match="cannot be written to a label"):
+    with pytest.raises(InputError, match="one kind of quotation mark"):
         network_text(replace(network, description="two\nlines"))
     others = Group("", "label", items=[("Own", "it's")])
     assert read_again(binary_network(replace(network, others=others)), tmp_path).others == others

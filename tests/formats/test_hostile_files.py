@@ -186,7 +186,10 @@ def test_names_that_are_numbers_with_decimals_are_refused_with_file_and_column(t
     shutil.copytree(EXAMPLE, tmp_path, dirs_exist_ok=True)
     (tmp_path / "control.csv").unlink()
     parquet(tmp_path / "control.parquet", point=[1.5, 2.5], x=[1.0, 2.0], y=[1.0, 2.0], z=[1.0, 2.0])
-    with pytest.raises(InputError, match=r"control\.parquet: the column point contains decimal numbers"):
+    with pytest.raises(
+        InputError,
+        match=r"control\.parquet: the column point must contain text or integers, got decimal numbers",
+    ):
         formats.read(tmp_path)
     parquet(tmp_path / "control.parquet", x=[1.0, 2.0], y=[1.0, 2.0], z=[1.0, 2.0])
     with pytest.raises(InputError, match=r"control\.parquet: the column point is missing"):
@@ -232,9 +235,10 @@ def test_links_that_lead_nowhere_or_in_circles_are_named(tmp_path):
     for name in ("one", "other"):
         shutil.copytree(EXAMPLE, tmp_path / name)
     (tmp_path / "one" / "more.csv").symlink_to("more.csv")
-    assert "files without the name of a table are ignored: more.csv" in [
-        each.text for each in formats.read(tmp_path / "one").messages
-    ]
+    assert (
+        "files without the name of a table are ignored: more.csv; rename them, or name them in [tables]"
+        in [each.text for each in formats.read(tmp_path / "one").messages]
+    )
     (tmp_path / "other" / "images.csv").unlink()
     (tmp_path / "other" / "images.csv").symlink_to("images.csv")
     with pytest.raises(InputError, match=r"images\.csv is missing"):

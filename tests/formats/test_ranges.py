@@ -89,7 +89,7 @@ def test_ranges_of_photos_come_back(tmp_path):
         (block.photo_ids[0], block.point_ids[0], 1000.0, 0.02)
     ]
     edited(place / "ranges.csv", lambda table: table.assign(clock="watch"))
-    with pytest.raises(InputError, match="clocks apply to records of trajectories only") as caught:
+    with pytest.raises(InputError, match="a clock requires a record of a trajectory") as caught:
         formats.read(place)
     assert caught.value.record == 2
 

@@ -145,7 +145,7 @@ def test_the_command_writes_tables_in_the_system(run, quarry):
 def test_the_command_refuses_before_it_adjusts(run):
     done = run("adjust", EXAMPLE, "--crs", UTM, "--out", "out")
     assert done.exit_code == 1
-    assert "the position of the frame on the earth is unknown (cartesian)" in " ".join(done.output.split())
+    assert "the position of the frame on the earth, unknown for cartesian" in " ".join(done.output.split())
     assert not Path("out").exists()
 
 

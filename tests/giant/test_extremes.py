@@ -132,7 +132,7 @@ def test_loops_of_links_are_named(what, sound, tmp_path):
     else:
         (place / what).unlink()
         os.symlink(place / what, place / what)
-    with pytest.raises(InputError, match=r"cannot be read: .*symbolic links") as caught:
+    with pytest.raises(InputError, match=r"cannot be read.*symbolic links") as caught:
         read_project(place)
     assert caught.value.file == (place / "GROUND" if what == "GROUND" else place)
 
@@ -141,7 +141,7 @@ def test_links_to_nothing_are_named(sound, tmp_path):
     place = written(tmp_path, sound[0])
     (place / "GROUND").unlink()
     os.symlink(place / "nowhere", place / "GROUND.DAT")
-    with pytest.raises(InputError, match=r"GROUND\.DAT: the file cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"GROUND\.DAT: the file cannot be read \(No such file"):
         read_project(place)
 
 
@@ -159,5 +159,5 @@ def test_what_is_no_directory_is_named(given, sound, tmp_path):
     place = written(tmp_path, sound[0])
     with pytest.raises(InputError, check=lambda error: error.code == "giant.folder"):
         read_project(place / given)
-    with pytest.raises(InputError, match="not a path"):
+    with pytest.raises(InputError, match="must be a path"):
         read_project(Path("a\0b"))

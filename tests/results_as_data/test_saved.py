@@ -276,7 +276,7 @@ def test_damaged_folders_are_refused_with_the_file(folder):
     images = folder / "images.parquet"
     whole = images.read_bytes()
     images.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match=r"images\.parquet: the checksum differs from summary"):
+    with pytest.raises(InputError, match=r"images\.parquet: the checksum must agree with summary"):
         read_result(folder)
     resealed(folder)
     with pytest.raises(InputError, match=r"images\.parquet: the file must be valid Parquet"):
@@ -318,7 +318,7 @@ def test_a_table_of_another_result_is_refused(folder, tmp_path_factory, table):
     (folder / f"{table}.parquet").write_bytes((other / f"{table}.parquet").read_bytes())
     same = summary["tables"][table] == others["tables"][table]
     if not same:
-        with pytest.raises(InputError, match=rf"{table}\.parquet: the checksum differs from"):
+        with pytest.raises(InputError, match=rf"{table}\.parquet: the checksum must agree with"):
             read_result(folder)
     assert not same or table in ("control", "observations")
     (folder / f"{table}.parquet").unlink()
@@ -426,5 +426,5 @@ def test_damage_anywhere_is_refused_or_does_no_harm(folder, name):
 
 
 def test_a_number_does_not_stand_for_an_array():
-    with pytest.raises(InputError, match="redundancy is 3, not an array of numbers"):
+    with pytest.raises(InputError, match="redundancy must be an array of numbers, got 3"):
         check_members(AdjustedCamera, {"redundancy": 3})

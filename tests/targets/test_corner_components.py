@@ -37,7 +37,7 @@ def test_a_camera_whose_corners_are_worse_is_found(twice_as_bad):
 def test_what_is_no_group(twice_as_bad):
     with refusal("targets.levels others=['photo']"):
         corner_components(twice_as_bad, ["photo", "level"])
-    with pytest.raises(InputError, match="is one of kind, camera, level"):
+    with pytest.raises(InputError, match="must be one of kind, camera, level"):
         corner_components(twice_as_bad, ["strip"])
 
 

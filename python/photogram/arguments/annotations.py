@@ -72,7 +72,7 @@ def path(name: str, value: object) -> Path:
     except TypeError:
         raise _refused(name, value, "a path") from None
     if not isinstance(text, str) or not text or "\0" in text:
-        raise _refused(name, value, "a path")
+        raise _refused(name, value, "a path without NUL characters" if text else "a path")
     try:
         os.fsencode(text)
     except UnicodeEncodeError:
@@ -254,8 +254,8 @@ def _array(name: str, value: Any) -> Any:
         raise _refused(name, value, "an array of numbers")
     try:
         array = np.asarray(value)
-    except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InputError(phrase("argument.array", name=name, of="numbers", reason=str(error))) from None
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise _refused(name, value, "an array of numbers") from None
     if array.dtype.kind == "O":
         try:
             value = array = array.astype(float)

@@ -58,8 +58,8 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
     try:
         with np.errstate(over="ignore"):  # Infinite values are left to the caller
             found: NDArray[np.float64] = array.astype(np.float64, copy=False)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise _no_array(name, "numbers", str(error)) from None
+    except (TypeError, ValueError, OverflowError):
+        raise _no_array(name, "numbers", shown(value)) from None
     if is_masked(value):
         if not missing:
             raise InputError(phrase("argument.masked", name=name))
@@ -92,11 +92,11 @@ def is_masked(value: object) -> bool:
 def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
     """Convert an argument to a NumPy array of any type."""
     if value is None:
-        raise _no_array(name, of, "it is None")
+        raise _no_array(name, of, "None")
     try:
         return np.asarray(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise _no_array(name, of, str(error)) from None
+    except (TypeError, ValueError, OverflowError):
+        raise _no_array(name, of, shown(value)) from None
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
@@ -140,7 +140,8 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
     """Return a read-only array of `length` integers from 0 to `count` - 1."""
     array = _plain(name, value, f"{length} whole numbers")
     if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
-        raise InputError(phrase("argument.indices", name=name, length=length))
+        fields = {"length": length, "shape": str(array.shape), "type": str(array.dtype)}
+        raise InputError(phrase("argument.indices", name=name, **fields))
     if is_masked(value):
         raise InputError(phrase("argument.masked", name=name))
     bad = np.flatnonzero((array < 0) | (array >= count))

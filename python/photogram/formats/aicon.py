@@ -92,7 +92,8 @@ def _cameras(path: Path, found: _Found) -> None:
         width, height, columns, rows = (values.pop(each) for each in names.split())
         size = int(columns), int(rows)
         if name in found.cameras or min(*size, width, height) <= 0 or size != (columns, rows):
-            raise head.place.error(phrase("aicon.camera", name=name))
+            sides = {"width": width, "height": height, "columns": columns, "rows": rows}
+            raise head.place.error(phrase("aicon.camera", name=name, **sides))
         with at_place(head.place):
             found.cameras[name] = Camera("brown_forward", values, name=f"camera {name}")
         found.sizes[name] = size, width / columns

@@ -108,8 +108,9 @@ def _words(project: Project) -> dict[str, str]:
     cameras = reduced_images(project).names
     for names in (project.block.photo_ids, project.block.point_ids, cameras):
         own = {name: "_".join(name.split()) for name in names}
-        if len(set(own.values())) < len(own):
-            raise InputError(phrase("bingo.blanks"))
+        last = {word: name for name, word in own.items()}
+        if same := [[name, last[word]] for name, word in own.items() if last[word] != name]:
+            raise InputError(phrase("bingo.blanks", names=same[0]))
         found |= own
     if bad := [name for name, word in found.items() if word in (END, "C", "#")]:
         raise InputError(phrase("bingo.reserved", name=bad[0]))

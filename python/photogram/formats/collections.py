@@ -66,8 +66,9 @@ def _read_bundler(path: Path, wishes: Wishes) -> Project:
         lines = [line.rsplit(" 0 ", 1)[0].strip() for line in read_lines(beside) if line.strip()]
         if len(lines) != count:
             raise InputError(phrase("bundler.count", n=len(lines), file=place.name, count=count), file=beside)
-        if len(set(lines)) < count or not all(line.isprintable() for line in lines):
-            raise InputError(phrase("bundler.names"), file=beside)
+        last = {line: row for row, line in enumerate(lines)}
+        if bad := [line for row, line in enumerate(lines) if last[line] != row or not line.isprintable()]:
+            raise InputError(phrase("bundler.names", name=bad[0]), file=beside)
         names = lines
     return project_of(found, place, BUNDLER.title, names)
 

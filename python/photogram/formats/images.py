@@ -57,7 +57,7 @@ def to_corner(project: Project) -> Floats:
     """Return (m, 2) columns and rows from the upper-left corner, pixels."""
     block = project.block
     if block.image_unit != "px" or block.photo_cameras is None:
-        raise InputError(phrase("format.pixels"))
+        raise InputError(phrase("format.pixels", unit=block.image_unit))
     which = block.photo_cameras[block.image_photos]
     return by_camera(
         block.image_xy, which, lambda row, own: in_corner(block.cameras[row], project.sizes[row], own)

@@ -139,7 +139,7 @@ def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
         return Camera(model, {"f": scale * each["focal"].number(), **middle, **terms("k1", "k2")}, name=name)
     if kind.value in ("spherical", "equirectangular"):
         if width != 2 * height:
-            raise each.error(phrase("opensfm.spherical"))
+            raise each.error(phrase("opensfm.spherical", width=width, height=height))
         return Camera("equirectangular", {"w": float(width), "h": float(height)}, name=name)
     models = {
         "simple_radial": ("opencv", ("k1",)),
@@ -168,8 +168,8 @@ def _poses(shots: dict[str, Tree]) -> tuple[Floats, Floats]:
     """Return (n, 3, 3) rotations world to camera, and (n, 3) translations."""
     vectors = np.array([each["rotation"].numbers(3) for each in shots.values()])
     for shot, vector in zip(shots.values(), vectors, strict=True):
-        if np.abs(vector).max() > 1e6:
-            raise shot["rotation"].error(phrase("format.angles"))
+        if (most := np.abs(vector).max()) > 1e6:
+            raise shot["rotation"].error(phrase("format.angles", most=1e6, unit="rad", value=float(most)))
     translations = np.array([each.get("translation", [0, 0, 0]).numbers(3) for each in shots.values()])
     return _photocore.vector_rotations(vectors), translations
 

@@ -150,7 +150,7 @@ def _head(
         return head, _delimiter(head)
     if comment is not None and not set(known).isdisjoint(_spelled(comment, spelling)):
         return comment, _delimiter(comment)
-    raise Place(path).error(phrase("error.empty-file", content="table"))
+    raise Place(path).error(phrase("error.empty-file", content="a table"))
 
 
 def _lines(text: str) -> Iterator[str]:

@@ -47,7 +47,7 @@ def holding(what: str, path: Path | None = None) -> Iterator[None]:
         raise InputError(message_of(error), file=path) from None
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         missing = isinstance(error, KeyError)
-        reason = phrase("error.missing", name=str(error)) if missing else str(error)
+        reason = phrase("error.missing", name=str(error)) if missing else phrase("error.member")
         raise InputError(phrase("error.content", content=what, reason=reason), file=path) from None
 
 

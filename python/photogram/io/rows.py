@@ -87,7 +87,7 @@ class Table:
             elif line.strip(" \t,;|"):
                 records.append(Place(path, number, line))
         if not records:
-            raise Place(path).error(phrase("error.empty-file", content="table"))
+            raise Place(path).error(phrase("error.empty-file", content="a table"))
         head, *body = records
         delimiter = next((each for each in DELIMITERS if each in (head.text or "")), ",")
         columns = tuple(spelling(name) for name in cells(head, delimiter))

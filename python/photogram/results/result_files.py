@@ -177,11 +177,9 @@ class Saved:
         rest = self.decoder.value(self.summary["kept"][_STATE])
         try:
             return _photocore.BlockState(unknowns.tolist(), *rest)
-        except (TypeError, ValueError) as error:
-            raise InputError(
-                phrase("error.content", content="state of an adjustment", reason=str(error)),
-                file=self.folder / SUMMARY,
-            ) from None
+        except (TypeError, ValueError):
+            fields = {"content": "state of an adjustment", "reason": phrase("error.member")}
+            raise InputError(phrase("error.content", **fields), file=self.folder / SUMMARY) from None
 
 
 _RENAMED = {"standardized": "test", "d": "difference"}  # Names in Parquet

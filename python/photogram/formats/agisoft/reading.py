@@ -134,7 +134,7 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
     resolution = element.need("resolution")
     width, height = resolution.attribute("width"), resolution.attribute("height")
     if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
-        raise resolution.error(phrase("format.size"))
+        raise resolution.error(phrase("format.size", width=width, height=height))
     size = int(width), int(height)
     properties = _properties(element.all("property"), "pixel_width", "focal_length")
     pixel = properties.get("pixel_width") or None

@@ -94,7 +94,7 @@ def _group(found: _Found, element: Element) -> None:
     dimensions = element.need("ImageDimensions")
     size = dimensions.whole("Width"), dimensions.whole("Height")
     if not (0 < size[0] < 2**31 and 0 < size[1] < 2**31):
-        raise dimensions.error(phrase("format.size"))
+        raise dimensions.error(phrase("format.size", width=size[0], height=size[1]))
     kind = element.word("CameraModelType", "Perspective")
     if kind != "Perspective":
         raise element.error(
@@ -206,8 +206,8 @@ def _rotation(element: Element) -> Floats:
         return checked_rotation(element, matrix)
     if element.child("Omega") is not None:
         angles = np.radians([[element.number(name) for name in ("Omega", "Phi", "Kappa")]])
-        if np.abs(angles).max() > 1e4:
-            raise element.error(phrase("format.angles"))
+        if (most := np.abs(angles).max()) > 1e4:
+            raise element.error(phrase("format.angles", most=1e4, unit="rad", value=float(most)))
         found: Floats = Attitudes.of("omega_phi_kappa", angles).values("matrix_to_photo")[0]
         return found
     raise element.error(phrase("blocks-exchange.rotation"))

@@ -98,8 +98,9 @@ class _Table:
         fields = [_members(each, path) for each in own[0].groups("Field")]
         self.columns = [each["Name"].text() for each in fields]
         for each in fields:
-            if each["Type"].text().lower() != "double" or each["Size"].whole() != 1:
-                raise self.error(phrase("csm.column", name=each["Name"].value))
+            kind, size = each["Type"].text(), each["Size"].whole()
+            if kind.lower() != "double" or size != 1:
+                raise self.error(phrase("csm.column", name=each["Name"].value, type=kind, size=size))
         self.rows = self._rows()
 
     def error(self, message: str | Phrase) -> InputError:

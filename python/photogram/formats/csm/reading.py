@@ -170,19 +170,19 @@ def _turns(tree: Tree, name: str) -> Turns:
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
     """Return the framelets of a push frame camera, each exposed around its own time."""
-    height = tree["framelet_height"].number() / summing
+    own = tree["framelet_height"]
+    height = own.number() / summing
     every = tree["interframe_delay"].number()
     if not (height > 0 and every > 0):
-        raise tree["framelet_height"].error(
-            phrase("format.positive", name="framelet_height and interframe_delay", value=min(height, every))
-        )
+        name = "framelet_height and interframe_delay"
+        raise own.error(phrase("format.positive", name=name, value=min(height, every)))
     if lines % height or lines / height > FRAMELETS:
-        raise tree["framelet_height"].error(phrase("csm.framelets", lines=lines, most=FRAMELETS))
+        raise own.error(phrase("csm.framelets", lines=lines, most=FRAMELETS, height=height * summing))
     first = tree["starting_ephemeris_time"].number() + 0.5 * tree["exposure_duration"].number()
     switches = [tree.get(name, False) for name in ("framelet_order_reversed", "framelets_flipped")]
     for each in switches:
         if not isinstance(each.value, bool):
-            raise each.error(phrase("format.boolean"))
+            raise each.error(phrase("format.boolean", value=str(each.value)))
     return Framelets(height, round(lines / height), first, every, *(each.value for each in switches))
 
 
@@ -192,7 +192,8 @@ def _jitter(tree: Tree) -> Jitter:
     ]
     times = np.array([each.number() for each in tree["lineExposureTimes"]])
     if len(coefficients[0]) != len(coefficients[1]) or not len(times):
-        raise tree.error(phrase("csm.coefficients"))
+        counts = {"samples": len(coefficients[0]), "lines": len(coefficients[1])}
+        raise tree.error(phrase("csm.coefficients", **counts))
     return Jitter(np.array(coefficients), times)
 
 

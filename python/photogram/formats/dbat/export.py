@@ -105,7 +105,7 @@ def _size(card: Card) -> Size:
         raise card.place.error(phrase("dbat.size"))
     width, height = (_number(card, k) for k in (2, 3))
     if not (0 < width < 2**31 and 0 < height < 2**31):
-        raise card.place.error(phrase("format.size"))
+        raise card.place.error(phrase("format.size", width=width, height=height))
     return width, height
 
 

@@ -201,7 +201,7 @@ def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
         raise element.error(phrase("format.unknown", what="unit", value=unit, names=["mm"]))
     width, height = _numbers(element, "image", 2)
     if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
-        raise element.need("image").error(phrase("format.size"))
+        raise element.need("image").error(phrase("format.size", width=width, height=height))
     size = int(width), int(height)
     sides = _sides(element, size)
     model = element.whole("model") if element.child("model") else PLAIN
@@ -212,7 +212,7 @@ def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
             phrase("format.unknown", what="model", value=str(model), names=[str(PLAIN), str(AFFINE)])
         )
     if model == PLAIN and skew:
-        raise element.need("skew").error(phrase("dbat.skew", model=PLAIN))
+        raise element.need("skew").error(phrase("dbat.skew", model=PLAIN, skew=skew, other=AFFINE))
     c = _principal_distance(element, messages)
     px, py = _principal_point(element, size, sides, terms, messages)
     name = element.word("name") or f"camera {number}"
@@ -224,12 +224,12 @@ def _sides(element: Element, size: Size) -> tuple[float, float]:
     sensor = element.need("sensor")
     first, comma, second = (word.strip() for word in sensor.text.partition(","))
     if not comma:
-        raise sensor.error(phrase("dbat.sensor"))
+        raise sensor.error(phrase("dbat.sensor", value=sensor.text))
     down = sensor.place.number(second) / size[1]
     aspect = element.word("aspect", "1" if first == "auto" else "auto")
     own = element.child("aspect") or sensor
     if aspect == "auto" and first == "auto":
-        raise sensor.error(phrase("dbat.sensor"))
+        raise sensor.error(phrase("dbat.sensor", value=sensor.text))
     across = sensor.place.number(first) / size[0] if aspect == "auto" else own.place.number(aspect) * down
     if not (1e-5 < down < 1 and 1e-5 < across < 1):
         raise sensor.error(phrase("dbat.pixels", across=across, down=down))
@@ -279,7 +279,8 @@ def _principal_point(
             raise element.need("pp").error(phrase("dbat.old"))
         py = -py
     if not (math.hypot(px - middle[0], py - middle[1]) < max(middle)):
-        raise element.need("pp").error(phrase("dbat.outside"))
+        place = {"px": px, "py": py, "mx": middle[0], "my": middle[1]}
+        raise element.need("pp").error(phrase("dbat.outside", **place))
     return px, py
 
 

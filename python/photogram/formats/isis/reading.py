@@ -97,7 +97,7 @@ class _Label:
         if value is None:
             return None
         if not isinstance(value, str) or re.fullmatch(r"\d{1,18}", value) is None:
-            raise InputError(phrase("format.whole", name=key), file=self.path, record=group.line)
+            raise InputError(phrase("format.whole", name=key, value=value), file=self.path, record=group.line)
         return int(value)
 
     def place(self, key: str) -> int:
@@ -169,7 +169,7 @@ def _text(data: bytes, path: Path) -> ControlNetwork:
     for key, value in network.items:
         if (name := _HEADER.get(key.lower())) is not None:
             if not isinstance(value, str):
-                raise InputError(phrase("format.text", name=key), file=path, record=network.line)
+                raise InputError(phrase("format.text", name=key, value=value), file=path, record=network.line)
             header[name] = value
         elif key.lower() == "targetradii":
             header["radii"] = _radii(value, network, path)
@@ -188,5 +188,5 @@ def _radii(value: Value, network: Group, path: Path) -> Floats:
         if not np.isfinite(radii).all():
             raise ValueError
     except ValueError:
-        raise InputError(phrase("isis.radii"), file=path, record=network.line) from None
+        raise InputError(phrase("isis.radii", value=str(value)), file=path, record=network.line) from None
     return radii

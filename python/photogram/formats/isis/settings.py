@@ -84,7 +84,7 @@ def _yes(text: str) -> bool:
 
 def _degree(text: str) -> int:
     if not re.fullmatch(r"\d+", text) or int(text) > MOST:
-        raise InputError(phrase("isis.degree", most=MOST))
+        raise InputError(phrase("isis.degree", most=MOST, value=text))
     return int(text)
 
 
@@ -226,5 +226,5 @@ def _elsewhere(name: str, value: str) -> dict[str, Phrase]:
         known = [*PARAMETERS, *OTHERWISE, *REFUSED]
         raise InputError(unknown_name("setting of jigsaw", name, known))
     if _yes(value):
-        raise InputError(phrase("isis.refused"))
+        raise InputError(phrase("isis.refused", name=name))
     return {}

@@ -152,7 +152,7 @@ def _angle(tags: Mapping[int, Any], tag: int, letters: str, place: Place) -> flo
     if value is None:
         return math.nan
     if not isinstance(value, Sequence) or isinstance(value, str | bytes) or len(value) != 3:
-        raise place.error(phrase("photos.angle", tag=tag))
+        raise place.error(phrase("photos.angle", tag=tag, value=str(value)))
     degrees, minutes, seconds = (_as_tag(each, place, tag) for each in value)
     letter = str(tags.get(tag - 1, "")).strip("\0 ").upper()
     if letter not in tuple(letters):

@@ -332,7 +332,7 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
             raise table.unknown_error(row, "camera", "splined camera", name, splined)
         rows, columns, _ = values[name].shape
         if not (i in range(columns) and j in range(rows)):
-            fields = {"camera": name, "columns": columns, "rows": rows}
+            fields = {"camera": name, "columns": columns, "rows": rows, "i": i, "j": j}
             raise table.error(row, phrase("plain.knot", **fields))
         if (name, i, j) in seen:
             raise table.error(row, phrase("error.repeated", kind="knot", name=f"{i:g}, {j:g}"))

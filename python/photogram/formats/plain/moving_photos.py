@@ -129,7 +129,8 @@ def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
         back = np.diff(values[rows, 0]) <= 0
         if back.any():
             row = int(rows[1 + int(np.argmax(back))])
-            raise table.cell_error(row, "line", "plain.increase")
+            last, value = values[[rows[np.argmax(back)], row], 0].tolist()
+            raise table.cell_error(row, "line", "plain.increase", before=last, value=value)
         found[name] = made(table, int(rows[0]), Lines, values[rows])
     return found
 

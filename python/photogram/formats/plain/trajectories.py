@@ -82,8 +82,8 @@ def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple
         steps = np.diff(times[rows])
         back = steps < 0 if multiple else steps <= 0
         if back.any():
-            row = int(rows[1 + int(np.argmax(back))])
-            raise table.cell_error(row, column, "plain.increase")
+            last, row = (int(rows[int(np.argmax(back)) + k]) for k in (0, 1))
+            raise table.cell_error(row, column, "plain.increase", before=times[last], value=times[row])
     return times
 
 

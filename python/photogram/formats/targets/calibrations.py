@@ -96,7 +96,7 @@ def calibration_of(project: Project) -> Calibration:
     if not project.boards:
         raise InputError(phrase("board-project.none"), file=project.path)
     if block.image_unit != "px" or block.photo_cameras is None:
-        raise InputError(phrase("format.pixels"), file=project.path)
+        raise InputError(phrase("format.pixels", unit=block.image_unit), file=project.path)
     if (block.image_sd[:, 0] != block.image_sd[:, 1]).any():
         raise InputError(phrase("board-project.sd"), file=project.path)
     # Priors of knots belong to their cameras.
