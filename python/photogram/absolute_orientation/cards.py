@@ -159,8 +159,8 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
     values = np.array([record.number_of(word, "parameter") for word in words[:7]])
     if not values.any():
         return None
-    if np.abs(values[:3]).max() > 1:
-        raise record.error(phrase("orientation.sine"))
+    if (largest := max(values[:3], key=abs)) ** 2 > 1:
+        raise record.error(phrase("orientation.sine", value=float(largest)))
     if values[3] <= 0:
         raise record.error(phrase("orientation.positive", name="s", value=values[3]))
     angles = np.arcsin(values[:3])
