@@ -128,7 +128,7 @@ class Common:
 def parse_common(source: Source) -> Common:
     """Read COMMON."""
     if len(source.lines) < 2:
-        raise source.error(phrase("giant.two-records"))
+        raise source.error(phrase("giant.two-records", count=len(source.lines)))
     job = source.record(2)
     common = Common(title=source.lines[0].strip(" "), strip=job.columns(15, 15).strip(" "))
     for column, name, true in SWITCHES:
