@@ -163,7 +163,7 @@ def replaced(index, line):
         (replaced(5, "       0.000  -90.000"), "must not have the number 0", 6),
         (replaced(7, "  4   90.0.0  -90.000"), "must be a", 8),
         (replaced(10, "zero"), "must be a", 11),
-        ([*cards()[:-1], "  7    1.0        1.0        0.0"], "a flag card is required .* point 6", 24),
+        ([*cards()[:-1], "  7    1.0        1.0        0.0"], "a flag card .* is required .* point 6", 24),
         (cards()[:16], "ends after the readings of point 3", None),
         (cards()[:8], "ends before a card of the plate grid", None),
         ([*cards()[:15], "  0", *cards()[17:]], "CARDS ARE OUT OF ORDER AT POINT NO. 3", 16),

@@ -99,7 +99,7 @@ def read_cards(
     """
     records = _records(path)
     if len(records) < 2:
-        raise InputError(phrase("orientation.deck"), file=path)
+        raise InputError(phrase("orientation.deck", count=len(records)), file=path)
     constants = records[1].words(3, 4, "constants M, N, MN and identification")
     m, n, mn = (records[1].count_of(w, name) for w, name in zip(constants, ("M", "N", "MN"), strict=False))
     if len(records) - 2 != m:
@@ -149,7 +149,7 @@ def read_restart(path: Path, stations: Stations, messages: list[Message]) -> Sim
     """Read a restart record (TB 19, step 12): eight words for a new solution."""
     records = _records(path)
     if len(records) != 1:
-        raise InputError(phrase("orientation.restart"), file=path)
+        raise InputError(phrase("orientation.restart", count=len(records)), file=path)
     return _former(records[0], stations, messages)
 
 
@@ -159,8 +159,8 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
     values = np.array([record.number_of(word, "parameter") for word in words[:7]])
     if not values.any():
         return None
-    if np.abs(values[:3]).max() > 1:
-        raise record.error(phrase("orientation.sine"))
+    if (largest := max(values[:3], key=abs)) ** 2 > 1:
+        raise record.error(phrase("orientation.sine", value=float(largest)))
     if values[3] <= 0:
         raise record.error(phrase("orientation.positive", name="s", value=values[3]))
     angles = np.arcsin(values[:3])
@@ -203,7 +203,7 @@ def read_transformation(path: Path) -> Similarity:
     """Read the two records of part II; their covariance is unknown."""
     records = _records(path)
     if len(records) < 2:
-        raise InputError(phrase("orientation.transformation"), file=path)
+        raise InputError(phrase("orientation.transformation", count=len(records)), file=path)
     first = records[0].words(6, 7, "a11 a12 a13 a21 a22 a23, identification")
     second = records[1].words(7, 8, "a31 a32 a33 s b1 b2 b3, identification")
     values = [

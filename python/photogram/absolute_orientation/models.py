@@ -153,7 +153,7 @@ def strip_of(block: Block, photos: Sequence[str]) -> Strip:
         If models have too few common positions, or all of them are on a line.
     """
     if len(photos) < 2:
-        raise InputError(phrase("orientation.strip"))
+        raise InputError(phrase("orientation.strip", count=len(photos)))
     models = [relative_model(block, *pair) for pair in pairwise(photos)]
     places = dict(zip(models[0].ids, models[0].positions, strict=True))
     counts = dict.fromkeys(places, 1)

@@ -23,7 +23,7 @@ from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD, cells
 from photogram.io.writing import OutputSet
 from photogram.lazy_dataclasses import dataclass
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -175,9 +175,8 @@ def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
     except (ValueError, UnicodeDecodeError, pd.errors.ParserError) as error:
         if isinstance(error, InputError):
             raise
-        raise _fault(source, names) or InputError(
-            phrase("orientation.not-read", error=str(error)), file=source
-        ) from None
+        text = next((each for each in error.args if isinstance(each, Phrase)), phrase("orientation.not-read"))
+        raise _fault(source, names) or InputError(text, file=source) from None
 
 
 def _layout(source: Path) -> tuple[list[str], dict[str, Any]]:

@@ -280,7 +280,7 @@ def to_cards(session: Session) -> bytes:
     """
     number = next(iter(session.grids))
     if len(session.grids) != 1 or number not in BUILT_IN:
-        raise InputError(phrase("comparators.deck-grid"))
+        raise InputError(phrase("comparators.deck-grid", names=[*session.grids]))
     operators = {case.number: case.operator for case in session.cases}
     for case_number in operators:
         check_number(Place(), "case", case_number, 1, CASES)

@@ -89,7 +89,7 @@ class Identity:
         """
         numbers = np.array([document["low_um"], document["high_um"]], dtype=float)
         if numbers.shape != (2, 2) or not (numbers[0] < numbers[1]).all():
-            raise InputError(phrase("comparators.range"))
+            raise InputError(phrase("comparators.range", value=str(numbers.tolist())))
         low, high = ((float(x), float(y)) for x, y in numbers)
         temperature = document["temperature_c"]
         return cls(

@@ -144,7 +144,7 @@ class _Frame:
             line.only(("marks", "angle", "sd_angle_arcmin", "place", "sd_place"))
             names = [self.mark(each) for each in line.words("marks")]
             if len(names) != 4 or len(set(names)) < 4:
-                raise line.error("marks", phrase("films.four-marks"))
+                raise line.error("marks", phrase("films.four-marks", names=names))
             marks = (names[0], names[1], names[2], names[3])
             if "sd_angle_arcmin" in line:
                 sd = math.radians(line.positive("sd_angle_arcmin") / 60)
@@ -200,8 +200,8 @@ def _angles(own: Table, c: float | None) -> Floats:
         if c is None:
             raise own.error("radius", phrase("error.requires", name="radius", other="c"))
         values = np.degrees(np.arctan2(values, c))
-    if not ((values > 0) & (values < 90)).all():
-        raise own.error(key, phrase("films.angles"))
+    if (wrong := values[~((values > 0) & (values < 90))]).size:
+        raise own.error(key, phrase("films.angles", value=float(wrong[0])))
     return np.radians(values)
 
 

@@ -128,7 +128,7 @@ class Common:
 def parse_common(source: Source) -> Common:
     """Read COMMON."""
     if len(source.lines) < 2:
-        raise source.error(phrase("giant.two-records"))
+        raise source.error(phrase("giant.two-records", count=len(source.lines)))
     job = source.record(2)
     common = Common(title=source.lines[0].strip(" "), strip=job.columns(15, 15).strip(" "))
     for column, name, true in SWITCHES:
@@ -146,9 +146,9 @@ def parse_common(source: Source) -> Common:
     if common.water_refraction:
         job.remark(phrase("giant.water-refraction", level=common.water_level))
     if common.convergence_percent < 0:
-        raise job.error(phrase("giant.criterion"))
+        raise job.error(phrase("giant.criterion", value=common.convergence_percent))
     if not 0 < common.semi_minor <= common.semi_major:
-        raise job.error(phrase("giant.axes"))
+        raise job.error(phrase("giant.axes", minor=common.semi_minor, major=common.semi_major))
     if len(source.lines) > 2:
         deviations, angle = source.record(3), common.geographic
         common.control_sd = (
@@ -172,11 +172,12 @@ def _digit(job: Record, column: int, largest: int) -> int:
 def common_records(common: Common) -> list[str]:
     """Write COMMON."""
     if len(common.title) > 80 or not common.title.isprintable():
-        raise ValueError(phrase("giant.title"))
+        raise ValueError(phrase("giant.title", value=common.title))
     if len(common.strip) > 1 or not common.strip.isprintable():
         raise ValueError(phrase("giant.strip", value=common.strip))
     if not 1 <= common.max_iterations <= 9 or not 1 <= common.convergence_percent <= 99:
-        raise ValueError(phrase("giant.iteration-limits"))
+        limits = {"iterations": common.max_iterations, "percent": common.convergence_percent}
+        raise ValueError(phrase("giant.iteration-limits", **limits))
     digits = {column: true if getattr(common, name) else 1 - true for column, name, true in SWITCHES}
     digits |= {12: UNIT_VARIANCE.index(common.unit_variance), 14: common.max_iterations}
     job = "".join(common.strip or " " if column == 15 else str(digits[column]) for column in range(1, 18))

@@ -107,12 +107,12 @@ class Record(records.Record):
         """Read a standard deviation, F10.3 or DMS; zero means the default."""
         value = self.angle(first, last) if angle else self.real(first, last)
         if value < 0:
-            raise self.error(phrase("giant.negative-sd", first=first, last=last))
+            raise self.error(phrase("giant.negative-sd", first=first, last=last, value=value))
         try:
             format_deviations((value,), (angle,))
         except ValueError:
             # An exponent allows values that the output files cannot repeat.
-            raise self.error(phrase("giant.sd-range", first=first, last=last)) from None
+            raise self.error(phrase("giant.sd-range", first=first, last=last, value=value)) from None
         return value
 
     def position(self, geographic: bool) -> tuple[float, float, float]:
@@ -121,7 +121,7 @@ class Record(records.Record):
             return self.real(9, 20), self.real(21, 32), self.real(33, 44)
         longitude, latitude, height = self.angle(9, 20), self.angle(21, 32), self.real(33, 44)
         if abs(latitude) > QUARTER_CIRCLE:
-            raise self.error(phrase("giant.latitude"))
+            raise self.error(phrase("giant.latitude", value=math.degrees(latitude)))
         return longitude, latitude, height
 
     def attitude(self) -> tuple[float, float, float]:

@@ -248,7 +248,7 @@ class Deck:
                 card, point, xyz = self._reading(job)
             readings.append(np.array(rows))
         if point != 0:
-            raise card.error(phrase("deck.flag", point=job.numbers[-1]))
+            raise card.error(phrase("deck.flag", point=job.numbers[-1], value=point))
         return readings
 
     def _reading(self, job: Job) -> tuple[Record, int, list[float]]:

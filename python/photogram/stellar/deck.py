@@ -58,7 +58,7 @@ class Card(Record):
         """Return a weight matrix of its elements xx, yy, xy."""
         first, second, cross = values
         if not (first > 0 and second > 0 and first * second > cross * cross):
-            raise self.error(phrase("stars.indefinite-card"))
+            raise self.error(phrase("stars.indefinite-card", xx=first, yy=second, xy=cross))
         return np.array([[first, cross], [cross, second]])
 
 
@@ -374,7 +374,7 @@ def _data(
         if star in stars:
             raise card.error(phrase("error.repeated", kind="star", name=star))
         if count < 1:
-            raise card.error(phrase("stars.no-images", star=star))
+            raise card.error(phrase("stars.no-images", star=star, count=count))
         place = [card.real(1, 14), card.real(15, 28)]
         if abs(place[1]) > np.pi / 2:
             raise card.error(phrase("stars.declination", star=star, value=place[1]))
@@ -386,8 +386,8 @@ def _data(
         stars[star] = star, card.name(72, 77) or star, place, weight
         for image in range(count):
             card = cards.take(f"an image of star {star}")
-            if str(abs(card.integer(61, 66))) != star:
-                raise card.error(phrase("stars.error-1", star=star))
+            if str(number := abs(card.integer(61, 66))) != star:
+                raise card.error(phrase("stars.error-1", star=star, value=number))
             point = card.integer(55, 60)
             trail = abs(point) % 1000
             group = 0 if trail < groups[0] else 1 if trail < groups[1] else 2

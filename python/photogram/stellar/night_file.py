@@ -268,7 +268,7 @@ def _by_magnitude(rows: list[Row]) -> list[Row]:
 def _image(row: Row, frame: tuple[float, float], offset: float) -> tuple[float, float]:
     xy = row.required("x_px") + offset, row.required("y_px") + offset
     if not all(-size <= value <= 2 * size for value, size in zip(xy, frame, strict=True)):
-        raise row.place.error(phrase("stars.outside", width=frame[0], height=frame[1]))
+        raise row.place.error(phrase("stars.outside", x=xy[0], y=xy[1], width=frame[0], height=frame[1]))
     return xy
 
 

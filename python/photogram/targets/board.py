@@ -101,8 +101,8 @@ class Board(Valued, Brief):
             self._check_grid()
         if self.point_sd is not None:
             sd = shaped("point_sd", self.point_sd, (len(self.places), 3))
-            if not ((sd >= 0) & np.isfinite(sd)).all():
-                raise InputError(phrase("targets.point-sd"))
+            if (wrong := sd[~((sd >= 0) & np.isfinite(sd))]).size:
+                raise InputError(phrase("targets.point-sd", value=float(wrong[0])))
             self._set("point_sd", sd)
         for name in ("sd_plane", "sd_spacing"):
             if getattr(self, name) is not None:
@@ -137,7 +137,7 @@ class Board(Valued, Brief):
             assert self.tag_spacing is not None
             pitch = self.tag_size * (1 + self.tag_spacing)
             if self.spacing not in (None, pitch, (pitch, pitch)):
-                raise InputError(phrase("targets.april-spacing"))
+                raise InputError(phrase("targets.april-spacing", pitch=pitch, value=str(self.spacing)))
             self._set("spacing", (pitch, pitch))
             return
         self._refuse("tag_size", "tag_spacing")
@@ -163,7 +163,7 @@ class Board(Valued, Brief):
         if self.point_names is not None:
             point_names = names("point_names", self.point_names)
             if len(point_names) != count or len(set(point_names)) < count:
-                raise InputError(phrase("targets.names", count=count))
+                raise InputError(phrase("targets.names", count=count, given=len(set(point_names))))
             self._set("point_names", tuple(point_names))
 
     def brief(self) -> tuple[str, Rows]:

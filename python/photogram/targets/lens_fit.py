@@ -183,7 +183,7 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
     free = {*names} - {"w", "h", *_FIXED_TERMS} if count is None else {*names[: 4 + count]}
     if splined:
         if min(knots) < ORDER + 1:
-            raise InputError(phrase("targets.knots", order=ORDER, least=ORDER + 1))
+            raise InputError(phrase("targets.knots", order=ORDER, least=ORDER + 1, value=min(knots)))
         field = min(FIELD_MARGIN * field_of(source.rays(grid_of_pixels(size)), knots), 359.0)
         start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": field}
         free = set()

@@ -71,7 +71,7 @@ def fitted_motion(
     numbers = np.column_stack([towards, aims, weights.reshape(len(towards), -1)])
     usable = np.isfinite(numbers).all(axis=1)
     if (count := int(np.count_nonzero(usable))) < MIN_PIXELS:
-        raise InputError(phrase("targets.few-pixels", count=count))
+        raise InputError(phrase("targets.few-pixels", count=count, least=MIN_PIXELS))
     towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
     motion, free = np.eye(4), slice(0 if finite else 3, 6)
     unit = towards / np.linalg.norm(towards, axis=1)[:, np.newaxis]

@@ -234,7 +234,7 @@ def distance_uncertainty(
 def _of_rig(result: Calibrated, cameras: Sequence[int | str]) -> tuple[Housing, list[int]]:
     numbers = [camera_number(result, each) for each in cameras]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
-        raise InputError(phrase("targets.two-cameras-once"))
+        raise InputError(phrase("targets.two-cameras-once", names=[*map(str, cameras)]))
     housed = housed_with(result, numbers[0])
     if not set(numbers) <= set(housed):
         raise InputError(phrase("targets.not-tied"))

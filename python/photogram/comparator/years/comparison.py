@@ -229,7 +229,7 @@ def compare(
         else:
             records += RecordedCalibration.read(Path(each))
     if len(records) < 2:
-        raise InputError(phrase("comparators.two"))
+        raise InputError(phrase("comparators.two", count=len(records)))
     records.sort(key=lambda record: record.day)
     for first, second in combinations(records, 2):
         if first.day == second.day and all(
