@@ -1,4 +1,4 @@
-"""Radial and other distortion of an adjusted camera, with standard deviations.
+"""Distortion of an adjusted camera along and across the radius, with standard deviations.
 
 A curve dr(r) of the radial terms k has the partials J = d(dr)/dk. With the cofactors Q of the terms its
 standard deviation is s(r) = sigma0 sqrt(J Q J'). Measurements also depend on the principal distance c. A

@@ -286,7 +286,7 @@ def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int])
 def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
     """Return groups of estimated distortion terms that are used together.
 
-    Radial terms are separate, the highest power first; all others are grouped by letter (P1 and P2, B1 and
+    Powers of the radius are separate, the highest first; others are grouped by letter (P1 and P2, B1 and
     B2).
     """
     radial, others = [], dict[str, list[str]]()

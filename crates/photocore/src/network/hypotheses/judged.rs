@@ -116,10 +116,10 @@ impl Judged {
     /// The same with other units: what leads from errors to errors in these.
     pub(super) fn in_units(mut self, units: &DMatrix<f64>) -> Self {
         let count = self.estimate.len();
-        let to = |own: &[f64]| (units * DVector::from_column_slice(own)).as_slice().to_vec();
-        self.estimate = to(&self.estimate);
-        self.mdb = self.mdb.as_deref().map(to);
-        self.error = self.error.as_deref().map(to);
+        let to = |own: &Vec<f64>| (units * DVector::from_column_slice(own)).as_slice().to_vec();
+        let (estimate, mdb, error) =
+            (to(&self.estimate), self.mdb.as_ref().map(to), self.error.as_ref().map(to));
+        (self.estimate, self.mdb, self.error) = (estimate, mdb, error);
         let cofactors = units * DMatrix::from_row_slice(count, count, &self.cofactors) * units.transpose();
         self.cofactors = cofactors.transpose().as_slice().to_vec();
         self
