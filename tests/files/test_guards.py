@@ -229,7 +229,7 @@ def test_a_directory_is_no_place_for_a_file(run, place, name, option):
     for directory in (".", "galveston", "galveston/.."):
         result = run(*words(name, **{option: directory}))
         assert result.exit_code == 1
-        assert f"{directory}: the output is a directory" in result.stderr
+        assert f"{directory}: the output must be a file" in result.stderr
     assert content(place) == before
 
 

@@ -311,8 +311,8 @@ def _looks(
     if isinstance(motion, LineScanner):
         spread += math.tan(motion.view_angle) * math.sin(crab)
         steepest += 4 * attitude_error
-    half_angle = math.atan(spread)
-    if not _NARROWEST < half_angle < (high := _WIDEST - steepest):
+    half_angle, high = math.atan(spread), _WIDEST - steepest
+    if not _NARROWEST < half_angle < high:
         raise InputError(phrase("simulation.view-angle", angle=half_angle, low=_NARROWEST, high=high))
     require(steepest <= _FAR_MORE * half_angle, "tilt", "most", high=_FAR_MORE * half_angle / 2, value=tilt)
     return half_angle, steepest
