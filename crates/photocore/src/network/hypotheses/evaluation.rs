@@ -39,7 +39,7 @@ impl Trial {
     /// Tests all hypotheses of the catalogue at the adjusted values, and computes what an undetected error would change.
     ///
     /// Errors of sets are tested by their scores and solutions with one factor, errors of groups by the selected inverse; groups are those
-    /// of [`super::Suspects`] except image observations, which [`Trial::tests`] has.
+    /// of [`crate::network::Suspects`] except image observations, which [`Trial::tests`] has.
     ///
     /// # Errors
     /// Nothing was adjusted before; an interruption, no memory.
