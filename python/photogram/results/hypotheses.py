@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.strips import strips_of
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, records
@@ -32,7 +34,6 @@ Facts = dict[str, Any]  # Additional facts for hypotheses; see `NetworkTrial.hyp
 LIMIT = 6.0  # Standard deviations from which on an undetected error of a point counts
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Smallest number of other points that it moves
-UNTESTED = 1e-6  # Redundancy below which an error of any size remains undetected
 EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise ratios
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
@@ -40,9 +41,9 @@ ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 LENSES = frozenset(
     {"camera-term", "bending"}
 )  # Errors that patterns of residuals reveal, or that have such a cause
+LISTED = 10  # Rows of each table of documents
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
-SEPARABLE = 0.9  # Correlation of scores from which on hypotheses cannot be distinguished
 
 DATUM = frozenset(
     {
@@ -100,9 +101,8 @@ class Hypothesis:
     error: Sequence[float] | None  # whose effect is reported: MDB or plausible size
     bias_to_noise: float
     effect: Effect | None
-    log_odds: float = field(default=math.nan)  # against "no error"
-    name: Phrase | None = None
-    checked: bool = False  # Whether check points detect it
+    log_odds: float  # against "no error"
+    checked: bool  # Whether check points detect it
 
     @property
     def undetected(self) -> float:
@@ -133,13 +133,46 @@ class Hypotheses:
     """All hypotheses of an adjusted network: errors of sets first."""
 
     every: Sequence[Hypothesis]
-    correlations: Floats  # (s, s) of the scores of the s hypotheses on sets
+    suspects: NamedSuspects
+    cameras: Sequence[str]  # names
     points: int  # number of adjusted points
     point_ids: Sequence[str]
     axes: Sequence[str]
     units: Mapping[str, str]  # Units of the errors of types without a length
     length: str  # Unit of all others
     single_odds: float  # Largest log odds of an error of a single observation, images among them
+
+    @cached_property
+    def _group_of(self) -> dict[tuple[int, int], int]:
+        kinds, subjects = self.suspects.kinds, self.suspects.subjects
+        groups = np.flatnonzero(kinds != 0)
+        return dict(
+            zip(
+                zip(kinds[groups].tolist(), subjects[groups].tolist(), strict=True),
+                groups.tolist(),
+                strict=True,
+            )
+        )
+
+    def name(self, own: Hypothesis) -> Phrase:
+        """Return the name of a hypothesis."""
+        if own.group is None:
+            fields: dict[str, Any] = {"set": (own.index or 0) + 1, "parameters": list(own.parameters)}
+            if own.index is not None and own.code in (
+                "camera-f",
+                "camera-point",
+                "camera-term",
+                "readout-time",
+            ):
+                fields["camera"] = self.cameras[own.index] if own.index < len(self.cameras) else "1"
+            return Phrase(f"hypothesis.{own.code}", fields)
+        group = self._group_of[own.group, own.index or 0]
+        named = self.suspects.name(group)
+        if own.component is None:
+            return named
+        rows = self.suspects.rows(group).tolist()
+        axes = [self.suspects.row_name(k) for k in rows if self.suspects.components[k] == own.component]
+        return phrase("named.parts", axes=axes, named=named)
 
     def unit(self, code: str) -> str:
         """Return the unit of the errors of a type, behind a blank."""
@@ -149,11 +182,8 @@ class Hypotheses:
     def harmful(self) -> list[Hypothesis]:
         """Hypotheses whose undetected errors move too many points, the worst first."""
         found = [each for each in self.every if each.is_harmful(self.points)]
-        wholes = {(each.group, each.index) for each in found if each.component is None}
-        # A group stands for its components.
-        alone = [each for each in found if each.component is None or (each.group, each.index) not in wholes]
         return sorted(
-            alone, key=lambda each: (each.mdb is not None, -each.effect.ratio if each.effect else 0)
+            found, key=lambda each: (each.mdb is not None, -each.effect.ratio if each.effect else 0)
         )
 
     def unchecked(self) -> list[Phrase]:
@@ -162,7 +192,7 @@ class Hypotheses:
         for each in self.harmful:
             effect = each.effect or Effect(0, 0, 0.0, None, 0.0)
             if each.mdb is None:
-                messages.append(phrase("unchecked.any", named=each.name))
+                messages.append(phrase("unchecked.any", named=self.name(each)))
                 continue
             size, named = self._main_component(each, each.mdb)
             share = 100 * effect.points / self.points
@@ -170,7 +200,7 @@ class Hypotheses:
             messages.append(Phrase("unchecked.mdb", fields))
         return messages
 
-    def _main_component(self, own: Hypothesis, mdb: Sequence[float]) -> tuple[str, Phrase | None]:
+    def _main_component(self, own: Hypothesis, mdb: Sequence[float]) -> tuple[str, Phrase]:
         """Return the size of an error, and its name if one component is nearly all of it."""
         unit = self.unit(own.code)
         squares = np.square(mdb)
@@ -178,10 +208,10 @@ class Hypotheses:
         of_group = [each for each in parts if (each.group, each.index) == (own.group, own.index)]
         if len(of_group) == len(mdb) and squares.max() > MAIN * squares.sum():
             main = int(squares.argmax())
-            return f"{abs(mdb[main]):.3g}{unit}", of_group[main].name
+            return f"{abs(mdb[main]):.3g}{unit}", self.name(of_group[main])
         if len(mdb) == 1:
-            return f"{abs(mdb[0]):.3g}{unit}", own.name
-        return f"{math.sqrt(squares.sum()):.3g}{unit}", own.name
+            return f"{abs(mdb[0]):.3g}{unit}", self.name(own)
+        return f"{math.sqrt(squares.sum()):.3g}{unit}", self.name(own)
 
     @property
     def assumptions(self) -> list[Phrase]:
@@ -212,7 +242,7 @@ class Hypotheses:
         return [
             phrase(
                 "common.error" if each is found[0] else "common.alternative",
-                named=each.name,
+                named=self.name(each),
                 size=_size(each, self.unit(each.code)),
                 odds=math.exp(found[0].log_odds - each.log_odds),
             )
@@ -224,69 +254,64 @@ class Hypotheses:
         """Whether the most likely of these errors moves a point beyond the limit."""
         return any(each.moves() for each in self.common()[:1])
 
-    def tests(self) -> Table:
-        """Return the declared table of all tests."""
-        every = self.every
-        columns = [
-            *self._names(),
-            _column("dimension", [each.rank for each in every], "Parameters", decimals=0),
-            _column("statistic", [each.statistic for each in every], "T", decimals=2),
-            _column("p", [each.probability for each in every], "p", figures=2),
-            _column("log_odds", [each.log_odds for each in every], "Log odds", decimals=1),
-            _column("estimate", [_written(each, each.estimate) for each in every], "Estimate", kind="name"),
-        ]
-        shown = np.array(
-            sorted(range(len(self.every)), key=lambda k: -self.every[k].log_odds)[:10], dtype=np.int64
-        )
-        note = "Log odds compare an error of a plausible size with no error."
-        return Table("hypotheses", "Tested hypotheses", columns, note, shown=shown)
+    @property
+    def likely(self) -> Sequence[Hypothesis]:
+        """The most likely hypotheses, for documents."""
+        return sorted(self.every, key=lambda each: -each.log_odds)[:LISTED]
 
-    def external_reliability(self) -> Table:
-        """Return the declared table of undetected errors and their effects on points."""
-        effects = [each.effect or Effect(0, 0, math.nan, None, math.nan) for each in self.every]
+    @property
+    def effective(self) -> Sequence[Hypothesis]:
+        """The hypotheses with the largest effects of undetected errors, for documents."""
+        return sorted(self.every, key=lambda each: -each.effect.ratio if each.effect else 0.0)[:LISTED]
+
+    def tests(self, some: Sequence[Hypothesis]) -> Table:
+        """Return the declared table of the tests of some hypotheses."""
+        columns = [
+            *self._names(some),
+            _column("dimension", [each.rank for each in some], "Parameters", decimals=0),
+            _column("statistic", [each.statistic for each in some], "T", decimals=2),
+            _column("p", [each.probability for each in some], "p", figures=2),
+            _column("log_odds", [each.log_odds for each in some], "Log odds", decimals=1),
+            _column("estimate", [_written(each, each.estimate) for each in some], "Estimate", kind="name"),
+        ]
+        note = "Log odds compare an error of a plausible size with no error."
+        return Table("hypotheses", "Tested hypotheses", columns, note)
+
+    def external_reliability(self, some: Sequence[Hypothesis]) -> Table:
+        """Return the declared table of undetected errors of some hypotheses, and of their effects."""
+        effects = [each.effect or Effect(0, 0, math.nan, None, math.nan) for each in some]
         worst = [
             "" if each.at is None else f"{self.axes[each.at[1]]} of {self.point_ids[each.at[0]]}"
             for each in effects
         ]
-        every = self.every
         columns = [
-            *self._names(),
-            _column("redundancy", [each.redundancy for each in every], "Redundancy", decimals=4),
-            _column("mdb", [_written(each, each.mdb or ()) for each in every], "MDB", kind="name"),
-            _column("bias_to_noise", [each.bias_to_noise for each in every], "Moves up to, sd", decimals=1),
+            *self._names(some),
+            _column("redundancy", [each.redundancy for each in some], "Redundancy", decimals=4),
+            _column("mdb", [_written(each, each.mdb or ()) for each in some], "MDB", kind="name"),
+            _column("bias_to_noise", [each.bias_to_noise for each in some], "Moves up to, sd", decimals=1),
             _column("points", [each.points for each in effects], "Points moved", decimals=0),
             _column("ratio", [each.ratio for each in effects], "Largest effect, sd", decimals=1),
             _column("change", [each.change for each in effects], "Largest effect", decimals=3),
             _column("at", worst, "At", kind="name"),
         ]
-        order = sorted(range(len(self.every)), key=lambda k: -np.nan_to_num(effects[k].ratio))
         note = (
             f"MDB: the error that tests of the level {DETECTION[0]:g} detect in {100 * DETECTION[1]:.0f} of"
             f" 100 cases. Otherwise, points moved change by more than {LIMIT:g} standard deviations."
         )
-        return Table(
-            "external-reliability",
-            "Undetected errors",
-            columns,
-            note,
-            shown=np.array(order[:10], dtype=np.int64),
-        )
+        return Table("external-reliability", "Undetected errors", columns, note)
 
     def document(self) -> list[dict[str, Any]]:
-        """Return the rows that both tables show as JSON objects."""
-        every, numbers = self.tests(), self.external_reliability()
-        shown = sorted({*self._shown(every), *self._shown(numbers)})
-        rows = [records(table.columns) for table in (every, numbers)]
-        return [{**rows[0][k], **rows[1][k]} for k in shown]
+        """Return the rows of both tables of documents as JSON objects."""
+        listed = {id(each) for each in (*self.likely, *self.effective)}
+        some = [each for each in self.every if id(each) in listed]
+        tables = self.tests(some), self.external_reliability(some)
+        tests, effects = (records(table.columns) for table in tables)
+        return [{**test, **effect} for test, effect in zip(tests, effects, strict=True)]
 
-    @staticmethod
-    def _shown(table: Table) -> list[int]:
-        return [] if table.shown is None else table.shown.tolist()
-
-    def _names(self) -> list[Quantity]:
+    def _names(self, some: Sequence[Hypothesis]) -> list[Quantity]:
         return [
-            _column("code", [each.code for each in self.every], "", kind="name"),
-            _column("hypothesis", [str(each.name) for each in self.every], "Error", kind="name"),
+            _column("code", [each.code for each in some], "", kind="name"),
+            _column("hypothesis", [str(self.name(each)) for each in some], "Error", kind="name"),
         ]
 
 
@@ -328,17 +353,22 @@ def hypotheses(
     trial, tests, suspects = found.trial, found.tests, found.suspects
     core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
     core.pop("check_sd", None)
-    rows, correlations = trial.core.hypotheses(
+    rows, _ = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=LIMIT, effects=EFFECTS
     )
-    name = group_names(cast("NamedSuspects", suspects), getattr(given, "camera_names", ()))
     numbers = Counter((row["code"], row["component"] is None) for row in rows)
     every = []
     for row in rows:
         effect = None if row["effect"] is None else Effect(*row["effect"])
-        own = Hypothesis(**{**row, "effect": effect}, name=name(row))
-        odds = _log_odds(own, numbers[own.code, own.component is None], estimated)
-        every.append(replace(own, log_odds=odds, checked=_is_checked(effect, check_sd)))
+        absurd = sum((d / p) ** 2 for d, p in zip(row["estimate"], row["plausible"], strict=False))
+        count = numbers[row["code"], row["component"] is None]
+        k, statistic = max(len(row["estimate"]), 1), row["statistic"]
+        if estimated is not None:
+            omega, freedom = estimated
+            statistic = -freedom * math.log(max(1 - statistic / omega, 1e-300))
+        odds = float(_log_odds(statistic, k, max(row["observations"], k + 1), count)) - absurd / 2
+        checked = _is_checked(effect, check_sd)
+        every.append(Hypothesis(**{**row, "effect": effect}, log_odds=odds, checked=checked))
     length, image = unit_written(axes[2].small), given.image_unit
     units = {"camera-f": f" {image}", "camera-point": f" {image}"}
     units |= dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad")
@@ -346,10 +376,11 @@ def hypotheses(
     units |= dict.fromkeys(("time-offset", "readout-time"), " s" if "times" in facts else " exposures")
     images = (suspects.kinds == 0) & tests.active
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
-    of_images = largest / 2 - math.log(3) - math.log(max(int(np.count_nonzero(images)), 1))
+    of_images = float(_log_odds(largest, 2, 3, max(int(np.count_nonzero(images)), 1)))
     return Hypotheses(
         every,
-        correlations,
+        suspects=cast("NamedSuspects", suspects),
+        cameras=getattr(given, "camera_names", ()),
         points=len(np.unique(suspects.points[images])),
         point_ids=given.point_ids,
         axes=[axis.name for axis in axes],
@@ -374,20 +405,15 @@ def largest_odds(tests: Iterable[Tested]) -> float:
     for each in tests:
         values = np.square(each.values) if each.statistic == "w" else np.asarray(each.values)
         k = np.asarray(each.dimension, dtype=np.float64)
-        odds = values / 2 - k / 2 * np.log(k + 1) - math.log(max(int(np.count_nonzero(~np.isnan(values))), 1))
+        odds = _log_odds(values, k, k + 1, max(int(np.count_nonzero(~np.isnan(values))), 1))
         found.append(float(np.nanmax(odds, initial=-math.inf)))
     return max(found)
 
 
-def _log_odds(own: Hypothesis, count: int, estimated: tuple[float, float] | None) -> float:
-    """Return T/2 - k/2 ln n_h - ln N_h - sum (d / plausible size)^2 / 2."""
-    k = max(len(own.estimate), 1)
-    statistic = own.statistic
-    if estimated is not None:
-        omega, freedom = estimated
-        statistic = -freedom * math.log(max(1 - statistic / omega, 1e-300))
-    absurd = sum((d / p) ** 2 for d, p in zip(own.estimate, own.plausible, strict=False))
-    return statistic / 2 - k / 2 * math.log(max(own.observations, k + 1)) - math.log(count) - absurd / 2
+def _log_odds(statistic: ArrayLike, k: ArrayLike, observations: ArrayLike, count: int) -> Floats:
+    """Return T/2 - k/2 ln n_h - ln N_h: the log odds of an error of any size against no error."""
+    half = np.asarray(k) / 2 * np.log(observations)
+    return np.asarray(np.asarray(statistic) / 2 - half - math.log(count))
 
 
 NO_FACTS: Facts = {
@@ -411,13 +437,13 @@ def block_facts(block: Block, places: Floats) -> Facts:
     cameras = np.zeros(count, dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
     facts: Facts = {"widths": [], "readouts": []}
     of_images = cameras[block.image_photos]
-    for camera in range(max(len(block.cameras), 1)):
-        xy = block.image_xy[of_images == camera]
-        low, high = (xy.min(axis=0), xy.max(axis=0)) if len(xy) else (np.zeros(2), np.zeros(2))
-        width, height = (high - low).tolist()
-        facts["widths"].append(width or math.nan)
+    low, high = (np.full((max(len(block.cameras), 1), 2), end) for end in (math.inf, -math.inf))
+    np.minimum.at(low, of_images, block.image_xy)
+    np.maximum.at(high, of_images, block.image_xy)
+    for camera, (width, height) in enumerate((high - low).tolist()):
+        facts["widths"].append(width if width > 0 else math.nan)
         digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0
-        middle = float(low[1] + high[1]) / 2
+        middle = float(low[camera, 1] + high[camera, 1]) / 2
         facts["readouts"].append([0.0, 1 / height, -middle / height] if digital else None)
     if block.geographic:
         return facts
@@ -446,27 +472,3 @@ def block_facts(block: Block, places: Floats) -> Facts:
         set_of = {int(kind): k for k, kind in enumerate(own)}
         facts["control_sets"] = [set_of.get(kind) for kind in kinds.tolist()]
     return facts
-
-
-def group_names(suspects: NamedSuspects, cameras: Sequence[str]) -> Callable[[dict[str, Any]], Phrase]:
-    """Return a function that names the hypothesis of a row of the core."""
-    groups = {
-        (int(suspects.kinds[group]), int(suspects.subjects[group])): int(group)
-        for group in np.flatnonzero(suspects.kinds != 0)
-    }
-
-    def name(row: dict[str, Any]) -> Phrase:
-        if row["group"] is None:
-            fields: dict[str, Any] = {"set": (row["index"] or 0) + 1, "parameters": list(row["parameters"])}
-            if row["code"] in ("camera-f", "camera-point", "camera-term", "readout-time"):
-                fields["camera"] = cameras[row["index"]] if row["index"] < len(cameras) else "1"
-            return Phrase(f"hypothesis.{row['code']}", fields)
-        group = groups[row["group"], row["index"]]
-        named = suspects.name(group)
-        if row["component"] is None:
-            return named
-        rows = suspects.rows(group)
-        axes = [suspects.row_name(k) for k in rows.tolist() if suspects.components[k] == row["component"]]
-        return phrase("named.parts", axes=axes, named=named)
-
-    return name

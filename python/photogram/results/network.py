@@ -303,7 +303,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         AdjustmentError
             If the adjustment has not converged, has a robust loss or has no redundancy.
         """
-        return self._hypotheses().tests().frame()
+        found = self._hypotheses()
+        return found.tests(found.every).frame()
 
     def external_reliability(self) -> pd.DataFrame:
         """Return effects of undetected errors as a data frame, a row for each hypothesis.
@@ -317,7 +318,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         AdjustmentError
             As in :meth:`hypotheses`.
         """
-        return self._hypotheses().external_reliability().frame()
+        found = self._hypotheses()
+        return found.external_reliability(found.every).frame()
 
     @property
     def image_points(self) -> Indices:

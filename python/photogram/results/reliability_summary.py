@@ -83,7 +83,8 @@ class ReliabilitySummary:
             sentences.append("on other points cannot be told apart:")
             sentences += [*map(str, self.pairs), *([f"and {more} more"] if more > 0 else [])]
         sentences = sentences or ["all observations of a point can be told apart"]
-        errors = [self.hypotheses.tests(), self.hypotheses.external_reliability()]
+        found = self.hypotheses
+        errors = [found.tests(found.likely), found.external_reliability(found.effective)]
         return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences), *errors]
 
     def document(self) -> dict[str, Any]:

@@ -22,9 +22,8 @@ const POINTS: [&str; 4] = ["cx", "cy", "xp", "yp"];
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     let bundle = catalogue.bundle;
-    let camera_of = trial.camera_of_photo();
     // Cameras with equal parameters are one: a block may have one for each photo.
-    let mut groups: Vec<(String, Vec<f64>, Vec<usize>)> = vec![];
+    let mut groups: Vec<(&'static str, Vec<f64>, Vec<usize>)> = vec![];
     for (photo, images) in bundle.images_on.iter().enumerate() {
         // What a scanned film sees is not the image of its camera.
         if *images == 0 || !bundle.passages.is_empty() {
@@ -34,13 +33,13 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
         let (name, parameters) = (camera.name(), camera.parameters());
         match groups.iter().position(|own| own.0 == name && own.1 == parameters) {
             Some(place) => groups[place].2.push(photo),
-            None if groups.len() < MOST_GROUPS => groups.push((name.to_owned(), parameters, vec![photo])),
+            None if groups.len() < MOST_GROUPS => groups.push((name, parameters, vec![photo])),
             None => return,
         }
     }
     groups.sort_by_key(|own| std::cmp::Reverse(own.2.len()));
     for (_, _, photos) in groups.into_iter().take(MOST_CAMERAS) {
-        of_camera(catalogue, trial, camera_of[photos[0]], &photos);
+        of_camera(catalogue, trial, trial.camera_of_photo[photos[0]], &photos);
     }
 }
 
@@ -98,11 +97,6 @@ impl Catalogue<'_> {
 }
 
 impl Trial {
-    /// The camera of each photo.
-    pub(super) fn camera_of_photo(&self) -> &[usize] {
-        &self.camera_of_photo
-    }
-
     /// Parameters of the camera of a photo that are fixed.
     fn fixed_parameters(&self, photo: usize, count: usize) -> Vec<usize> {
         let (model, problem) = (&self.assembled.problem.model, &self.assembled.problem);

@@ -50,7 +50,7 @@ pub(super) struct Catalogue<'a> {
     pub(super) cameras: Vec<Vec<(usize, usize)>>,
     /// Column of the readout time of the camera of each photo.
     pub(super) shutters: Vec<Option<usize>>,
-    camera_of_photo: &'a [usize],
+    pub(super) camera_of_photo: &'a [usize],
 }
 
 impl<'a> Catalogue<'a> {
@@ -70,7 +70,7 @@ impl<'a> Catalogue<'a> {
             fixed: HashMap::new(),
             cameras: vec![vec![]; photos],
             shutters: vec![None; photos],
-            camera_of_photo: trial.camera_of_photo(),
+            camera_of_photo: &trial.camera_of_photo,
         }
     }
 
@@ -106,10 +106,11 @@ impl<'a> Catalogue<'a> {
     /// Points with observed or fixed coordinates: the point of the network, its place in the model.
     pub fn control_points(&self, trial: &Trial) -> Vec<(usize, usize)> {
         let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "control");
-        let tied: Vec<usize> = tied.flat_map(|tied| tied.touches.points.iter().copied()).collect();
+        let mut observed = vec![false; trial.assembled.points.len()];
+        tied.flat_map(|tied| &tied.touches.points).for_each(|&place| observed[place] = true);
         let given = |place: usize| self.sd[self.bundle.of_point(place)].iter().any(|sd| sd.is_finite());
         let points = trial.assembled.points.iter().enumerate();
-        let control = points.filter(|(place, _)| given(*place) || tied.contains(place));
+        let control = points.filter(|(place, _)| given(*place) || observed[*place]);
         control.map(|(place, &point)| (point, place)).collect()
     }
 
@@ -143,10 +144,6 @@ impl<'a> Catalogue<'a> {
         };
         self.bundle.observations.iter().any(|tied| tied.observation.kind() == "attitude")
             || (0..self.bundle.cameras.len()).any(weighted)
-    }
-
-    pub fn camera_of(&self, photo: usize) -> usize {
-        self.camera_of_photo[photo]
     }
 
     /// What sees an unknown as an observation of itself.

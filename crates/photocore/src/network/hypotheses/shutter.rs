@@ -14,7 +14,7 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     };
     for (camera, _) in facts.readouts.iter().enumerate().filter(|(_, readout)| readout.is_some()) {
         let photos: Vec<usize> = (0..catalogue.bundle.cameras.len())
-            .filter(|&photo| trial.camera_of_photo()[photo] == camera && moves(photo))
+            .filter(|&photo| trial.camera_of_photo[photo] == camera && moves(photo))
             .collect();
         if photos.is_empty() {
             continue;
@@ -35,7 +35,7 @@ impl Catalogue<'_> {
         let observed = &self.bundle.images[image];
         let photo = observed.photo;
         let Some(column) = self.shutters[photo] else { return };
-        let camera = self.camera_of(photo);
+        let camera = self.camera_of_photo[photo];
         let Some([a, b, c]) = self.facts.readouts[camera] else { return };
         let time = a * observed.xy[0] + b * observed.xy[1] + c;
         let (first, velocity) = (self.bundle.of_block(photo).start, self.facts.velocities[photo]);
