@@ -35,8 +35,10 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints, MinimumConstraints, check_datum
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
+from photogram.results.axes import point_axes
 from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.fixed_tests import held_remark, held_tested
+from photogram.results.hypotheses import block_facts, hypotheses
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import (
     ATTITUDE,
@@ -52,7 +54,7 @@ from photogram.results.snooping_result import Snooped, recorded
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped
-from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
+from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Tests
 from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import Phrase, phrase
 
@@ -185,9 +187,14 @@ def _snoop_block(
         trial.restart(core_trial(start, None, core, threads))
         return aside
 
+    def common(tests: Tests) -> list[Phrase]:
+        facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
+        found = hypotheses(trial, tests, facts, block, point_axes(block), None)
+        return found.common_errors() if found.common_is_harmful else []
+
     try:
         trial = block_trial(block, None, core, threads, parts=parts)
-        outcome = snooped(trial, settings, afresh)
+        outcome = snooped(trial, settings, afresh, common)
     except (LostSupportError, _photocore.BlockError):
         # This adjustment names undetermined unknowns, or continues without some points.
         covariance = unit_variance == "redundancy"

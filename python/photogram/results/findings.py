@@ -17,7 +17,9 @@ from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.tests import Tests
-from photogram.statistics.findings import Findings, Removed, Systematic, Tested
+from photogram.results.type_factors import type_factors
+from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text
+from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
@@ -44,6 +46,9 @@ def network_findings(
 ) -> Findings:
     """Return the findings of all networks, with tests of fixed values and of patterns."""
     tests, summary = Tests(result), result.reliability_summary
+    lost = None if summary is None else summary.downweighted
+    test = _robust_test(result) if result.loss else result.global_test
+    rejected = test is not None and (test.rejected_high or test.rejected_low)
     return Findings(
         status=result.status,
         observations=[
@@ -51,17 +56,28 @@ def network_findings(
             *(each if result.KNOWN else each.studentized(*result.sum_and_freedom) for each in fixed),
         ],
         degrees_of_freedom=result.degrees_of_freedom,
-        global_test=None if result.loss else result.global_test,
+        global_test=test,
+        types=type_factors(tests) if rejected and result.KNOWN and not result.loss else [],
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
-        snooped=result.snooped,
+        snooped=result.snooped if lost is None else lost.removed,
+        robust=result.loss is not None,
+        unsupported=[] if lost is None else lost.unsupported,
         remarks=[*unseen(result), *_assumptions(result)],
         unchecked=[] if summary is None else summary.hypotheses.unchecked(),
         common=[] if summary is None else summary.hypotheses.common_errors(largest_odds(fixed)),
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )
+
+
+def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:
+    """Return the test of the observations that a loss does not remove, with their given weights."""
+    summary = result.reliability_summary
+    if summary is None or getattr(result, "unit_variance", "constrained") != "constrained":
+        return None
+    return global_test(summary.standing.weighted_sum_of_squares, summary.standing.degrees_of_freedom)
 
 
 def block_findings(result: Result) -> Findings:
@@ -130,9 +146,8 @@ def _set_aside(result: Result) -> Removed | None:
     if not result.set_aside:
         return None
     images = sum(getattr(name, "code", "") == "named.image" for name in result.set_aside)
-    return Removed(
-        [{"name": name} for name in result.set_aside], images / max(images + len(result.image_points), 1)
-    )
+    counts: dict[Text, tuple[int, int]] = {IMAGES: (images, images + len(result.image_points))}
+    return Removed([{"name": name} for name in result.set_aside], counts)
 
 
 def _left_out(result: Result) -> list[Phrase]:

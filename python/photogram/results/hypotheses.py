@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,8 +26,8 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.network.block import Block
     from photogram.network.unadjusted import Given
-    from photogram.results.network_trial import NamedSuspects
-    from photogram.results.reliability import Reliability
+    from photogram.results.network_trial import NamedSuspects, NetworkTrial
+    from photogram.statistics.snooping.suspects import Tests
 
 Facts = dict[str, Any]  # Additional facts for hypotheses; see `NetworkTrial.hypotheses`
 
@@ -339,18 +339,19 @@ def _written(own: Hypothesis, values: Sequence[float]) -> str:
 
 
 def hypotheses(
-    found: Reliability,
+    trial: NetworkTrial,
+    tests: Tests,
     facts: Facts,
     given: Given,
     axes: Sequence[Axis],
     estimated: tuple[float, float] | None,
 ) -> Hypotheses:
-    """Return the hypotheses of an adjusted network that is tested.
+    """Return the hypotheses of an adjusted network with the `tests` of its observations.
 
     `axes` are those of its points, `estimated` the sum of squares and the degrees of freedom if the unit
     weight is estimated.
     """
-    trial, tests, suspects = found.trial, found.tests, found.suspects
+    suspects = trial.suspects
     core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
     core.pop("check_sd", None)
     rows, _ = trial.core.hypotheses(
@@ -379,7 +380,7 @@ def hypotheses(
     of_images = float(_log_odds(largest, 2, 3, max(int(np.count_nonzero(images)), 1)))
     return Hypotheses(
         every,
-        suspects=cast("NamedSuspects", suspects),
+        suspects=suspects,
         cameras=getattr(given, "camera_names", ()),
         points=len(np.unique(suspects.points[images])),
         point_ids=given.point_ids,

@@ -239,7 +239,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     ) -> Reliability:
         """Return detectable gross errors and effects of others (docs/blunders.md).
 
-        The computation requires a factorisation and a selected inverse at the adjusted values.
+        The computation requires a factorisation and a selected inverse at the adjusted values. With a robust
+        loss it uses the given weights, without observations whose weight the loss reduces to less than 0.1.
 
         Parameters
         ----------
@@ -257,16 +258,21 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """
         from photogram.results.reliability import Reliability
 
-        return Reliability(self._trial(), self.covariances, level=level, power=power, unit_weight=unit_weight)
+        trial = self._trial()
+        if self.loss is not None:
+            from photogram.results.robust import downweighted
+
+            trial.downweighted = downweighted(self, trial)
+        return Reliability(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
 
     @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:
         """The reliability summary of reports, with tests of all groups.
 
-        None without redundancy numbers or convergence, or with a loss.
+        None without redundancy numbers or convergence.
         """
         computed = bool(finite_rows(self.redundancy)[self.used_images].all())
-        if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
+        if not (computed and self.converged and self.degrees_of_freedom > 0):
             return None
         from photogram.results.hypotheses import hypotheses
         from photogram.results.reliability_summary import reliability_summary
@@ -279,7 +285,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
             return None
         estimated = None if self.KNOWN else self.sum_and_freedom
         axes, facts = self._terms().point_axes, self._hypothesis_facts()
-        own = hypotheses(found, facts, self.given, axes, estimated)
+        own = hypotheses(found.trial, found.tests, facts, self.given, axes, estimated)
         return reliability_summary(found, own, heights=self.geographic)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
@@ -301,7 +307,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         Raises
         ------
         AdjustmentError
-            If the adjustment has not converged, has a robust loss or has no redundancy.
+            If the adjustment has not converged or has no redundancy.
         """
         found = self._hypotheses()
         return found.tests(found.every).frame()

@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness
 from photogram.network.trajectories import Trajectory
 from photogram.network.unadjusted import Given
-from photogram.results.observation_kinds import named_observation
+from photogram.results.observation_kinds import kind_words, named_observation
+from photogram.statistics.findings import Text
 from photogram.statistics.groups import INVISIBLE
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
@@ -26,7 +27,7 @@ from photogram.statistics.snooping.suspects import (
     Suspects,
     Tests,
 )
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 KINDS = ("image", "control", "position", "attitude", "observation", "camera", "unknown")
 """Items of the suspects of the core by number."""
@@ -39,6 +40,9 @@ ROBUST_ITERATIONS = 20
 
 _TESTS = ("active", "rank", "statistic", "least", "shared", "residual", "error", "error_sd")
 
+if TYPE_CHECKING:
+    from photogram.results.robust import Downweighted
+
 T = TypeVar("T")
 
 
@@ -46,7 +50,12 @@ class NetworkTrial:
     """A network that can be adjusted without some of its observations."""
 
     def __init__(
-        self, core: _photocore.NetworkTrial, suspects: Suspects, supported: Bools, rough: float, exact: float
+        self,
+        core: _photocore.NetworkTrial,
+        suspects: NamedSuspects,
+        supported: Bools,
+        rough: float,
+        exact: float,
     ) -> None:
         self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
         self.deviations: Floats = core.suspects.deviations
@@ -58,6 +67,7 @@ class NetworkTrial:
         row = np.arange(starts[-1]) - np.repeat(starts[:-1], sizes)
         self._diagonal = np.repeat(self._block_starts[:-1], sizes) + row * (np.repeat(sizes, sizes) + 1)
         self._tests: dict[str, np.ndarray] = {}
+        self.downweighted: Downweighted | None = None  # by a robust loss
 
     def restart(self, core: _photocore.NetworkTrial) -> None:
         """Continue the same network from other initial values; its groups are unchanged."""
@@ -101,8 +111,10 @@ class NetworkTrial:
             raise
 
     def stand(self) -> Standing:
-        """Use the final state of the adjustment of the network."""
-        status, _, omega, freedom, _ = self.core.stand()
+        """Use the final state of the adjustment, without observations removed by a loss."""
+        out = Out(np.zeros(int(self.suspects.row_starts[-1]), dtype=bool))
+        out = out if self.downweighted is None else self.downweighted.out
+        status, _, omega, freedom, _ = self._asked(self.core.stand, out.rows, sorted(out.points))
         return Standing(status, omega, freedom)
 
     def correlation(self, first: int, second: int, between: Floats) -> float:
@@ -285,6 +297,23 @@ class NamedSuspects(Suspects):
             return Phrase(f"named.{KINDS[kind]}", {"photo": str(photos[subject])})
         return self.other_name(kind, subject)
 
+    def counts(self, rows: Bools, used: Bools) -> dict[Text, tuple[int, int]]:
+        """Return the numbers of groups with removed rows, and of all used groups, by type."""
+        removed = np.logical_or.reduceat(rows, self.row_starts[:-1])
+        found: dict[Text, tuple[int, int]] = {}
+        for kind in np.unique(self.kinds[removed]).tolist():
+            own = np.flatnonzero((self.kinds == kind) & (used | removed))
+            types = np.array([self.type(kind, subject) for subject in self.subjects[own].tolist()])
+            for each in dict.fromkeys(types[removed[own]].tolist()):
+                same = types == each
+                found[each] = (int(removed[own][same].sum()), int(same.sum()))
+        return found
+
+    def type(self, kind: int, subject: int) -> Phrase:
+        """Return the name of the type of a group, in the plural."""
+        name = KINDS[kind]
+        return phrase("test.control" if name == "control" else f"test.{name}s")
+
     def row_name(self, row: int) -> str:
         return self._row(row)[0]
 
@@ -411,6 +440,11 @@ class BlockSuspects(NamedSuspects):
     def _of_coefficients(self) -> dict[int, Trajectory]:
         every = {id(each): each for each in self.block.trajectories}.values()
         return {id(one): each for each in every for all_ in each.coefficients for one in all_}
+
+    def type(self, kind: int, subject: int) -> Phrase:
+        if kind != OBSERVATION:
+            return super().type(kind, subject)
+        return phrase("test.observations", kind=kind_words(self.observations[subject].label))
 
     def other_name(self, kind: int, subject: int) -> Phrase:
         if kind == OBSERVATION:

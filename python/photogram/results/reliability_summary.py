@@ -19,11 +19,12 @@ from photogram.results.reliability import Inseparable, Reliability
 from photogram.show.page import Part, Remarks, about
 from photogram.show.quantity import Quantities, Quantity, Table, column, members, records
 from photogram.statistics.reliability import TESTABLE
-from photogram.statistics.snooping.suspects import Suspects, Tests
+from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.results.robust import Downweighted
 
 LISTED = 5  # Listed observations of each type
 PAIRS = 10  # Listed inseparable pairs
@@ -49,6 +50,8 @@ class ReliabilitySummary:
     suspects: Suspects  # all groups, and their tests
     tests: Tests
     hypotheses: Hypotheses  # Errors of sets and single observations, and their effects if undetected
+    standing: Standing  # sum of squares and degrees of freedom of the tested observations
+    downweighted: Downweighted | None  # observations that a robust loss excludes from the tests
 
     @property
     def testable(self) -> Bools:
@@ -126,6 +129,8 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
         suspects=suspects,
         tests=tests,
         hypotheses=hypotheses,
+        standing=found.standing,
+        downweighted=found.trial.downweighted,
     )
 
 

@@ -17,15 +17,17 @@ from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section, a
 from photogram.show.quantity import Quantity, Table, members, members_of_each, of_each, records
 from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
+from photogram.statistics.snooping.disputes import disputes
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome
-from photogram.statistics.snooping.suspects import Standing, Suspects
+from photogram.statistics.snooping.suspects import Standing
 from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.results.network_trial import NamedSuspects
     from photogram.statistics.verdict import Verdict
 
 
@@ -50,7 +52,7 @@ class Snooped(Brief, Documented):
 
     result: AdjustedNetwork
     outcome: Outcome
-    suspects: Suspects
+    suspects: NamedSuspects
     settings: Settings
     exchanged: tuple[Exchange, ...] = ()
 
@@ -169,8 +171,7 @@ def recorded(found: Snooped) -> Snooped:
             record | {"subject": entry.subject}
             for record, entry in zip(records(log_table(found.removed).columns), found.removed, strict=True)
         ],
-        images=found.share_removed("image"),
-        control=found.share_removed("control"),
+        found.suspects.counts(found.outcome.out.rows, found.outcome.final.active),
         rivals=found.rivals,
         exchanged=[each.sentence for each in found.exchanged],
         kept=[
@@ -178,6 +179,7 @@ def recorded(found: Snooped) -> Snooped:
             for entry in found.log
             if entry.kept
         ],
+        disputed=disputes(found.log),
     )
     return replace(found, result=replace(found.result, snooped=record))
 

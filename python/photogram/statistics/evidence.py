@@ -23,6 +23,8 @@ from photogram.words import Phrase
 
 FEW = 5  # With fewer degrees of freedom tests detect large disagreement only
 
+BEYOND = 2.0  # Multiple of critical values above which observations of a robust adjustment are gross errors
+
 ENOUGH = 20  # Smallest number of test values for a median
 
 EXPLAINED, SINGLE = 0.8, 0.2
@@ -174,6 +176,8 @@ class Evidence:
 
         With few observations, the factor is estimated from the others (externally studentized test).
         """
+        if self.found.robust:
+            return self.beyond(BEYOND * self.factor_of_limits)
         if not self.rejected or not self.single:
             return self.single
         if self.robust is not None:

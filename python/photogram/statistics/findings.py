@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats, Indices
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
 from photogram.statistics.limits import GlobalTest, externally_studentized
 from photogram.words import Phrase
@@ -160,19 +160,45 @@ class GroupFactor:
     factor: float  # Required factor of the standard deviations: the root of the component
     interval: tuple[float, float]  # 95 percent, of the factor
     significant: bool  # Whether it differs significantly from 1, and by enough to affect weights
+    sd: float = math.nan  # The given standard deviation; NaN if there are several
+
+
+IMAGES, CONTROL_POINTS = Phrase("test.images"), Phrase("test.control")  # Types of observations
+MOST: Mapping[Text, float] = {
+    IMAGES: 0.05,
+    CONTROL_POINTS: 1 / 3,
+}  # Largest removable shares
+MOST_OTHERS = 0.05  # Of all other types; one observation of each may be removed
 
 
 @dataclass(frozen=True)
 class Removed:
-    """Result of data snooping."""
+    """Observations that data snooping or a robust loss removed."""
 
     # Removed observations in order: name and other members of the log
     removed: Sequence[Mapping[str, Any]]
-    images: float = 0.0  # shares of removed image observations and control
-    control: float = 0.0
+    # Numbers of removed and of all groups by type of observation
+    counts: Mapping[Text, tuple[int, int]] = field(default_factory=dict)
+    number: int | None = None  # number of removed observations if not all are listed
     rivals: Sequence[Text] = ()  # observations that are inseparable from these
     exchanged: Sequence[Text] = ()  # exchanged names among them
     kept: Sequence[Text] = ()  # suspects that were not removed, with the reason
+    # Suspects of which one has an error, and the observations do not show which
+    disputed: Sequence[Text] = ()
+
+    def share(self, kind: Text) -> float:
+        """Return the removed share of the observations of a type."""
+        removed, all_ = self.counts.get(kind, (0, 1))
+        return removed / all_
+
+    @property
+    def excessive(self) -> list[Text]:
+        """Types of which too many observations were removed."""
+        return [
+            kind
+            for kind, (removed, all_) in self.counts.items()
+            if removed > MOST.get(kind, max(MOST_OTHERS, 1 / all_)) * all_
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,12 +222,15 @@ class Findings:
     changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
+    types: Sequence[GroupFactor] = ()  # Factors of all types of observations, if the global test rejects
     # Detected common errors of sets of observations, and whether they forbid the use
     common: Sequence[Text] = ()
     common_is_harmful: bool = False
     # Undetectable errors that affect many points, the worst first
     unchecked: Sequence[Text] = ()
     snooped: Removed | None = None
+    robust: bool = False  # Whether a robust loss removed them
+    unsupported: Sequence[Text] = ()  # Points with too few images that the loss does not remove
     # Observations rejected by initial orientation that do not fit the adjusted network; None without any
     set_aside: Removed | None = None
     # Whether all photos are fixed, so that their errors are in all residuals

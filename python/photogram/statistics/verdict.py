@@ -7,6 +7,7 @@ probability, level and number of tests.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
-from photogram.statistics.findings import Findings, Text
+from photogram.statistics.findings import IMAGES, Findings, Text
 from photogram.statistics.limits import NOTABLE_FACTOR
 from photogram.words import Phrase
 
@@ -27,8 +28,6 @@ WRONG_ALIKE = 1.5
 """Limit of the median factor, and of the ratio of the mean-square and the median factor.
 
 If the median factor is larger and the ratio smaller, all residuals are too large, not a few."""
-
-MOST_IMAGES, MOST_CONTROL = 0.05, 1 / 3  # Largest shares of removed images and control
 
 _GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)  # Exit codes, the worst last
 
@@ -228,7 +227,9 @@ def _gross_errors(e: Evidence) -> Phrase | None:
             if e.single
             else Phrase(code, fields)
         )
-    if not e.rejected or e.found.snooped or not e.gross or e.lens or "common-error" in e.codes:
+    if not e.gross or e.lens or "common-error" in e.codes:
+        return None
+    if not e.found.robust and (not e.rejected or e.found.snooped):
         return None
     # A few gross errors increase s but not the median; a wrong model increases all residuals.
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
@@ -258,11 +259,18 @@ def _remedy(e: Evidence) -> Phrase | str:
 
 def _too_much_removed(e: Evidence) -> Phrase | None:
     found = e.found.snooped
-    if found is None or not found.removed or (found.images <= MOST_IMAGES and found.control <= MOST_CONTROL):
+    if found is None or not found.removed or not found.excessive:
         return None
-    shares = {"images": 100 * found.images, "control": 100 * found.control}
-    fields = {"n": len(found.removed), **shares, "exchanged": list(found.exchanged)}
+    shares = [
+        Phrase("part.share", {"percent": 100 * found.share(kind), "kind": kind}) for kind in found.excessive
+    ]
+    fields = {"n": found.number or len(found.removed), "shares": shares, "exchanged": list(found.exchanged)}
     return Phrase("verdict.too-much-removed", fields)
+
+
+def _disputed(e: Evidence) -> Phrase | None:
+    groups = list(e.found.snooped.disputed) if e.found.snooped else []
+    return Phrase("verdict.disputed", {"groups": groups}) if groups else None
 
 
 def _removed(e: Evidence) -> Phrase | None:
@@ -270,19 +278,19 @@ def _removed(e: Evidence) -> Phrase | None:
     if found is None or not found.removed or e.high or "too-much-removed" in e.codes:
         return None
     names = [each.get("subject") or each.get("name", "") for each in found.removed]
-    fields = {"n": len(names), "names": names, "exchanged": list(found.exchanged)}
+    fields = {"n": found.number or len(names), "names": names, "exchanged": list(found.exchanged)}
     return Phrase("verdict.usable-after-removal", fields)
 
 
 def _set_aside(much: bool, e: Evidence) -> Phrase | None:
     """Return observations rejected by initial orientation, for many or few."""
     found = e.found.set_aside
-    if found is None or (found.images > MOST_IMAGES) is not much:
+    if found is None or bool(found.excessive) is not much:
         return None
     fields = {"n": len(found.removed), "names": [each["name"] for each in found.removed]}
     fields["keep"] = Phrase("part.keep-all")
     if much:
-        return Phrase("verdict.too-much-set-aside", {**fields, "images": 100 * found.images})
+        return Phrase("verdict.too-much-set-aside", {**fields, "images": 100 * found.share(IMAGES)})
     return Phrase("verdict.set-aside.also" if e.high else "verdict.set-aside", fields)
 
 
@@ -306,12 +314,43 @@ def _common_factor(far: bool, e: Evidence) -> Phrase | None:
     """Return an implausible common factor of sd (`far`), or a smaller one."""
     if not e.high or e.gross or e.pattern or e.found.intersected or _is_far(e) is not far:
         return None
+    if "weights-of-types" in e.codes:
+        return None
     if any(each.significant for each in e.found.components):
         return None
     if e.robust is not None and e.robust < e.factor / NOTABLE_FACTOR:
         return None
     scaled = ".scaled" if e.found.scaled and not far else ""
     return Phrase(f"verdict.weights{scaled}", {"factor": e.interval()})
+
+
+def _types(e: Evidence) -> Phrase | None:
+    """Return the types that a common factor of all standard deviations makes wrong.
+
+    The factor of all residuals, which scales the covariances, is that of the types with most redundancy.
+    """
+    f = e.factor
+    if not e.found.scaled or e.gross or e.pattern or e.found.intersected or not (e.high or e.low):
+        return None
+    if 1 / WRONG_ALIKE <= f <= WRONG_ALIKE or (
+        e.high and e.robust is not None and e.robust < f / NOTABLE_FACTOR
+    ):
+        return None
+    causes, others = [], []
+    for each in e.found.types:
+        low, high = each.interval
+        # Standard deviations of untested types must not become smaller by residuals of others.
+        optimistic = f * WRONG_ALIKE < (1.0 if math.isnan(each.factor) else low)
+        pessimistic = f > WRONG_ALIKE * high and WRONG_ALIKE * high > 1.0
+        if optimistic or pessimistic:
+            others.append(each.group)
+        elif not math.isnan(each.factor) and low / WRONG_ALIKE <= f <= high * WRONG_ALIKE:
+            fields = {"kind": each.group, "factor": each.factor}
+            sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor}
+            causes.append(Phrase(f"part.type{'.sd' if sd else ''}", fields | sd))
+    return (
+        Phrase("verdict.weights-of-types", {"types": causes, "others": others}) if others and causes else None
+    )
 
 
 def _is_far(e: Evidence) -> bool:
@@ -372,7 +411,9 @@ def _look_at(e: Evidence) -> Phrase | None:
 
 
 def _too_low(e: Evidence) -> Phrase | None:
-    return Phrase("verdict.weights-pessimistic", {"factor": 1 / e.factor}) if e.low else None
+    if not e.low or "weights-of-types" in e.codes:
+        return None
+    return Phrase("verdict.weights-pessimistic", {"factor": 1 / e.factor})
 
 
 def _accepted(e: Evidence) -> Phrase | None:
@@ -415,6 +456,7 @@ _EXPLAINING = frozenset(
         "intersection",
         "weights",
         "weights-of-groups",
+        "weights-of-types",
         "model",
     }
 )
@@ -450,6 +492,15 @@ RULES = (
         warning=True,
         grave=lambda e: e.found.common_is_harmful,
     ),
+    Rule(
+        "unsupported",
+        _listing("unsupported", "names", "unsupported"),
+        EXIT_NOT_USABLE,
+        ("take-out", "measure-again"),
+        warning=True,
+        grave=lambda e: any(getattr(name, "code", "") == CONTROL for name in e.found.unsupported),
+    ),
+    Rule("disputed", _disputed, EXIT_NOT_USABLE, ("measure-again",)),
     Rule("gross-errors", _gross_errors, EXIT_NOT_USABLE, ("look-at-gross-errors", "lens", "take-out")),
     Rule("too-much-removed", _too_much_removed, EXIT_NOT_USABLE, ("common-of-observations",)),
     Rule("usable-after-removal", _removed, 0, ("measure-again", "after-selection"), also=True),
@@ -459,6 +510,7 @@ RULES = (
     Rule("check-points", _checks, EXIT_NOT_USABLE, ("wrong-checks", "cause-first")),
     Rule("look-at-check-points", _suspect_checks, 0, ("look-at-checks",), warning=True),
     Rule("intersection", _intersected, EXIT_NOT_USABLE, ("adjust-photos",), warning=True, grave=_is_far),
+    Rule("weights-of-types", _types, EXIT_NOT_USABLE, ("sd-of-types",)),
     Rule("weights", partial(_common_factor, True), EXIT_NOT_USABLE, ("scaled", "larger-sd")),
     Rule("weights", partial(_common_factor, False), 0, ("scaled", "larger-sd"), warning=True),
     Rule(

@@ -57,6 +57,12 @@ pub struct Out<'a> {
     pub photos: &'a [usize],
 }
 
+impl Out<'_> {
+    fn is_empty(&self) -> bool {
+        !self.rows.contains(&true) && self.points.is_empty() && self.photos.is_empty()
+    }
+}
+
 /// Result of a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
@@ -165,15 +171,23 @@ impl Trial {
         &self.suspects
     }
 
-    /// Linearizes the complete network at the end of its adjustment.
+    /// Linearizes the network at the end of its adjustment, without the excluded observations.
+    ///
+    /// Values do not change: a robust loss may have excluded these observations.
     ///
     /// # Errors
     /// Undetermined parameters; an interruption, insufficient memory.
-    pub fn stand(&mut self, threads: &Threads, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
-        let found = match self.found.take_if(|_| self.stands) {
+    pub fn stand(
+        &mut self,
+        out: Out<'_>,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Outcome, NetworkError> {
+        let found = match self.found.take_if(|_| self.stands && out.is_empty()) {
             Some(found) => found,
             None => {
-                self.take_out(Out::default());
+                self.stands = false;
+                self.take_out(out);
                 let problem = &self.assembled.problem;
                 Leverages::at(problem, problem.initial.clone(), self.held.clone(), threads, watch)
                     .map_err(|error| NetworkError::new(error, &self.assembled))?

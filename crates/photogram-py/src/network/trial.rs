@@ -124,9 +124,17 @@ impl NetworkTrial {
         table(py, self.trial.points())
     }
 
-    fn stand(&mut self, py: Python<'_>) -> PyResult<OutcomeRow> {
+    #[pyo3(signature = (rows, points))]
+    fn stand(
+        &mut self,
+        py: Python<'_>,
+        rows: PyReadonlyArray1<'_, bool>,
+        points: Vec<usize>,
+    ) -> PyResult<OutcomeRow> {
+        let rows: Vec<bool> = rows.as_array().iter().copied().collect();
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
-        let found = watched(py, workers, None, |pool, watch| trial.stand(pool, watch))?;
+        let out = Out { rows: &rows, points: &points, photos: &[] };
+        let found = watched(py, workers, None, |pool, watch| trial.stand(out, pool, watch))?;
         found.map(outcome_row).map_err(|error| refused(&error))
     }
 

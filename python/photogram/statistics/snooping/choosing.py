@@ -144,8 +144,7 @@ class Choosing:
 
     def _bounded(self) -> list[Chosen]:
         limit = self.level.limit(self.out)
-        beyond = _beyond(self.tests, self.unit, self.scales, limit)
-        candidates = np.flatnonzero(self.allowed & beyond)
+        candidates = np.flatnonzero(self.allowed & beyond(self.tests, self.unit, self.scales, limit))
         if not candidates.size and self.ahead:
             ratio = np.where(self.allowed, self.tests.statistic / self.scales, -math.inf)
             candidates = np.argsort(-np.nan_to_num(ratio, nan=-math.inf), kind="stable")[:AHEAD]
@@ -209,7 +208,7 @@ def hides(unit: UnitWeight, scale: float) -> bool:
     return unit.weighted_sum_of_squares / scale > critical
 
 
-def _beyond(tests: Tests, unit: UnitWeight, scales: Floats, limit: float) -> Bools:
+def beyond(tests: Tests, unit: UnitWeight, scales: Floats, limit: float) -> Bools:
     """Return (G,) groups whose T exceeds the limit."""
     critical = np.full(len(tests.rank), math.inf)
     for rank in np.unique(tests.rank[tests.rank > 0]).tolist():

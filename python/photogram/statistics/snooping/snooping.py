@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.statistics.limits import global_test
+from photogram.statistics.snooping.disputes import without_disputed
 from photogram.statistics.snooping.log import Removal, Round
 from photogram.statistics.snooping.starts import begun, needs_robust_start, scales, start_robustly
 from photogram.statistics.snooping.suspects import Aside, Out, Standing, Tests, Trial
@@ -36,7 +38,12 @@ class Outcome:
     remarks: list[Phrase]
 
 
-def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] | None = None) -> Outcome:
+def snooped(
+    trial: Trial,
+    settings: Settings,
+    afresh: Callable[[], Aside | None] | None = None,
+    common: Callable[[Tests], Sequence[Phrase]] | None = None,
+) -> Outcome:
     """Remove gross errors from a network and return the outcome.
 
     Parameters
@@ -48,19 +55,16 @@ def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None]
     afresh
         Restarts the trial from a consensus of its observations if its adjustment diverges. Returns the
         observations that the consensus rejects; None without consensus.
+    common
+        Returns common errors of sets that explain the test values better than errors of single observations.
+        Then nothing is removed: removing the members one after the other would hide the cause.
     """
     work = begun(trial, settings, afresh)
-    take_bad_photos_out(work)
-    if needs_robust_start(work):
-        start_robustly(work)
+    errors = [] if common is None or work.log or not is_rejected(work) else common(work.tests)
+    if errors:
+        work.remarks.append(phrase("snooping.common", errors=list(errors)))
     else:
-        work.factors, work.scales = scales(work)
-    for number in range(1, work.settings.max_rounds + 1):
-        removed, returned = _round(work, number)
-        if not removed and not returned:
-            break
-    else:
-        work.remarks.append(phrase("snooping.not-ended", n=work.settings.max_rounds))
+        _remove(work)
     out = [place for place, each in enumerate(work.log) if each.is_out]
     for place in out:
         work.log[place] = with_prediction(work, place)
@@ -77,14 +81,36 @@ def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None]
     )
 
 
-def _round(work: TakingOut, number: int) -> tuple[list[int], list[int]]:
+def is_rejected(work: TakingOut) -> bool:
+    """Whether residuals of a converged adjustment are too large."""
     standing = work.standing
+    test = global_test(standing.weighted_sum_of_squares, standing.degrees_of_freedom)
+    return standing.status == "converged" and test is not None and test.rejected_high
+
+
+def _remove(work: TakingOut) -> None:
+    take_bad_photos_out(work)
+    if needs_robust_start(work):
+        start_robustly(work)
+    else:
+        work.factors, work.scales = scales(work)
+    for number in range(1, work.settings.max_rounds + 1):
+        removed, returned = _round(work, number)
+        if not removed and not returned:
+            break
+    else:
+        work.remarks.append(phrase("snooping.not-ended", n=work.settings.max_rounds))
+
+
+def _round(work: TakingOut, number: int) -> tuple[list[int], list[int]]:
+    standing, before = work.standing, work.tests
     count = sum(each.is_out for each in work.log)
     choices = work.choosing(work.allowed(), count, ahead=True).choose()
     # In a large network, earlier removals are reinstated in the adjustment that removes others.
     returned = [] if work.trial.whole else agreeing(work)
     removed = work.apply(work.entries(choices, number), returned)
     note_return(work, returned, number)
+    removed = without_disputed(work, removed, before)
     if work.trial.whole:
         returned = take_back(work, number)
     removed += take_photos_out(work, number)
