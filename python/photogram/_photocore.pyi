@@ -1292,11 +1292,8 @@ class NetworkTrial:
     def points(self) -> _Floats:
         """(n, 3) point coordinates after the last trial; NaN for removed points."""
 
-    def stand(self, rows: NDArray[np.bool_], points: list[int]) -> tuple[str, int, float, int, list[int]]:
-        """Restore the adjusted state without the removed rows and points; see `adjust`.
-
-        Values do not change. With no removed row, this is the adjusted state with all observations.
-        """
+    def stand(self) -> tuple[str, int, float, int, list[int]]:
+        """Restore the adjusted state with all observations; return the same as `adjust`."""
 
     def adjust(
         self,

@@ -9,7 +9,7 @@ use photocore::adjustment::Event;
 use photocore::geometry::{
     self, Air, ObjectSpace, Perspective, PoseNumbers, RotationSense, Station as Site, Vector3,
 };
-use photocore::network::{Camera, Image, Network, Of, Options, Out, Photo, Point};
+use photocore::network::{Camera, Image, Network, Of, Options, Photo, Point};
 use photocore::programs::comparator::{
     Basis, Calibration as Comparison, Case, Comparator, GridPoint, Measurement, Placement,
 };
@@ -83,7 +83,7 @@ fn adjust_block(network: &Network, threads: &Threads) {
     covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, threads, &mut go).unwrap();
     network.adjustment(&options).from_state(&solution.state).on(threads).watched(&mut go).run().unwrap();
     let mut trial = solution.converged.expect("it converges").trial(network);
-    trial.stand(Out::default(), threads, &mut go).unwrap();
+    trial.stand(threads, &mut go).unwrap();
     trial.tests(threads).unwrap();
     trial.effects(&[0, 5], threads).unwrap();
     trial.responses(&[0, 5], threads).unwrap();

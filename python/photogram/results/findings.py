@@ -57,7 +57,7 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=type_factors(tests) if rejected and result.KNOWN and not result.loss else [],
+        types=type_factors(tests) if rejected and result.KNOWN else [],
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,

@@ -240,7 +240,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """Return detectable gross errors and effects of others (docs/blunders.md).
 
         The computation requires a factorisation and a selected inverse at the adjusted values. With a robust
-        loss it uses the given weights, without observations whose weight the loss reduces to less than 0.1.
+        loss it adjusts by least squares, without observations whose weight the loss reduces to less than 0.1.
 
         Parameters
         ----------

@@ -78,8 +78,8 @@ class NetworkTrial:
         """Whether the network is small enough for R of all rows."""
         return int(self.suspects.row_starts[-1]) <= WHOLE
 
-    def adjust(self, out: Out) -> Standing:
-        tolerance = self.exact if self.whole else self.rough
+    def adjust(self, out: Out, *, exact: bool = False) -> Standing:
+        tolerance = self.exact if self.whole else PRECISE if exact else self.rough
         standing = self._asked(
             self.core.adjust,
             out.rows,
@@ -111,10 +111,10 @@ class NetworkTrial:
             raise
 
     def stand(self) -> Standing:
-        """Use the final state of the adjustment, without observations removed by a loss."""
-        out = Out(np.zeros(int(self.suspects.row_starts[-1]), dtype=bool))
-        out = out if self.downweighted is None else self.downweighted.out
-        status, _, omega, freedom, _ = self._asked(self.core.stand, out.rows, sorted(out.points))
+        """Use the final state of the adjustment; with a loss, adjust without removed observations."""
+        if self.downweighted is not None:
+            return self.adjust(self.downweighted.out, exact=True)
+        status, _, omega, freedom, _ = self.core.stand()
         return Standing(status, omega, freedom)
 
     def correlation(self, first: int, second: int, between: Floats) -> float:
@@ -345,6 +345,7 @@ ROUGH = 2.0
 """Standard deviations: a round ends if the next step would not move any unknown by more. The following rounds
 start there. The last round removes nothing, so its tests are practically exact."""
 EXACT = 1e-7  # Value for R of all rows
+PRECISE = 1e-3  # Value for hypotheses on sets, whose partials nearly are combinations of those of unknowns
 LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a part of the extent of the block
 
 

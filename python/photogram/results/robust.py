@@ -1,7 +1,8 @@
 """Observations that a robust loss removes in effect, and points that lose their support.
 
-Tests of a robust adjustment use the weights before the loss and the residuals of the robust solution.
-Observations with a weight factor below :data:`REMOVED` count as removed.
+Observations with a weight factor below :data:`REMOVED` count as removed. The tests are those of a
+least-squares adjustment of the others, which starts at the robust solution: the residuals of the latter have
+no exact distribution.
 """
 
 from __future__ import annotations

@@ -57,12 +57,6 @@ pub struct Out<'a> {
     pub photos: &'a [usize],
 }
 
-impl Out<'_> {
-    fn is_empty(&self) -> bool {
-        !self.rows.contains(&true) && self.points.is_empty() && self.photos.is_empty()
-    }
-}
-
 /// Result of a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
@@ -171,23 +165,15 @@ impl Trial {
         &self.suspects
     }
 
-    /// Linearizes the network at the end of its adjustment, without the excluded observations.
-    ///
-    /// Values do not change: a robust loss may have excluded these observations.
+    /// Linearizes the complete network at the end of its adjustment.
     ///
     /// # Errors
     /// Undetermined parameters; an interruption, insufficient memory.
-    pub fn stand(
-        &mut self,
-        out: Out<'_>,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<Outcome, NetworkError> {
-        let found = match self.found.take_if(|_| self.stands && out.is_empty()) {
+    pub fn stand(&mut self, threads: &Threads, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
+        let found = match self.found.take_if(|_| self.stands) {
             Some(found) => found,
             None => {
-                self.stands = false;
-                self.take_out(out);
+                self.take_out(Out::default());
                 let problem = &self.assembled.problem;
                 Leverages::at(problem, problem.initial.clone(), self.held.clone(), threads, watch)
                     .map_err(|error| NetworkError::new(error, &self.assembled))?

@@ -124,17 +124,9 @@ impl NetworkTrial {
         table(py, self.trial.points())
     }
 
-    #[pyo3(signature = (rows, points))]
-    fn stand(
-        &mut self,
-        py: Python<'_>,
-        rows: PyReadonlyArray1<'_, bool>,
-        points: Vec<usize>,
-    ) -> PyResult<OutcomeRow> {
-        let rows: Vec<bool> = rows.as_array().iter().copied().collect();
+    fn stand(&mut self, py: Python<'_>) -> PyResult<OutcomeRow> {
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
-        let out = Out { rows: &rows, points: &points, photos: &[] };
-        let found = watched(py, workers, None, |pool, watch| trial.stand(out, pool, watch))?;
+        let found = watched(py, workers, None, |pool, watch| trial.stand(pool, watch))?;
         found.map(outcome_row).map_err(|error| refused(&error))
     }
 

@@ -60,7 +60,10 @@ def snooped(
         Then nothing is removed: removing the members one after the other would hide the cause.
     """
     work = begun(trial, settings, afresh)
-    errors = [] if common is None or work.log or not is_rejected(work) else common(work.tests)
+    errors: Sequence[Phrase] = []
+    if common is not None and not work.log and is_rejected(work):
+        work.adjust(work.out, exact=True)
+        errors = common(work.tests)
     if errors:
         work.remarks.append(phrase("snooping.common", errors=list(errors)))
     else:

@@ -183,8 +183,11 @@ class Trial(Protocol):
     def whole(self) -> bool:
         """Whether R of all rows together is small enough to be computed."""
 
-    def adjust(self, out: Out) -> Standing:
-        """Adjust without exclusions; raise LostSupportError if undetermined."""
+    def adjust(self, out: Out, *, exact: bool = False) -> Standing:
+        """Adjust without exclusions; raise LostSupportError if undetermined.
+
+        `exact`: whether the result is required for hypotheses on sets.
+        """
 
     def tests(self) -> Tests:
         """Test all groups."""

@@ -238,9 +238,9 @@ class TakingOut:
                 out.rows[rows] = True
                 yield Phrase("snooping.single-ray", {"name": self.suspects.name(group)})
 
-    def adjust(self, out: Out) -> None:
+    def adjust(self, out: Out, *, exact: bool = False) -> None:
         """Adjust without exclusions and test; raise LostSupportError if undetermined."""
-        self.standing = self.trial.adjust(out)
+        self.standing = self.trial.adjust(out, exact=exact)
         self.out = out
         self.tests = self.trial.tests()
 
