@@ -364,9 +364,13 @@ def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
     """Whether the headline names the true cause, or inseparable ones with it; None if it names none."""
     code = result.verdict.code
     fields = result.verdict.message.fields
-    if code == "common-error":
-        named = [each.fields["named"].code for each in fields["errors"]]
-        return f"hypothesis.{hypothesis.partition(' ')[0]}" in named
+    if code == "common-error" and result.reliability_summary:
+        # Errors whose statistics differ by less than odds of 20 : 1 are inseparable by the data.
+        true, first = hypothesis.partition(" ")[0], fields["errors"][0].fields["named"].code.partition(".")[2]
+        largest: dict[str, float] = defaultdict(float)
+        for each in result.reliability_summary.hypotheses.every:
+            largest[each.code] = max(largest[each.code], each.statistic)
+        return first == true or largest[true] > largest[first] - 2 * math.log(20)
     if code == "gross-errors" and hypothesis.startswith("control-point"):
         return f"control point {point}" in str(fields["suspects"][0])
     return None

@@ -106,7 +106,7 @@ class LinearTrial:
         self.unknowns: Floats = np.zeros(a.shape[1])
         self.adjust(Out(np.zeros(len(values), dtype=bool)))
 
-    def adjust(self, out: Out) -> Standing:
+    def adjust(self, out: Out, *, exact: bool = False) -> Standing:
         """Solve without what is out."""
         self._in = ~out.rows
         a, values = self._a[self._in], self._l[self._in]

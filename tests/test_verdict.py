@@ -18,6 +18,8 @@ from photogram.show.judgement import judged, verdict_table
 from photogram.show.page import Document
 from photogram.statistics import global_test, group_tests
 from photogram.statistics.findings import (
+    CONTROL_POINTS,
+    IMAGES,
     Agreement,
     Findings,
     GroupFactor,
@@ -29,6 +31,7 @@ from photogram.statistics.verdict import verdict, worst
 from photogram.words import Phrase
 
 F = 81
+A = {"name": "a"}
 
 
 def named(index):
@@ -67,8 +70,8 @@ CASES = {
     "stars": (findings(good(), doubtful=["exposure 2"]), 4, False, "The identification of stars is doubtful"),
     "blunder": (findings(with_blunder, 2.0), 4, False, "Gross errors likely: 1) y of point 7 (w = 9)"),
     "removed": (findings(good(), snooped=Removed([{"name": "a"}])), 0, False, "Usable after removal of 1"),
-    "too much": (findings(good(), snooped=Removed([{"name": "a"}], images=0.06)), 4, False, "Too much had"),
-    "control": (findings(good(), snooped=Removed([{"name": "a"}], control=0.4)), 4, False, "Too much had"),
+    "too much": (findings(good(), snooped=Removed([A], {IMAGES: (6, 100)})), 4, False, "Too much had"),
+    "control": (findings(good(), snooped=Removed([A], {CONTROL_POINTS: (4, 10)})), 4, False, "Too much had"),
     "factor": (findings(good(factor=2.0), 4.0), 0, True, "Weights too optimistic: standard deviations are"),
     "far": (findings(good(factor=200.0), 4e4), 4, False, "Weights too optimistic"),
     "group": (findings(good(), components=[component(2.0)]), 0, True, "Standard deviations are wrong: those"),
@@ -339,9 +342,10 @@ def test_a_lens_that_is_not_modelled(simulated):
     assert " um near x " in made.headline
 
 
-def test_a_robust_loss_has_no_global_test(simulated):
-    made = adjust(simulated, loss="huber").verdict
-    assert made.headline.startswith("Not tested as a whole (a robust loss changes the weights)")
+def test_a_robust_loss_keeps_the_tests(simulated):
+    plain, robust = adjust(simulated).verdict, adjust(simulated, loss="huber").verdict
+    assert robust.code == plain.code
+    assert robust.is_tested_as_a_whole
 
 
 def photo(noise):
@@ -415,9 +419,9 @@ SITUATIONS = {
     "groups": {"components": [component(2.0)]},
     "groups far": {"components": [component(5.0)]},
     "few out": {"snooped": Removed([{"name": "a"}])},
-    "many out": {"snooped": Removed([{"name": "a"}], images=0.3)},
+    "many out": {"snooped": Removed([{"name": "a"}], {IMAGES: (30, 100)})},
     "few aside": {"set_aside": Removed([{"name": "a"}])},
-    "many aside": {"set_aside": Removed([{"name": "a"}], images=0.3)},
+    "many aside": {"set_aside": Removed([{"name": "a"}], {IMAGES: (30, 100)})},
     "check wrong": {"checks": checks(error=9.0)},
     "check to look at": {"checks": checks(error=3.6)},
     "checks together": {"checks": checks(together=6.0)},

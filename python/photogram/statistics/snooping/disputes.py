@@ -29,14 +29,14 @@ def without_disputed(work: TakingOut, removed: list[int], before: Tests) -> list
         return removed
     suspects, limit = work.suspects, work.level.limit(0)
     was, remains = (beyond(tests, work.unit(), work.scales, limit) for tests in (before, work.tests))
-    candidates = (suspects.kinds != 0) & suspects.removable & was & ~remains
+    candidates = (suspects.kinds != 0) & suspects.removable & was & ~remains & work.tests.active
+    candidates[[entry.group for entry in work.log if entry.is_out]] = False
     statistics = before.statistic / work.scales
     disputed = {}
     for place in single:
         group = work.log[place].group
         least = statistics[group] - 2 * math.log(ODDS)
-        others = np.flatnonzero(candidates & (statistics > least) & (suspects.subjects >= 0))
-        if rivals := [other for other in others.tolist() if other != group and work.tests.active[other]]:
+        if rivals := np.flatnonzero(candidates & (statistics > least)).tolist():
             disputed[place] = rivals
     return _reinstated(work, removed, before, disputed) if disputed else removed
 
