@@ -329,12 +329,15 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     position_sd[alone], attitude_sd[alone] = 0.0, 0.0
     rows = [row for own, _ in block.observation_groups for row in own]
     dropped = {rows[index] for index in gone(trial, out, OBSERVATION)[0].tolist()}
-    positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+    observed = [
+        _observed(getattr(block, f"photo_{name}"), getattr(block, f"photo_{name}_observed"), sd)
+        for name, sd in (("positions", position_sd), ("attitudes", attitude_sd))
+    ]
     cleaned = block.replace(
         photo_positions=np.where(position_sd == 0, block.photo_positions, reached[:, :3]),
         photo_attitudes=np.where(attitude_sd == 0, block.photo_attitudes, reached[:, 3:]),
-        photo_positions_observed=_observed(block.photo_positions, positions, position_sd),
-        photo_attitudes_observed=_observed(block.photo_attitudes, attitudes, attitude_sd),
+        photo_positions_observed=observed[0],
+        photo_attitudes_observed=observed[1],
         photo_position_sd=position_sd,
         photo_attitude_sd=attitude_sd,
         point_positions=point_positions,
@@ -346,9 +349,11 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
 
 
 def _observed(initial: Floats, observed: Floats | None, sd: Floats) -> Floats | None:
-    """Return observed values; None if nothing is weighted."""
+    """Return observed values, fixed ones at the initial values; None if nothing is weighted."""
     weighted = bool((np.isfinite(sd) & (sd > 0)).any())
-    return initial if observed is None and weighted else observed
+    if observed is None:
+        return initial if weighted else None
+    return np.where(sd == 0, initial, observed)
 
 
 def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -17,8 +18,7 @@ from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.tests import Tests
-from photogram.results.type_factors import type_factors
-from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text
+from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text, TypeFactor
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
@@ -57,7 +57,7 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=type_factors(tests) if rejected and result.KNOWN else [],
+        types=_type_factors(tests) if rejected and result.KNOWN else [],
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
@@ -70,6 +70,22 @@ def network_findings(
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )
+
+
+def _type_factors(tests: Tests) -> list[TypeFactor]:
+    """Return the sums of squares and redundancy numbers of all observed types."""
+    found = []
+    for each in tests.normal:
+        for kind, components in each.groups.items():
+            observed = each.observed[:, components]
+            residuals, sd, redundancy = (
+                values[:, components][observed] for values in (each.residuals, each.sd, each.redundancy)
+            )
+            if observed.any():
+                given = float(sd[0]) if np.ptp(sd) <= 1e-9 * sd[0] else math.nan
+                squares, r = float(np.sum((residuals / sd) ** 2)), float(np.nansum(redundancy))
+                found.append(TypeFactor(kind, squares, r, given))
+    return found
 
 
 def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:

@@ -155,12 +155,39 @@ class Systematic:
 
 
 @dataclass(frozen=True)
+class TypeFactor:
+    """Agreement of the given standard deviations of a type of observation with its residuals."""
+
+    group: Text
+    squares: float  # q and r: weighted sum of squares, and sum of redundancy numbers
+    redundancy: float
+    sd: float  # The given standard deviation; NaN if there are several
+
+    @property
+    def factor(self) -> float:
+        """Factor of the standard deviations: the root of q / r."""
+        return math.sqrt(self.squares / self.redundancy)
+
+    def is_given_rather_than(self, factor: float) -> bool:
+        """Whether the given standard deviations are more likely than those multiplied by a factor.
+
+        log L(theta) = -r log(theta) - q / (2 theta^2), theta the factor. Without redundancy, residuals of
+        other types are no reason for smaller standard deviations. Nominal ones, which are much too large, do
+        not oppose a larger factor.
+        """
+        if self.redundancy < 1.0:
+            return factor < 1.0
+        if factor > 1.0 and self.factor < 1 / NOMINAL:
+            return False
+        return self.redundancy * math.log(factor) > self.squares / 2 * (1 - factor**-2)
+
+
+@dataclass(frozen=True)
 class GroupFactor:
     group: Text
     factor: float  # Required factor of the standard deviations: the root of the component
     interval: tuple[float, float]  # 95 percent, of the factor
     significant: bool  # Whether it differs significantly from 1, and by enough to affect weights
-    sd: float = math.nan  # The given standard deviation; NaN if there are several
 
 
 IMAGES, CONTROL_POINTS = Phrase("test.images"), Phrase("test.control")  # Types of observations
@@ -168,6 +195,7 @@ MOST: Mapping[Text, float] = {
     IMAGES: 0.05,
     CONTROL_POINTS: 1 / 3,
 }  # Largest removable shares
+NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least
 MOST_OTHERS = 0.05  # Of all other types; one observation of each may be removed
 
 
@@ -222,7 +250,7 @@ class Findings:
     changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
-    types: Sequence[GroupFactor] = ()  # Factors of all types of observations, if the global test rejects
+    types: Sequence[TypeFactor] = ()  # All types of observations, if the global test rejects
     # Detected common errors of sets of observations, and whether they forbid the use
     common: Sequence[Text] = ()
     common_is_harmful: bool = False

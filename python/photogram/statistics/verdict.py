@@ -229,7 +229,9 @@ def _gross_errors(e: Evidence) -> Phrase | None:
         )
     if not e.gross or e.lens or "common-error" in e.codes:
         return None
-    if not e.found.robust and (not e.rejected or e.found.snooped):
+    # Data snooping leaves gross errors if nothing else determines their points or photos.
+    snooped = e.found.snooped is not None and not e.found.snooped.kept
+    if "disputed" in e.codes or (not e.found.robust and (not e.rejected or snooped)):
         return None
     # A few gross errors increase s but not the median; a wrong model increases all residuals.
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
@@ -254,7 +256,8 @@ def _remedy(e: Evidence) -> Phrase | str:
         if e.found.weigh and isinstance(name, Phrase) and name.fields["named"].code == CONTROL:
             return Phrase("part.fixed.control", {"how": e.found.weigh})
         return Phrase("part.fixed")
-    return Phrase("part.snoop") if e.found.can_snoop and e.found.status == "converged" else ""
+    snoops = e.found.can_snoop and e.found.snooped is None and e.found.status == "converged"
+    return Phrase("part.snoop") if snoops else ""
 
 
 def _too_much_removed(e: Evidence) -> Phrase | None:
@@ -338,13 +341,9 @@ def _types(e: Evidence) -> Phrase | None:
         return None
     causes, others = [], []
     for each in e.found.types:
-        low, high = each.interval
-        # Standard deviations of untested types must not become smaller by residuals of others.
-        optimistic = f * WRONG_ALIKE < (1.0 if math.isnan(each.factor) else low)
-        pessimistic = f > WRONG_ALIKE * high and WRONG_ALIKE * high > 1.0
-        if optimistic or pessimistic:
+        if each.is_given_rather_than(f):
             others.append(each.group)
-        elif not math.isnan(each.factor) and low / WRONG_ALIKE <= f <= high * WRONG_ALIKE:
+        elif each.redundancy >= 1.0:
             fields = {"kind": each.group, "factor": each.factor}
             sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor}
             causes.append(Phrase(f"part.type{'.sd' if sd else ''}", fields | sd))

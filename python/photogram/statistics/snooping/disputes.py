@@ -11,7 +11,7 @@ import numpy as np
 from photogram.statistics.snooping.choosing import beyond
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.suspects import LostSupportError, Tests
-from photogram.statistics.snooping.taking_out import TakingOut
+from photogram.statistics.snooping.taking_out import NEEDED, TakingOut
 from photogram.words import Phrase, phrase
 
 ODDS = 20.0  # Largest likelihood ratio of alternatives
@@ -76,15 +76,30 @@ DISPUTED = Phrase("snooping.disputed")
 
 
 def disputes(log: Sequence[Removal]) -> list[Phrase]:
-    """Return the observations of the log that have alternatives, each with these and their odds."""
-    return [
-        phrase(
-            "snooping.rivals",
-            groups=[
-                each.subject,
-                *(phrase("snooping.rival", name=own.name, odds=own.odds) for own in each.rivals),
-            ],
-        )
-        for each in log
-        if each.kept == DISPUTED
-    ]
+    """Return the observations of the log that have alternatives, each with these and their odds.
+
+    Observations other than images, none of which can be removed without losing the datum, are alternatives of
+    each other.
+    """
+    found = [_alternatives(each, each.rivals) for each in log if each.kept == DISPUTED]
+    needed = [each for each in log if each.kept == NEEDED and each.kind != "image"]
+    needed.sort(key=lambda each: -each.statistic)
+    if len(needed) > 1:
+        first, *others = needed
+        rivals = [
+            Rival(
+                each.name,
+                each.statistic,
+                each.dimension,
+                math.exp(min(first.statistic - each.statistic, 1e3) / 2),
+            )
+            for each in others
+        ]
+        if near := [rival for rival in rivals if rival.odds < ODDS]:
+            found.append(_alternatives(first, near))
+    return found
+
+
+def _alternatives(entry: Removal, rivals: Sequence[Rival]) -> Phrase:
+    names = [phrase("snooping.rival", name=rival.name, odds=rival.odds) for rival in rivals]
+    return phrase("snooping.rivals", groups=[entry.subject, *names])

@@ -36,6 +36,7 @@ class Settings:
 
 
 RESCUES = 5  # Largest number of attempts per round to determine all unknowns
+NEEDED = Phrase("snooping.needed")
 _NOT_DETERMINED = Phrase("snooping.point-undetermined")
 
 
@@ -211,7 +212,7 @@ class TakingOut:
 
     def _keep(self, entry: Removal) -> None:
         self.kept.add(entry.group)
-        self.log.append(entry.with_(kept=Phrase("snooping.needed")))
+        self.log.append(entry.with_(kept=NEEDED))
 
     def _out_with(self, out: Out, entry: Removal) -> Removal:
         """Exclude a group and all observations that depend on it."""
