@@ -54,7 +54,7 @@ from photogram.results.snooping_result import Snooped, recorded
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped
-from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Tests
+from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Tests
 from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import Phrase, phrase
 
@@ -187,9 +187,10 @@ def _snoop_block(
         trial.restart(core_trial(start, None, core, threads))
         return aside
 
-    def common(tests: Tests) -> list[Phrase]:
+    def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
-        found = hypotheses(trial, tests, facts, block, point_axes(block), None)
+        own = standing.weighted_sum_of_squares, standing.degrees_of_freedom
+        found = hypotheses(trial, tests, facts, block, point_axes(block), own, known=True)
         return found.common_errors() if found.common_is_harmful else []
 
     try:

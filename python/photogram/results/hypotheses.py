@@ -64,6 +64,7 @@ UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
 whose causes (terms of distortion) are hypotheses of their own."""
 
+EXPLAINED = 0.5  # Least part of the excess of the sum of squares that a common error explains
 MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
 
@@ -141,6 +142,7 @@ class Hypotheses:
     units: Mapping[str, str]  # Units of the errors of types without a length
     length: str  # Unit of all others
     single_odds: float  # Largest log odds of an error of a single observation, images among them
+    excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
 
     @cached_property
     def _group_of(self) -> dict[tuple[int, int], int]:
@@ -233,6 +235,8 @@ class Hypotheses:
         ]
         found.sort(key=lambda each: -each.log_odds)
         if not found or found[0].log_odds < max(self.single_odds, rivals):
+            return []
+        if found[0].statistic < EXPLAINED * self.excess:
             return []
         return [each for each in found if each.log_odds > found[0].log_odds - math.log(ALTERNATIVES)]
 
@@ -344,14 +348,17 @@ def hypotheses(
     facts: Facts,
     given: Given,
     axes: Sequence[Axis],
-    estimated: tuple[float, float] | None,
+    standing: tuple[float, float],
+    *,
+    known: bool,
 ) -> Hypotheses:
     """Return the hypotheses of an adjusted network with the `tests` of its observations.
 
-    `axes` are those of its points, `estimated` the sum of squares and the degrees of freedom if the unit
-    weight is estimated.
+    `axes` are those of its points, `standing` the sum of squares and the degrees of freedom. `known` is
+    whether the unit weight is known.
     """
     suspects = trial.suspects
+    estimated = None if known else standing
     core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
     core.pop("check_sd", None)
     rows, _ = trial.core.hypotheses(
@@ -387,6 +394,7 @@ def hypotheses(
         axes=[axis.name for axis in axes],
         units=units,
         length=f" {length}",
+        excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         single_odds=max([of_images, *(each.log_odds for each in every if each.group is not None)]),
     )
 

@@ -283,10 +283,12 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
             # Other results remain valid; a network that is singular by rounding has a message already.
             return None
-        estimated = None if self.KNOWN else self.sum_and_freedom
+        own = found.standing
+        known = own.weighted_sum_of_squares, float(own.degrees_of_freedom)
+        standing = known if self.KNOWN else self.sum_and_freedom
         axes, facts = self._terms().point_axes, self._hypothesis_facts()
-        own = hypotheses(found.trial, found.tests, facts, self.given, axes, estimated)
-        return reliability_summary(found, own, heights=self.geographic)
+        errors = hypotheses(found.trial, found.tests, facts, self.given, axes, standing, known=self.KNOWN)
+        return reliability_summary(found, errors, heights=self.geographic)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""

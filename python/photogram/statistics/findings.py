@@ -168,18 +168,21 @@ class TypeFactor:
         """Factor of the standard deviations: the root of q / r."""
         return math.sqrt(self.squares / self.redundancy)
 
-    def is_given_rather_than(self, factor: float) -> bool:
-        """Whether the given standard deviations are more likely than those multiplied by a factor.
+    def opposes(self, factor: float) -> bool:
+        """Whether a common factor of all standard deviations makes those of this type wrong.
 
-        log L(theta) = -r log(theta) - q / (2 theta^2), theta the factor. Without redundancy, residuals of
-        other types are no reason for smaller standard deviations. Nominal ones, which are much too large, do
-        not oppose a larger factor.
+        log L(theta) = -r log(theta) - q / (2 theta^2), theta the factor. Smaller standard deviations require
+        evidence: L must increase. Larger ones are refused if L decreases, unless the given ones are nominal,
+        that is much too large.
         """
-        if self.redundancy < 1.0:
-            return factor < 1.0
-        if factor > 1.0 and self.factor < 1 / NOMINAL:
-            return False
-        return self.redundancy * math.log(factor) > self.squares / 2 * (1 - factor**-2)
+        gain = self._log_likelihood(factor) - self._log_likelihood(1.0)
+        if factor < 1.0:
+            return gain < EVIDENCE
+        nominal = self._log_likelihood(1 / NOMINAL) - self._log_likelihood(1.0) > EVIDENCE
+        return gain < -EVIDENCE and not nominal
+
+    def _log_likelihood(self, factor: float) -> float:
+        return -self.redundancy * math.log(factor) - self.squares / 2 * factor**-2
 
 
 @dataclass(frozen=True)
@@ -195,6 +198,7 @@ MOST: Mapping[Text, float] = {
     IMAGES: 0.05,
     CONTROL_POINTS: 1 / 3,
 }  # Largest removable shares
+EVIDENCE = 2.0  # Difference of log likelihoods that decides: 1.92 at the ends of a 95 percent interval
 NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least
 MOST_OTHERS = 0.05  # Of all other types; one observation of each may be removed
 

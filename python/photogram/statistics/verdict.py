@@ -341,7 +341,7 @@ def _types(e: Evidence) -> Phrase | None:
         return None
     causes, others = [], []
     for each in e.found.types:
-        if each.is_given_rather_than(f):
+        if each.opposes(f):
             others.append(each.group)
         elif each.redundancy >= 1.0:
             fields = {"kind": each.group, "factor": each.factor}

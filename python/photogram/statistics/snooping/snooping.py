@@ -42,7 +42,7 @@ def snooped(
     trial: Trial,
     settings: Settings,
     afresh: Callable[[], Aside | None] | None = None,
-    common: Callable[[Tests], Sequence[Phrase]] | None = None,
+    common: Callable[[Tests, Standing], Sequence[Phrase]] | None = None,
 ) -> Outcome:
     """Remove gross errors from a network and return the outcome.
 
@@ -63,7 +63,7 @@ def snooped(
     errors: Sequence[Phrase] = []
     if common is not None and not work.log and is_rejected(work):
         work.adjust(work.out, exact=True)
-        errors = common(work.tests)
+        errors = common(work.tests, work.standing)
     if errors:
         work.remarks.append(phrase("snooping.common", errors=list(errors)))
     else:

@@ -1,0 +1,86 @@
+"""Verdicts on wrong weights, disputed observations, common errors and robust losses."""
+
+import numpy as np
+import pytest
+
+from photogram import adjust, simulate, snoop
+from photogram.statistics.findings import Removed
+
+
+@pytest.fixture(scope="module")
+def block():
+    """Return a small block with control points and check points."""
+    return simulate(
+        strips=3,
+        photos_per_strip=5,
+        points_per_photo=40,
+        flying_height=1000.0,
+        control_sd=0.2,
+        check_points=0,
+        seed=11,
+    ).block
+
+
+def with_control(block, change):
+    """Return the block with other coordinates of control."""
+    positions = block.point_positions.copy()
+    rows = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))
+    change(positions, rows)
+    return block.replace(point_positions=positions)
+
+
+@pytest.mark.parametrize("factor", [10.0, 2.0, 0.5, 0.1])
+def test_wrong_weights_of_images_do_not_scale_control(block, factor):
+    found = adjust(block.replace(image_sd=block.image_sd * factor)).verdict
+    assert (found.code, found.exit) == ("weights-of-types", 4)
+    assert found.message.fields["types"][0].fields["factor"] == pytest.approx(1 / factor, rel=0.1)
+
+
+def test_a_common_factor_of_all_types_remains(block):
+    found = adjust(block.replace(image_sd=block.image_sd / 2, point_sd=block.point_sd / 2)).verdict
+    assert (found.code, found.exit) == ("weights", 0)
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_a_loss_does_not_hide_wrong_control(block, loss):
+    def raised(positions, rows):
+        positions[rows[0], 2] += 45.0
+
+    found = adjust(with_control(block, raised), loss=loss).verdict
+    assert found.exit == 4
+
+
+def test_a_loss_does_not_change_the_verdict_on_good_data(block):
+    assert adjust(block, loss="huber").verdict.code == adjust(block).verdict.code
+
+
+def test_one_of_three_control_points(block):
+    rows = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))
+    sd = block.point_sd.copy()
+    sd[rows[3:]] = np.inf
+
+    def moved(positions, rows):
+        positions[rows[0], 0] += 100 * float(block.point_sd[rows[0], 0])
+
+    found = snoop(with_control(block, moved).replace(point_sd=sd)).verdict
+    assert (found.code, found.exit) == ("disputed", 4)
+    assert (
+        sum("control point" in str(each) for each in found.message.fields["groups"][0].fields["groups"]) == 3
+    )
+
+
+@pytest.mark.parametrize("common", [True, False])
+def test_attitudes_are_not_removed_one_by_one(block, common):
+    rng = np.random.default_rng(5)
+    attitudes = adjust(block).photo_attitudes
+    errors = np.array([0.02, 0.0, 0.0]) if common else rng.normal(size=attitudes.shape) * 0.02
+    sd = np.full(attitudes.shape, 1e-3)
+    found = snoop(block.replace(photo_attitudes_observed=attitudes + errors, photo_attitude_sd=sd))
+    assert found.verdict.exit == 4
+    assert (found.verdict.code == "common-error") is common
+    assert not (common and found.removed)
+
+
+def test_a_removed_share_of_every_type_is_limited():
+    few, more = (Removed([{"name": "a"}], {"observations": (number, 12)}) for number in (1, 2))
+    assert (few.excessive, more.excessive) == ([], ["observations"])
