@@ -60,7 +60,7 @@ def test_one_of_three_control_points(block):
     sd[rows[3:]] = np.inf
 
     def moved(positions, rows):
-        positions[rows[0], 0] += 100 * float(block.point_sd[rows[0], 0])
+        positions[rows[0], 0] += 20 * float(block.point_sd[rows[0], 0])
 
     found = snoop(with_control(block, moved).replace(point_sd=sd)).verdict
     assert (found.code, found.exit) == ("disputed", 4)
