@@ -91,7 +91,8 @@ def _type_factors(tests: Tests) -> list[TypeFactor]:
 def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:
     """Return the test of the observations that a loss does not remove, with their given weights."""
     summary = result.reliability_summary
-    if summary is None or getattr(result, "unit_variance", "constrained") != "constrained":
+    constrained = getattr(result, "unit_variance", "constrained") == "constrained"
+    if summary is None or not result.KNOWN or not constrained:
         return None
     return global_test(summary.standing.weighted_sum_of_squares, summary.standing.degrees_of_freedom)
 

@@ -130,7 +130,11 @@ class Tests:
             for title, groups, rows in types
             if testable[groups].any()
         ]
-        return found if result.KNOWN else [tests.studentized(*result.sum_and_freedom) for tests in found]
+        if result.KNOWN:
+            return found
+        standing = summary.standing
+        own = standing.weighted_sum_of_squares, standing.degrees_of_freedom
+        return [tests.studentized(*(own if result.loss else result.sum_and_freedom)) for tests in found]
 
     @cached_property
     def outliers(self) -> list[Bools]:
