@@ -79,7 +79,7 @@ class NetworkTrial:
         return int(self.suspects.row_starts[-1]) <= WHOLE
 
     def adjust(self, out: Out, *, exact: bool = False) -> Standing:
-        tolerance = self.exact if self.whole else PRECISE if exact else self.rough
+        tolerance = self.exact if self.whole or exact else self.rough
         standing = self._asked(
             self.core.adjust,
             out.rows,
@@ -344,8 +344,7 @@ ANGLES = ("omega", "phi", "kappa")
 ROUGH = 2.0
 """Standard deviations: a round ends if the next step would not move any unknown by more. The following rounds
 start there. The last round removes nothing, so its tests are practically exact."""
-EXACT = 1e-7  # Value for R of all rows
-PRECISE = 1e-3  # Value for hypotheses on sets, whose partials nearly are combinations of those of unknowns
+EXACT = 1e-7  # Value for R of all rows, and for hypotheses on sets
 LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a part of the extent of the block
 
 

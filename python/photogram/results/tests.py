@@ -133,8 +133,8 @@ class Tests:
         if result.KNOWN:
             return found
         standing = summary.standing
-        own = standing.weighted_sum_of_squares, standing.degrees_of_freedom
-        return [tests.studentized(*(own if result.loss else result.sum_and_freedom)) for tests in found]
+        tested = standing.weighted_sum_of_squares, standing.degrees_of_freedom
+        return [tests.studentized(*(tested if result.loss else result.sum_and_freedom)) for tests in found]
 
     @cached_property
     def outliers(self) -> list[Bools]:
