@@ -64,7 +64,7 @@ UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
 whose causes (terms of distortion) are hypotheses of their own."""
 
-EXPLAINED = 0.5  # Least part of the excess of the sum of squares that a common error explains
+EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
 MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
 
@@ -361,6 +361,7 @@ def hypotheses(
     estimated = None if known else standing
     core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
     core.pop("check_sd", None)
+    timed = core.pop("timed", False)
     rows, _ = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=LIMIT, effects=EFFECTS
     )
@@ -381,7 +382,7 @@ def hypotheses(
     units = {"camera-f": f" {image}", "camera-point": f" {image}"}
     units |= dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad")
     units |= dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown", "observation"), "")
-    units |= dict.fromkeys(("time-offset", "readout-time"), " s" if "times" in facts else " exposures")
+    units |= dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures")
     images = (suspects.kinds == 0) & tests.active
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(largest, 2, 3, max(int(np.count_nonzero(images)), 1)))
@@ -470,8 +471,9 @@ def block_facts(block: Block, places: Floats) -> Facts:
         if len(strip) > 1 and (np.diff(times[strip]) > 0).all():
             velocities[strip] = np.gradient(places[strip], times[strip], axis=0)
     facts["velocities"] = velocities
-    if timed:
-        facts["times"] = seconds.tolist()
+    if count > 1:
+        # Without times, the order of the photos is used.
+        facts |= {"times": times.tolist(), "timed": timed}
     if 1 < len(strips) <= MOST_SETS:
         facts["position_sets"] = sets.tolist()
     control = np.isfinite(block.point_sd).any(axis=1)
