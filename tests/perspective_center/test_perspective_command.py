@@ -144,7 +144,7 @@ def test_usage(run):
     assert run("deck", "--example").exit_code == 2
     missing = run("nowhere")
     assert missing.exit_code == 1
-    assert "nowhere: the file cannot be read" in missing.output
+    assert "nowhere: the file must be readable" in missing.output
 
 
 def test_no_convergence_is_an_exit_code(run, tmp_path):
