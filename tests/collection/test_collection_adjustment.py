@@ -231,7 +231,7 @@ def test_two_collections_in_one_have_a_datum_each():
 def test_nothing_to_adjust_is_an_error():
     made = simulate(photos=2, points=1, seed=1).collection
     alone = made.replace(image_photos=np.zeros(2, int))
-    with pytest.raises(AdjustmentError, match="none is on two photos"):
+    with pytest.raises(AdjustmentError, match="no point is left to adjust"):
         adjust(alone)
 
 

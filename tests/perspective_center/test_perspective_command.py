@@ -159,7 +159,7 @@ def test_no_convergence_is_an_exit_code(run, tmp_path):
 def test_a_set_that_cannot_be_solved_stops_the_run(run, singular):
     result = run(singular, "--json", "out.json", "--out", "o", "--plots")
     assert result.exit_code == 3
-    assert "NORMAL EQUATIONS MATRIX IS SINGULAR: fewer than three points" in result.output
+    assert "NORMAL EQUATIONS MATRIX IS SINGULAR: a pose requires at least three points" in result.output
     document = json.loads(Path("out.json").read_text())
     assert len(document["sets"]) == 1
     assert document["error"].startswith("NORMAL EQUATIONS MATRIX IS SINGULAR")

@@ -165,7 +165,7 @@ def replaced(index, line):
         (replaced(10, "zero"), "must be a", 11),
         ([*cards()[:-1], "  7    1.0        1.0        0.0"], "a flag card .* is required .* point 6", 24),
         (cards()[:16], "ends after point 3", None),
-        (cards()[:8], "ends before a card of the plate grid", None),
+        (cards()[:8], "must contain a card of the plate grid", None),
         ([*cards()[:15], "  0", *cards()[17:]], "CARDS ARE OUT OF ORDER AT POINT NO. 3", 16),
         ([*cards()[:13], *cards()[15:]], "CARDS ARE OUT OF ORDER AT POINT NO. 2", 14),
     ],

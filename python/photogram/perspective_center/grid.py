@@ -163,7 +163,7 @@ def reduce(
     title: str = "",
     number: int = 1,
 ) -> Grid:
-    """Reduce readings to a grid: means, sd (divisor k - 1), corrections.
+    """Reduce readings to a grid: means, standard deviations (divisor k - 1), corrections.
 
     Parameters
     ----------

@@ -301,7 +301,7 @@ class Located:
         return xyz, turned, remarks
 
     def geographic(self) -> tuple[Floats, Floats]:
-        """Return (n, 3) longitudes, latitudes (deg), ellipsoidal heights, and sd.
+        """Return (n, 3) longitudes, latitudes (deg), ellipsoidal heights (WGS 84), and (n, 3) sd.
 
         Positions that are already in this system are not changed.
         """
