@@ -370,7 +370,7 @@ def test_simulate_refuses_impossible_blocks(run, tmp_path):
     assert result.stderr == f"error: strips: {Phrase('error.least', {'low': 1, 'value': 0})}\n"
     result = run("simulate", "block", *SMALL, "--control-sd", "0")
     assert result.exit_code == 1
-    assert "is fixed" in result.stderr
+    assert "must not be fixed" in result.stderr
     assert names(tmp_path) == set()
 
 

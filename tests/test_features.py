@@ -228,7 +228,7 @@ def test_a_project_declares_them(run, tmp_path):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        ((), 2, "contains no features"),
+        ((), 2, "must contain features"),
         (("--circle", "bore"), 2, "must be NAME=POINT"),
         (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "two have the name 'a'"),
         (("--circle", "a=x,y,z"), 1, "feature a: the point 'x' is unknown"),

@@ -169,7 +169,7 @@ def test_a_set_that_cannot_be_solved_stops_the_run(run, singular):
 
 
 def test_plots_that_cannot_be_drawn(run, tmp_path):
-    with pytest.raises(InputError, match="the format 'xyz'"):
+    with pytest.raises(InputError, match="got 'xyz'"):
         run_sketch(run_deck(Path(str(EXAMPLE))).results).save(tmp_path / "out.xyz")
     result = run("--example", "--out", "o", "--plots", "--plot-format", "xyz", "--json", "out.json")
     assert result.exit_code == 2

@@ -85,7 +85,8 @@ def listing(run: Run) -> str:
         return text
     text += "" if stop.title is None else _head(stop.title, stop.number)
     text += "" if stop.grid is None else _input(stop.grid)
-    error = SINGULAR if isinstance(stop.error, RankError) else getattr(stop.error, "message", str(stop.error))
+    text = getattr(stop.error, "message", str(stop.error)).partition("; ")[0]  # Without the remedy
+    error = SINGULAR if isinstance(stop.error, RankError) else text
     return f"{text}\n     {error}\n"
 
 

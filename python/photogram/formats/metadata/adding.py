@@ -174,7 +174,7 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
 
     frame = project.frame
     if project.block.linear_unit != "m":
-        raise InputError(phrase("photos.metres"), file=project.path)
+        raise InputError(phrase("photos.metres", unit=project.block.linear_unit), file=project.path)
     if not known.systems[0]:
         if frame.kind == "geographic":
             raise InputError(phrase("photos.crs", option=GNSS_CRS))
