@@ -241,7 +241,7 @@ def test_a_start_in_the_plane_of_the_projection_centre_is_an_error():
     parameters[0, 3:6] = parameters[0, :3] = 0
     positions = made.point_positions.copy()
     positions[0, 2] = 0
-    with pytest.raises(AdjustmentError, match="not finite"):
+    with pytest.raises(AdjustmentError, match="must give finite coordinates"):
         adjust(made.replace(photo_parameters=parameters, point_positions=positions))
 
 

@@ -126,7 +126,7 @@ def test_what_points_do_not_give_is_named():
             "first.unknown.points",
         ),
         ([OnLine(names[0], Line("edge"), 0.01)], "first.unknown.points"),
-        ([OnPlumbLine("lost", PlumbLine("corner"), 0.01)], "0 of its 1 points"),
+        ([OnPlumbLine("lost", PlumbLine("corner"), 0.01)], "got 0 of 1"),
         ([OnLevel("lost", Level("lake"), 0.01)], "requires a point with a height"),
     ):
         more = block.replace(

@@ -137,10 +137,8 @@ def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
         camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)
         width, height = map(int, content["imagersize"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        message = phrase("targets.mrcal-no-model")
-        if isinstance(error, InputError) and error.phrase:
-            message = error.phrase
-        raise InputError(message, file=path) from None
+        own = error.phrase if isinstance(error, InputError) else None
+        raise InputError(own or phrase("targets.mrcal-no-model"), file=path) from None
     return camera, (width, height)
 
 
