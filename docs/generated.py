@@ -20,7 +20,17 @@ WIDTH = "500"  # Columns of the help, so that no line is wrapped
 PANEL = re.compile(r"^╭─ (.*?) ─+╮\n(.*?)^╰", re.DOTALL | re.MULTILINE)
 VARIANT = re.compile(r"(\.one(\.\w+)?)?(\.cli)?$")
 FIELD = re.compile(r"\{(\w+)[^}]*\}")
-COMMAND = "\n"  # Between the sentences of Python and of the command line
+REMEDY = re.compile(
+    r"(\(<var>option</var>[^)]*\)|(?<=[;.:,] )(?:(?:so|then|and) )?(?:"
+    "add|adjust|assign|calibrate|change|check|choose|close|combine|compare|convert|copy|correct|count|create|define"
+    "|describe|divide|enter|estimate|exchange|export|extend|fill|find|fix|fly|free|give|group|ignore|improve|increase"
+    "|install|keep|leave|list|look|make|measure|move|name|observe|omit|put|read|reduce|remove|rename|repeat|replace"
+    "|restore|resume|reverse|rotate|run|save|see|select|separate|set|shorten|simulate|solve|sort|specify|split|start|store"
+    r"|transform|use|wait|widen|write)\b.*?)(?=<br>|$)",
+    re.IGNORECASE,
+)
+"""The part of a message that begins with an imperative, or an option in parentheses."""
+COMMAND = "\x1f"  # Between the sentences of Python and of the command line
 DECIDED = {"take-out": "snoop", "lens": "calibrate"}  # Usual case of next steps that the program decides
 
 
@@ -127,8 +137,12 @@ def verdicts(_: str) -> str:
 def messages(families: str) -> str:
     """Return a table of the messages of some families."""
     names = families.split()
-    rows = [(cell(text), code(name)) for name, text in sentences().items() if name.partition(".")[0] in names]
-    return table(("Message", "Code"), rows)
+    rows = [
+        (REMEDY.sub(r"<strong>\1</strong>", cell(text)), code(name))
+        for name, text in sentences().items()
+        if name.partition(".")[0] in names
+    ]
+    return table(("Message, with the remedy in bold", "Code"), rows)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:

@@ -213,7 +213,7 @@ def test_a_project_declares_them(run, tmp_path):
         ('bore = { circle = ["nobody-*"] }', "[features] bore: the point 'nobody-*' is unknown"),
         (
             'bore = { circel = ["hole-1"] }',
-            "[features] bore: the kind of features 'circel' is unknown; the nearest name is 'circle'",
+            "[features] bore: the kind of features 'circel' is unknown; use an existing name, such as the nearest, 'circle'",
         ),
         ('bore = "hole-1"', "[features] bore: must have the form"),
         ("bore = { circle = 3 }", "[features.bore] circle: must be a list"),
@@ -228,9 +228,9 @@ def test_a_project_declares_them(run, tmp_path):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        ((), 2, "contains no features"),
+        ((), 2, "must contain features"),
         (("--circle", "bore"), 2, "must be NAME=POINT"),
-        (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "the name 'a' is used by two features"),
+        (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "two have the name 'a'"),
         (("--circle", "a=x,y,z"), 1, "feature a: the point 'x' is unknown"),
     ],
 )

@@ -232,7 +232,7 @@ def test_a_datum_of_trajectories_that_have_one(block):
         lambda: result.in_datum(InnerConstraints()),
         lambda: adjust(block, datum=InnerConstraints()),
     ):
-        with pytest.raises(AdjustmentError, match="the block is not free"):
+        with pytest.raises(AdjustmentError, match="requires a free block"):
             ask()
     assert adjust(block, datum=MinimumConstraints(first)).datum.kind == "observations"
     with raises(InputError, "block.unsupported.trajectories"):

@@ -33,7 +33,7 @@ def test_inputs_are_spared(tmp_path, monkeypatch, command):
     given = {path: path.read_bytes() for path in tmp_path.iterdir()}
     run = CliRunner().invoke(app, [*words, Path(name).name])
     assert run.exit_code == 1, run.output
-    assert "would be written over the input" in run.output
+    assert "must not be written over the input" in run.output
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == given
 
 
@@ -41,5 +41,5 @@ def test_another_name_of_an_input_is_known(tmp_path):
     (tmp_path / "a").write_text("a")
     (tmp_path / "link").symlink_to("a")
     check_outputs([tmp_path / "new"], [tmp_path / "a", tmp_path / "missing"])
-    with pytest.raises(InputError, match="would be written over the input"):
+    with pytest.raises(InputError, match="must not be written over the input"):
         check_outputs([tmp_path / "link"], [tmp_path / "a"])

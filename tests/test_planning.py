@@ -532,7 +532,7 @@ def test_a_second_pattern_by_spacing_and_by_positions(run):
 def test_what_plan_refuses(run, tmp_path):
     assert run("simulate", "block", *SMALL).exit_code == 0
     for arguments, said in {
-        ("--control", "corners"): "both patterns are corners",
+        ("--control", "corners"): "the patterns must differ, got corners twice",
         ("block", "--strips", "3"): "must not be combined with options of simulated",
         ("block", "--against-spacing", "3"): "must not be combined with options of simulated",
         ("block", "block"): "every project must be specified once",
@@ -544,7 +544,7 @@ def test_what_plan_refuses(run, tmp_path):
     assert run("plan", "nothing").exit_code == 1
     result = run("plan", *SMALL, "--against", "none")
     assert result.exit_code == 3
-    assert "no control: the observations do not determine position and scale" in result.stderr
+    assert "no control: the observations must determine position and scale" in result.stderr
 
 
 @pytest.mark.giant("1", "fictitious data generator: simulated projects")

@@ -428,8 +428,8 @@ def test_simulate_writes_tables_that_are_adjusted(run, options, expected, member
     [
         (["--knots", "3"], "--knots"),
         (["--readout", "0.03", "--scanner", "1"], "--readout"),
-        (["--readout", "0.03", "--pitch", "1"], "cannot be combined with --readout"),
-        (["--scanner", "3", "--rate", "1"], "cannot be combined with --scanner"),
+        (["--readout", "0.03", "--pitch", "1"], "must not be combined with --readout"),
+        (["--scanner", "3", "--rate", "1"], "must not be combined with --scanner"),
     ],
 )
 def test_options_of_motion_that_go_with_nothing(run, options, words):

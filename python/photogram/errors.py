@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from photogram.messages import locate
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 __all__ = [
     "AdjustmentError",
@@ -105,6 +105,13 @@ class AdjustmentError(PhotogramError):
 
 class OutOfMemoryError(AdjustmentError, MemoryError):
     """Insufficient memory: too little is available, or an allocation failed. The process continues."""
+
+
+def failure_of_core(kind: str, message: str) -> AdjustmentError:
+    """Return the error of a failure of the core that concerns no single object."""
+    error = OutOfMemoryError if kind == "memory" else AdjustmentError
+    known = kind in ("memory", "empty", "not finite")
+    return error(phrase(f"core.{kind}", message=message) if known else message)
 
 
 class RankError(AdjustmentError):

@@ -142,13 +142,13 @@ def test_exit_codes(run, tmp_path):
     Path("few.csv").write_text("id,X,Y,Z,x,y,z\nA,1,2,3,4,5,6\n")
     few = run("few.csv", "--json", "result.json")
     assert few.exit_code == 3
-    assert "insufficient control" in few.output
+    assert "control requires 7 coordinates" in few.output
     Path("points.csv").write_text("id,x,y,z\nA,1,2,bad\n")
     faulty = run("--example", "--points", "points.csv", "--json", "r.json", "--out", "o", "--plots")
     assert faulty.exit_code == 1
     assert "record 2" in faulty.output
     over = run("--example", "--points", "points.csv", "--points-out", "points.csv")
-    assert "would be written over" in over.output
+    assert "must not be written over" in over.output
     assert {path.name for path in tmp_path.iterdir()} == {"few.csv", "points.csv"}
 
 

@@ -216,7 +216,7 @@ def test_no_file_is_taken_for_a_good_one(run, tmp_path):
     assert document["points"] == []
     refused = run("absolute-orientation", "transform", "result.json", "points.csv", "out.csv")
     assert refused.exit_code == 1
-    assert "the orientation must not be used: probably X and Y" in refused.output
+    assert "adjust again: probably X and Y" in refused.output
     assert not (tmp_path / "out.csv").exists()
     with pytest.raises(InputError, check=lambda error: error.code == "orientation.unusable"):
         read_similarity(tmp_path / "result.json", usable=True)

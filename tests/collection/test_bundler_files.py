@@ -107,7 +107,7 @@ DAMAGES = {
     ),
     "half a view": (changed(FIRST_POINT + 3, "2.5 0 0 1.0 1.0"), FIRST_POINT + 3, "got 2.5"),
     "no such camera": (changed(FIRST_POINT + 3, "1 7 0 1.0 1.0"), FIRST_POINT + 3, "got 7"),
-    "more": ([*LINES, "1 2 3"], len(LINES) + 1, "numbers beyond the 12 points"),
+    "more": ([*LINES, "1 2 3"], len(LINES) + 1, "must end after the 12 points"),
 }
 
 
@@ -124,7 +124,7 @@ def test_what_is_damaged_is_named_with_file_and_line(tmp_path, damage):
 @pytest.mark.parametrize("lines", [1, 2, 10, FIRST_POINT, FIRST_POINT + 1, len(LINES) - 1])
 def test_a_file_that_ends_early_is_refused(tmp_path, lines):
     path = written(tmp_path, "\n".join(LINES[:lines]) + "\n")
-    with pytest.raises(InputError, match="ends before the"):
+    with pytest.raises(InputError, match="but ends before"):
         read(path)
 
 

@@ -231,7 +231,7 @@ def test_two_collections_in_one_have_a_datum_each():
 def test_nothing_to_adjust_is_an_error():
     made = simulate(photos=2, points=1, seed=1).collection
     alone = made.replace(image_photos=np.zeros(2, int))
-    with pytest.raises(AdjustmentError, match="none is on two photos"):
+    with pytest.raises(AdjustmentError, match="no point is left to adjust"):
         adjust(alone)
 
 
@@ -241,7 +241,7 @@ def test_a_start_in_the_plane_of_the_projection_centre_is_an_error():
     parameters[0, 3:6] = parameters[0, :3] = 0
     positions = made.point_positions.copy()
     positions[0, 2] = 0
-    with pytest.raises(AdjustmentError, match="not finite"):
+    with pytest.raises(AdjustmentError, match="must give finite coordinates"):
         adjust(made.replace(photo_parameters=parameters, point_positions=positions))
 
 

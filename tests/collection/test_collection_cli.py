@@ -70,7 +70,7 @@ def test_faults_of_the_input_are_named(run, tmp_path):
     assert "problem.txt, record 3: the number of a photo must be 0 to 1, got 2" in done.output
     assert run("collection").exit_code == 2
     assert run("collection", "--example", "--sd", "-1").exit_code == 1
-    for words, said in (((), "requires --loss"), (("--snoop",), "cannot be combined with --scale")):
+    for words, said in (((), "requires --loss"), (("--snoop",), "must not be combined with --scale")):
         done = run("collection", "--example", "--scale", "2", *words)
         assert done.exit_code == 2
         assert said in done.output

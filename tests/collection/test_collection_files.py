@@ -78,7 +78,7 @@ def test_a_bad_line_is_named_and_shown(tmp_path, number, text, message):
 def test_a_file_that_ends_early_or_late_is_refused(tmp_path):
     assert "ends before" in str(spoilt(tmp_path, lambda lines: lines[:-1]))
     late = spoilt(tmp_path, lambda lines: [*lines, "7.5"])
-    assert "beyond" in str(late)
+    assert "must end after" in str(late)
     assert late.text == "7.5"
     assert "ends before" in str(spoilt(tmp_path, lambda lines: []))
 

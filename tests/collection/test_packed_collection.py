@@ -43,7 +43,7 @@ def test_a_file_longer_than_its_first_line_says(tmp_path, pack, filling, code):
 def test_a_first_line_that_announces_too_much(tmp_path):
     path = tmp_path / "problem"
     path.write_bytes(b"21 11315 99999999999999\n0 0 1.0 2.0\n")
-    with pytest.raises(InputError, match="ends before 400000000034133 numbers"):
+    with pytest.raises(InputError, match="must contain 400000000034133 numbers"):
         read(path)
 
 

@@ -485,7 +485,7 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         read([tmp_path / "nowhere.txt"])
     (tmp_path / "a.csv").write_text(TABLE)
-    with pytest.raises(InputError, match="tables and decks"):
+    with pytest.raises(InputError, match="all tables or all decks"):
         read([tmp_path / "a.csv", tmp_path / "b.txt"])
     with refusal("comparators.files"):
         read([])
@@ -530,7 +530,7 @@ def test_identical_readings_are_remarked_on_or_refused():
     assert "comparators.identical case=1 points=7" in messages
     same[case.points == 8] = same[case.points == 7][0]
     copied = replace(session, cases=(replace(case, xy_um=same), *session.cases[1:]))
-    with pytest.raises(InputError, match="points 7 and 8 have identical readings"):
+    with pytest.raises(InputError, match="must have different readings, unlike 7 and 8"):
         calibrate(copied, QUICK)
 
 

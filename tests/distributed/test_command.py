@@ -146,7 +146,7 @@ def test_what_is_not_done_of_a_project_on_disk_is_refused(tmp_path, project, opt
     value = [tmp_path / each if str(each).startswith("found") else each for each in value]
     said = called(project, "--parts", 3, option, *value, "--out", tmp_path / "out", code=2)
     words = " ".join(said.replace("│", " ").split())
-    assert f"Invalid value for {option}: cannot be combined with --parts" in words
+    assert f"Invalid value for {option}: must not be combined with --parts" in words
     assert not (tmp_path / "out" / "report.txt").exists()
 
 
@@ -155,7 +155,7 @@ def test_what_is_not_done_of_a_project_on_disk_is_refused(tmp_path, project, opt
 def test_options_that_exclude_parts_are_refused_before_the_project_is_read(tmp_path, option, plan):
     (tmp_path / "project.toml").write_text("not a project")
     said = called(tmp_path, "--parts", 3, *option, *plan, "--out", tmp_path / "out", code=2)
-    assert f"Invalid value for {option[0]}: cannot be combined with --parts" in " ".join(said.split())
+    assert f"Invalid value for {option[0]}: must not be combined with --parts" in " ".join(said.split())
 
 
 @pytest.mark.parametrize(("said", "option"), [("huber", None), ("none", "huber"), ("huber", "none")])

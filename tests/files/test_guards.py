@@ -201,7 +201,7 @@ def test_no_output_goes_over_an_input(run, place, name, option, source, alias):
     before = content(place)
     result = run(*words(name, **{option: target}))
     assert result.exit_code == 1, result.output
-    assert f"{target}: the result would be " in result.stderr
+    assert f"{target}: the result must not be " in result.stderr
     assert "over the input" in result.stderr or "of the project" in result.stderr
     assert content(place) == before
 
@@ -255,7 +255,7 @@ def test_no_output_makes_a_project_ambiguous(run, place, name, target):
         result = run(*words(name, **{option: f"galveston/{target}"}))
         assert result.exit_code == 1, result.output
         assert (
-            f"galveston/{target}: the file would be read as {Path(target).stem.upper()} of the project"
+            f"galveston/{target}: the file must not have the name of {Path(target).stem.upper()} of the project"
             in (result.stderr)
         )
         assert not (place / "galveston" / target).exists()
@@ -267,7 +267,7 @@ def test_a_project_that_is_overwritten_gets_no_second_files(run, place, name):
     before = content(place)
     result = run(*words(name, out="second"), "--overwrite")
     assert result.exit_code == 1, result.output
-    assert "second/ground.txt: the project in this folder would have two files GROUND" in result.stderr
+    assert "second/ground.txt: a project must have one file GROUND" in result.stderr
     assert content(place) == before
 
 
@@ -277,7 +277,7 @@ def test_the_default_directory_may_be_a_link_to_the_input(run, place, name):
     before = content(place)
     result = run(*words(name))
     assert result.exit_code == 1, result.output
-    assert "would be written over the input" in result.stderr
+    assert "must not be written over the input" in result.stderr
     assert content(place) == before
 
 
@@ -287,7 +287,7 @@ def test_files_of_an_output_directory_spare_the_inputs(run, place, name):
     before = content(place)
     result = run("comparator", "listing.txt", "--no-plots", "--out", place)
     assert result.exit_code == 1, (name, result.output)
-    assert "listing.txt: the result would be written over the input" in result.stderr
+    assert "listing.txt: the result must not be written over the input" in result.stderr
     assert content(place) == before
 
 
@@ -316,5 +316,5 @@ def test_the_packaged_example_is_an_input(run, tmp_path):
     before = packaged.read_bytes()
     result = run("collection", "--example", "--json", packaged)
     assert result.exit_code == 1
-    assert "would be written over the input" in result.stderr
+    assert "must not be written over the input" in result.stderr
     assert packaged.read_bytes() == before

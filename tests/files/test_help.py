@@ -88,7 +88,7 @@ def test_pictures_of_an_example_need_no_directory(run, name, tmp_path, monkeypat
 def test_plan_takes_an_example_or_projects(run):
     refused = run("plan", "somewhere", "--example")
     assert refused.exit_code == 2
-    assert "cannot be combined with DIR" in refused.stderr
+    assert "must not be combined with DIR" in refused.stderr
 
 
 def test_adjust_snoops_at_a_level(run, tmp_path):

@@ -98,7 +98,7 @@ def test_a_file_is_no_place_for_an_adjusted_collection(run, tmp_path):
     for name in ("adjusted.txt", "adjusted.txt.bz2"):
         refused = run("collection", "--example", "--out", name)
         assert refused.exit_code == 2
-        assert "adjusted.txt is written into it" in refused.stderr
+        assert "into which adjusted.txt is written" in refused.stderr
     assert not list(tmp_path.iterdir())
 
 

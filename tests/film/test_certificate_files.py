@@ -46,7 +46,7 @@ def test_exchanged_digits_end_with_4_and_are_named(run, tmp_path):
     (tmp_path / "c.toml").write_text(EXAMPLE.replace("220.018", "220.108"), encoding="utf-8")
     done = run("certificate", "c.toml")
     assert done.exit_code == 4
-    assert "ml-mr is 220.108 mm, by coordinates 220.018 mm; perhaps ml-mr 220.018 for 220.108 (exchange)" in (
+    assert "ml-mr is 220.108 mm, by coordinates 220.018 mm; compare both with the certificate, perhaps ml-mr 220.018 for 220.108 (exchange)" in (
         " ".join(done.stdout.split())
     )
 

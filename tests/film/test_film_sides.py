@@ -69,7 +69,7 @@ def test_without_poses_names_are_asked_for(tmp_path: Path) -> None:
     without_starts(tmp_path)
     rewritten(tmp_path / "fiducial_images.csv", {"fiducial": ""})
     rewritten(tmp_path / "photos.csv", {"omega": "", "phi": "", "kappa": ""})
-    with pytest.raises(InputError, match=r"photo p\d: the marks do not determine.* specify the names"):
+    with pytest.raises(InputError, match=r"photo p\d: .* the marks do not determine.* add the names"):
         read(tmp_path)
 
 

@@ -65,9 +65,9 @@ def test_a_camera_of_stars_is_that_of_a_certificate(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "said"),
     [
-        ("camera,calibration,c\nrc10-2345,camera.json,152\n", "specifies model and parameters"),
+        ("camera,calibration,c\nrc10-2345,camera.json,152\n", "must be in its calibration only"),
         ("camera,calibration\nrc10-2345,scanners.csv\n", "scanners.csv"),
-        ("camera,calibration\nrc10-2345,none.json\n", "none.json: the file cannot be read"),
+        ("camera,calibration\nrc10-2345,none.json\n", "none.json: the file must be readable"),
     ],
 )
 def test_calibrations_that_cannot_be_are_refused(folder: Path, table: str, said: str) -> None:

@@ -126,8 +126,8 @@ def test_what_points_do_not_give_is_named():
             "first.unknown.points",
         ),
         ([OnLine(names[0], Line("edge"), 0.01)], "first.unknown.points"),
-        ([OnPlumbLine("lost", PlumbLine("corner"), 0.01)], "0 of its 1 points"),
-        ([OnLevel("lost", Level("lake"), 0.01)], "none of its points has a height"),
+        ([OnPlumbLine("lost", PlumbLine("corner"), 0.01)], "got 0 of 1"),
+        ([OnLevel("lost", Level("lake"), 0.01)], "requires a point with a height"),
     ):
         more = block.replace(
             point_ids=[*names, "lost"],

@@ -161,7 +161,7 @@ def test_what_metashape_does_not_have_is_refused():
     project = formats.read(sample("project"))
     camera = Camera("opencv_fisheye", {"fx": 900.0, "fy": 900.0, "cx": 500.0, "cy": 400.0}, name="A")
     other = project.block.cameras[1]
-    with pytest.raises(InputError, match="opencv_fisheye, which Metashape does not have"):
+    with pytest.raises(InputError, match="must be known to Metashape, got opencv_fisheye"):
         formats.to_files(project.replace(block=project.block.replace(cameras=[camera, other])), "agisoft")
 
 

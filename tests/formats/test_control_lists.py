@@ -188,7 +188,7 @@ def test_a_column_of_roles_is_read_whatever_it_is_called(tmp_path, head, cells, 
         (
             "Easting",
             ["1", "2", "3"],
-            "the columns x, easting both provide 'x'; choose one with --columns x=x",
+            "one column must provide 'x', got x, easting; choose one with --columns x=x",
         ),
     ],
 )

@@ -67,7 +67,7 @@ def test_a_name_that_may_be_two_formats_is_refused(run, tmp_path):
 def test_a_format_that_is_only_read_is_refused_with_those_that_are_written(run, tmp_path):
     done = run("convert", "--example", "own", "--to", "dbat")
     assert done.exit_code == 1
-    assert "the formats for writing are plain, colmap" in done.stderr.replace("\n", " ")
+    assert "the format for writing must be one of plain, colmap" in done.stderr.replace("\n", " ")
     assert not list(tmp_path.iterdir())
 
 

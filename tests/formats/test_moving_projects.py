@@ -456,7 +456,7 @@ def test_photos_that_move_are_not_adjusted_in_parts(moving_projects):
     assert streamable(drone)
     with pytest.raises(
         InputError,
-        match="DJI_0 has a rolling shutter or a trajectory, but Parquet",
+        match="must not contain rolling shutters or trajectories, unlike photo DJI_0",
     ):
         Streamed(drone, Wishes(), moving_projects / "run")
 

@@ -135,9 +135,9 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
             "Lake",
             ["record 4", "column level", "error.column level: cells.similar Lake lake"],
         ),
-        ("planes", "1,2,3", "1,,3", ["planes.csv", "record 2", "some of x, y, z are empty"]),
+        ("planes", "1,2,3", "1,,3", ["planes.csv", "record 2", "x, y, z must all have values"]),
         ("planes", "0,0,1", "0,0,0", ["planes.csv", "record 2", "a vector with a positive length"]),
-        ("planes", "1,2,3,0,0,1", ",,,0,0,1", ["record 2", "plane wall is weighted or fixed"]),
+        ("planes", "1,2,3,0,0,1", ",,,0,0,1", ["record 2", "plane wall is weighted, fixed or partly given"]),
         ("lines", "1,2,3,1,0,0", "1,2,3,,,", ["lines.csv", "record 2", "requires a direction"]),
         (
             "line_points",

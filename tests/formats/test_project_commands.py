@@ -111,7 +111,7 @@ def test_what_no_format_knows_is_refused_with_the_formats(run, tmp_path):
     for path in ("folder", "file.bin"):
         done = run("adjust", path)
         assert done.exit_code == 1
-        assert "the format is unknown" in done.stderr
+        assert "the format must be one of" in done.stderr
         assert "plain project" in done.stderr
     done = run("adjust", "nothing")
     assert done.exit_code == 1
@@ -140,7 +140,7 @@ def test_a_file_of_a_folder_is_told_apart_from_the_folder(run):
     assert run("convert", "--example", "sparse").exit_code == 0
     done = run("info", "sparse/images.bin")
     assert done.exit_code == 1
-    assert "the file belongs to a COLMAP model; specify its folder" in done.stderr.replace("\n", " ")
+    assert "the path must be the folder of a COLMAP model" in done.stderr.replace("\n", " ")
 
 
 def test_without_control_the_datum_is_asked_for(run, tmp_path):

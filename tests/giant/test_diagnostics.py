@@ -114,7 +114,7 @@ def test_section_3_limits_are_none_by_default_and_read_by_their_names(tmp_path):
 @pytest.mark.giant("3", "N1: stations")
 def test_section_11_camera_stations_exceeded(tmp_path):
     error = refused(tmp_path, Limits(stations=1))
-    assert error.message == "**CAMERA STATIONS EXCEEDED 1: there are 2"
+    assert error.message.startswith("**CAMERA STATIONS EXCEEDED 1: there are 2;")
     assert (error.file, error.record) == (tmp_path / "FRAMES", 3)
 
 
@@ -123,7 +123,7 @@ def test_section_11_camera_stations_exceeded(tmp_path):
 @pytest.mark.giant("14", "31 N2 counts unique points")
 def test_section_11_image_points_exceeded_counts_different_points(tmp_path):
     error = refused(tmp_path, Limits(points=2))
-    assert error.message == "**IMAGE POINTS EXCEEDED 2: there are 3"
+    assert error.message.startswith("**IMAGE POINTS EXCEEDED 2: there are 3;")
     # Points of frames that FRAMES does not list do not count.
     images = with_images(b=["Q"])
     with_limits(tmp_path, Limits(points=3), IMAGES=images, FRAMES=FRAMES[:2])
@@ -133,16 +133,16 @@ def test_section_11_image_points_exceeded_counts_different_points(tmp_path):
 @pytest.mark.giant("3", "N3: control points")
 def test_section_11_ground_control_exceeded_counts_records(tmp_path):
     error = refused(tmp_path, Limits(control=2))
-    assert error.message == "**GROUND CONTROL EXCEEDED 2: there are 3"
+    assert error.message.startswith("**GROUND CONTROL EXCEEDED 2: there are 3;")
     assert (error.file, error.record) == (tmp_path / "GROUND", 3)
     error = refused(tmp_path, Limits(control=3), GROUND=[*GROUND, GROUND[0]])
-    assert error.message == "**GROUND CONTROL EXCEEDED 3: there are 4"
+    assert error.message.startswith("**GROUND CONTROL EXCEEDED 3: there are 4;")
 
 
 @pytest.mark.giant("3", "N5: camera systems")
 def test_section_3_camera_systems_exceeded(tmp_path):
     error = refused(tmp_path, Limits(cameras=1), CAMERAS=["F1982        -152740", "F1983        -152740"])
-    assert error.message == "**CAMERA SYSTEMS EXCEEDED 1: there are 2"
+    assert error.message.startswith("**CAMERA SYSTEMS EXCEEDED 1: there are 2;")
 
 
 @pytest.mark.giant("11", "PASS POINTS APPEARING ON MORE THAN n PHOTOGRAPHS")
@@ -189,7 +189,7 @@ def test_section_11_the_bandwidth_is_exceeded(tmp_path):
         "ADDING VARIABLE 3",
         "VARIABLES    1    2",
     ]
-    assert "the point P3 requires the frame F3" in error.message
+    assert "point P3 with frame F3 exceeds it" in error.message
     assert (error.file, error.record) == (tmp_path / "FRAMES", 5)
 
 
@@ -210,7 +210,7 @@ def test_section_11_intersection_names_the_point_that_would_break_the_limit(tmp_
     project, block = with_limits(tmp_path, Limits(bandwidth=6), **band_files(), COMMON=intersection)
     assert len(block.image_xy) == 18
     (message,) = [message for message in project.messages if "bandwidth" in message.text]
-    assert "exceeds 6 when the point P3 requires the frame F3" in message.text
+    assert "at most 6, but point P3 with frame F3 exceeds it" in message.text
     assert message.record == 5
 
 
@@ -283,7 +283,7 @@ def test_of_control_that_stands_there_twice_by_hand_the_first_counts(tmp_path):
         pytest.param(
             {"IMAGES": replaced(IMAGES, 6, f"{'B':40}F1983")},
             ("IMAGES", 6),
-            "a camera of CAMERAS instead of 'F1983'",
+            "a camera of CAMERAS, got 'F1983'",
             id="unknown camera",
             marks=pytest.mark.giant("11", "unknown camera"),
         ),

@@ -240,7 +240,7 @@ def test_writing_numbers(value, field):
 
 @pytest.mark.parametrize("value", [1e10, -1e9, math.inf, -math.inf, 1e300])
 def test_numbers_that_do_not_fit(value):
-    with pytest.raises(ValueError, match=r"does not fit|must be a finite number"):
+    with pytest.raises(ValueError, match=r"must fit|must be a finite number"):
         format_real(value, 10, 3)
 
 
@@ -296,7 +296,7 @@ def test_deviations():
         format_deviations((0.0, 600 * arcsec, 0.04), (True, True, False)) == "            1000.000     0.040"
     )
     for value in (-0.1, 1e-12, 1e12, math.nan):
-        with pytest.raises(ValueError, match=r"cannot be written|does not fit"):
+        with pytest.raises(ValueError, match=r"must fit|must be"):
             format_deviations((value,), (False,))
 
 
@@ -304,7 +304,7 @@ def test_principal_distances():
     assert format_principal_distance(0.0) == " " * 10
     assert format_principal_distance(-152.74) == "  -152.740"
     for value in (1e-12, -1e-12, math.nan, 1e12):
-        with pytest.raises(ValueError, match=r"cannot be written|does not fit"):
+        with pytest.raises(ValueError, match=r"must fit|must be"):
             format_principal_distance(value)
 
 

@@ -330,7 +330,7 @@ def test_section_2_1_unreadable_coordinates_name_file_record_and_text(field):
     [
         (IMAGES[:-1], 9, r"the frame 'B' \(record 6\) requires a terminator"),
         (IMAGES[:6], 6, r"the frame 'B' \(record 6\) requires a terminator"),
-        ([*IMAGES[:4], *IMAGES[5:]], 5, r"lacks coordinates; .* terminator"),
+        ([*IMAGES[:4], *IMAGES[5:]], 5, r"must have coordinates.* terminator"),
         ([*IMAGES[:4], f"{'B':20}{'0.0060':>10}{'0.0080':>10}", *IMAGES[6:]], 5, "terminator"),
         (["****", *IMAGES], 1, "requires the header"),
         (replaced(IMAGES, 2, IMAGES[1].replace("1 ", "  ", 1)), 2, "the point requires a name"),

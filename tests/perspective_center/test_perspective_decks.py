@@ -138,7 +138,7 @@ def test_any_flag_and_any_end(write, flag, end):
 def test_a_missing_last_flag_is_remarked(write):
     run = run_deck(write(cards()[:-1]))
     assert len(run.results) == 1
-    assert "without a flag card" in str(run.messages[0])
+    assert "must end with a flag card" in str(run.messages[0])
 
 
 def test_icalf_zero_is_one_set(write):
@@ -164,8 +164,8 @@ def replaced(index, line):
         (replaced(7, "  4   90.0.0  -90.000"), "must be a", 8),
         (replaced(10, "zero"), "must be a", 11),
         ([*cards()[:-1], "  7    1.0        1.0        0.0"], "a flag card .* is required .* point 6", 24),
-        (cards()[:16], "ends after the readings of point 3", None),
-        (cards()[:8], "ends before a card of the plate grid", None),
+        (cards()[:16], "ends after point 3", None),
+        (cards()[:8], "must contain a card of the plate grid", None),
         ([*cards()[:15], "  0", *cards()[17:]], "CARDS ARE OUT OF ORDER AT POINT NO. 3", 16),
         ([*cards()[:13], *cards()[15:]], "CARDS ARE OUT OF ORDER AT POINT NO. 2", 14),
     ],

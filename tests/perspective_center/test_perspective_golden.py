@@ -125,7 +125,7 @@ def test_cards_out_of_order(golden, expected):
     deck = golden / "decks" / "synthetic_out_of_order.txt"
     with pytest.raises(InputError) as caught:
         read_deck(deck)
-    assert caught.value.message == wanted["message"]
+    assert caught.value.message.startswith(wanted["message"])
     assert (caught.value.record, caught.value.text.split()[0]) == (18, "5")
     run = run_deck(deck, as_published=True)
     assert run.results == []
@@ -137,7 +137,7 @@ def test_singular_normal_equations(golden, expected, as_published):
     wanted = expected("synthetic_singular")
     deck = golden / "decks" / "synthetic_singular.txt"
     (grid,) = read_deck(deck)
-    with pytest.raises(RankError, match=f"{wanted['message']}: fewer than three points"):
+    with pytest.raises(RankError, match=f"{wanted['message']}: a pose requires at least three points"):
         determine(grid, as_published=as_published)
     run = run_deck(deck, as_published=as_published)
     assert run.results == []

@@ -60,7 +60,7 @@ def test_a_folder_that_is_the_input_is_refused(run):
     for place in ("quarry", "./quarry/"):
         done = run("adjust", "quarry", "--parquet", place)
         assert done.exit_code == 1
-        assert "the results would be written over the input" in " ".join(done.output.split())
+        assert "the results must not be written over the input" in " ".join(done.output.split())
     assert not list(Path("quarry").glob("*.parquet"))
 
 
@@ -100,4 +100,4 @@ def test_results_of_collections_are_no_projects(run):
     assert run("collection", "--example", "--parquet", "data", "--quiet").exit_code == 0
     done = run("info", "data")
     assert done.exit_code == 1
-    assert "the folder contains the result of a collection" in " ".join(done.output.split())
+    assert "got a collection" in " ".join(done.output.split())

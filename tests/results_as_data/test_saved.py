@@ -271,7 +271,7 @@ def folder(tmp_path):
 
 
 def test_damaged_folders_are_refused_with_the_file(folder):
-    with pytest.raises(InputError, match=r"nothing/summary\.json: the file cannot be read"):
+    with pytest.raises(InputError, match=r"nothing/summary\.json: the file must be readable"):
         read_result(folder / "nothing")
     images = folder / "images.parquet"
     whole = images.read_bytes()
@@ -285,7 +285,7 @@ def test_damaged_folders_are_refused_with_the_file(folder):
     images.write_bytes(whole)
     parquet.write_table(table.slice(1), folder / "points.parquet")
     resealed(folder)
-    with pytest.raises(InputError, match=r"images\.parquet: the name '.*' is missing in the table"):
+    with pytest.raises(InputError, match=r"images\.parquet: the name '.*' must be in the table"):
         read_result(folder)
     parquet.write_table(table.drop_columns(["covariance"]), folder / "points.parquet")
     resealed(folder)
@@ -322,7 +322,7 @@ def test_a_table_of_another_result_is_refused(folder, tmp_path_factory, table):
             read_result(folder)
     assert not same or table in ("control", "observations")
     (folder / f"{table}.parquet").unlink()
-    with pytest.raises(InputError, match=rf"{table}\.parquet: the file cannot be read"):
+    with pytest.raises(InputError, match=rf"{table}\.parquet: the file must be readable"):
         read_result(folder)
 
 

@@ -114,7 +114,7 @@ def test_tables_have_a_row_for_each_point_and_source(run, site):
         (["--standard", "din"], "'din'"),
         (["--budget", "point C99 z"], "'C99'"),
         (["--text", "missing.toml"], "missing.toml"),
-        (["--sd", "checks=1"], "rates, bases, check, as images=0.5"),
+        (["--sd", "checks=1"], "rates, bases, check; write it as images=0.5"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_is_written(run, site, options, said):

@@ -360,7 +360,7 @@ def test_results_do_not_replace_the_input(folder, monkeypatch):
     for target in ("night.toml", "images.csv"):
         run = CliRunner().invoke(app, ["stellar-camera", "exposures", "night.toml", "--json", target])
         assert run.exit_code == 1
-        assert "would be written over the input" in run.output
+        assert "must not be written over the input" in run.output
     assert (folder / "images.csv").read_bytes() == before
     assert not (folder / "night-calibrated").exists()
 

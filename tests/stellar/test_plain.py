@@ -231,7 +231,7 @@ def test_no_result_is_written_over_an_input(tmp_path, monkeypatch, target):
     before = (tmp_path / target).read_bytes()
     run = CliRunner().invoke(app, ["stellar-camera", "plate.toml", "--json", target])
     assert run.exit_code == 1
-    assert "would be written over the input" in run.output
+    assert "must not be written over the input" in run.output
     assert (tmp_path / target).read_bytes() == before
     assert not (tmp_path / "plate-calibrated").exists()
 

@@ -114,7 +114,7 @@ def test_outliers_as_mrcal_marks_them(left):
         (["--board", "9by6", "--spacing", "25"], "must be two numbers"),
         (["--spacing", "25"], "requires --board"),
         (["--sd", "control=1"], "images=S"),
-        (["--snoop", "--loss", "huber"], "cannot be combined with --loss"),
+        (["--snoop", "--loss", "huber"], "must not be combined with --loss"),
         (["--model", "pinhole9"], "pinhole"),
     ],
 )

@@ -236,7 +236,7 @@ def test_it_is_an_option_of_the_command(folder, tmp_path):
     assert float(clock[-6]) == 1e-6
     assert "54 points are fixed and not listed" in " ".join(report.split())
     for words, said in (
-        (["--offset", "b=0"], "the camera b does not have an offset; --sync offset "),
+        (["--offset", "b=0"], "the camera b requires --sync offset"),
         (["--sync", "offset", "--offset", "b=x"], "must be CAMERA=S or CAMERA=S,SD"),
         (["--sync", "offset", "--offset", "b=1,-1"], "must be CAMERA=S or CAMERA=S,SD"),
     ):

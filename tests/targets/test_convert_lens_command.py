@@ -86,7 +86,7 @@ def test_what_makes_no_sense_is_refused(lens, arguments, code, message):
             {"intrinsics": VALUES[:5]},
             "LENSMODEL_OPENCV4: must have 8 values, got 5",
         ),
-        ({"imagersize": None}, str(phrase("targets.mrcal-no-model", reason=""))),
+        ({"imagersize": None}, str(phrase("targets.mrcal-no-model"))),
     ],
 )
 def test_lenses_that_are_not_taken_are_named(tmp_path, changes, message):

@@ -281,9 +281,9 @@ def test_the_table_has_the_corners_of_the_model():
     ("before", "after", "said"),
     [
         ("'optimization_inputs'", "'inputs'", "targets.mrcal-no-corners key=optimization_inputs"),
-        ("b'P)h", "b'P h", "targets.mrcal-damaged key=optimization_inputs reason=bad base85"),
-        ("'imagersize'", "__import__('os')", "targets.mrcal-dictionary reason=targets.mrcal-code"),
-        ("'lensmodel'", "'lens'", "targets.mrcal-no-model reason=error.missing name=lensmodel"),
+        ("b'P)h", "b'P h", "targets.mrcal-damaged key=optimization_inputs"),
+        ("'imagersize'", "__import__('os')", "targets.mrcal-dictionary"),
+        ("'lensmodel'", "'lens'", "targets.mrcal-no-model"),
     ],
 )
 def test_a_damaged_model_of_mrcal_is_refused(tmp_path, before, after, said):

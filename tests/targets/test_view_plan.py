@@ -156,7 +156,7 @@ def test_it_is_an_option_of_the_command(tmp_path):
         (["corners", "--plan", 5], "specify one of PATH, --example, --plan"),
         (["--plan", 5, *board], "requires --size, and --field or --focal"),
         (["--plan", 5, "--size", "800x600", "--field", 60], "requires --board"),
-        (["--plan", 5, *board, "--field", 60, "--snoop"], "cannot be combined with --plan"),
+        (["--plan", 5, *board, "--field", 60, "--snoop"], "must not be combined with --plan"),
         (["--example", "--field", 60], "requires --plan"),
     ):
         assert said in " ".join(run(*words).output.replace("│", " ").split()), words

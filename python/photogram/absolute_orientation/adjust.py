@@ -18,7 +18,7 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import names as names_of
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
 from photogram.statistics.limits import externally_studentized, global_test
@@ -322,12 +322,12 @@ def _named(
         text = phrase("orientation.insufficient", **counts, all=7 - held, horizontal=4 - held)
         return RankError(text, [], [stations.ids[row] for row in rows])
     if kind == "undetermined":
-        return RankError(f"{message}: {', '.join(names)}" if names else message, [], names)
+        return RankError(phrase("orientation.undetermined", message=message, names=names), [], names)
     if kind == "first stations":
         return InputError(phrase("orientation.first-stations", message=message, names=names))
     if kind == "scale":
         return AdjustmentError(phrase("orientation.scale"))
-    return AdjustmentError(message)
+    return failure_of_core(kind, message)
 
 
 check_arguments(globals(), ["orient"])

@@ -81,7 +81,7 @@ class Strip:
 
 
 def relative_model(block: Block, first: str, second: str) -> Model:
-    """Compute the relative orientation of two photos from common points.
+    """Compute the relative orientation of two photos from common points, in a minimum datum.
 
     Raises
     ------

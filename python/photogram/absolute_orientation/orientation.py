@@ -150,7 +150,7 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def decided_by_w(self) -> bool:
-        """Whether standardized residuals are tested: given sd are reliable.
+        """Whether standardized residuals are tested: the given standard deviations are reliable.
 
         Otherwise the unit weight is estimated, and studentized residuals are tested.
         """

@@ -115,7 +115,7 @@ class Similarity:
         ):
             raise InputError(phrase("orientation.rotation"))
         if not (0 < scale < math.inf and 0 < deviation_factor < math.inf):
-            raise InputError(phrase("orientation.scales"))
+            raise InputError(phrase("orientation.scales", scale=scale, factor=deviation_factor))
         centre, model = (
             shaped(name, value, (3,))
             for name, value in (("control_centre", control_centre), ("model_centre", model_centre))
@@ -197,7 +197,8 @@ class Similarity:
         try:
             sd = np.broadcast_to(numbers("model_sd", model_sd), points.shape) * self.deviation_factor
         except ValueError:
-            raise InputError(phrase("orientation.broadcast", shape=str(points.shape))) from None
+            fields = {"shape": str(points.shape), "actual": str(np.shape(model_sd))}
+            raise InputError(phrase("orientation.broadcast", **fields)) from None
         covariance = self.tangent_covariance
         known = np.full((7, 7), np.nan) if covariance is None else covariance
         return _photocore.transform_points(self._row(), known, points, sd)

@@ -143,22 +143,22 @@ class Stations(Brief):
         repeated = [name for name, count in Counter(self.ids).items() if count > 1]
         if repeated:
             raise InputError(phrase("orientation.repeated", station=repeated[0]))
-        self._refuse(~np.isfinite(self.model), "model-coordinate")
-        self._refuse(np.isinf(self.control), "control-coordinate")
+        self._refuse(self.model, ~np.isfinite(self.model), "model-coordinate")
+        self._refuse(self.control, np.isinf(self.control), "control-coordinate")
         sd = np.where(self.given, self.control_sd, 0.0)
-        self._refuse(~(sd >= 0), "control-sd")
+        self._refuse(sd, ~(sd >= 0), "control-sd")
         if self.model_sd is not None:
             positive = (self.model_sd >= 0) & np.isfinite(self.model_sd)
-            self._refuse(~positive, "model-sd")
+            self._refuse(self.model_sd, ~positive, "model-sd")
             exact = self.held & (sd == 0) & (self.model_sd == 0).all(axis=1, keepdims=True)
-            self._refuse(exact, "exact")
+            self._refuse(sd, exact, "exact")
         elif (sd[self.held] > 0).any():
             raise InputError(phrase("orientation.no-model-sd"))
 
-    def _refuse(self, faulty: Bools, code: str) -> None:
-        if faulty.any():
-            station = self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]
-            raise InputError(phrase(f"orientation.{code}", station=station))
+    def _refuse(self, values: Floats, faulty: Bools, code: str) -> None:
+        for row, column in np.argwhere(faulty).tolist():
+            fields = {"station": self.ids[row], "value": float(values[row, column])}
+            raise InputError(phrase(f"orientation.{code}", **fields))
 
 
 def _table(name: str, values: ArrayLike, count: int) -> Floats:

@@ -26,7 +26,7 @@ from photogram.adjustment.taking_over import large_turns, stays, taken_over
 from photogram.adjustment.undetermined import beyond_trajectory, in_one_place, undetermined_combinations
 from photogram.arguments.arrays import argument_error, number, one_of, whole_number
 from photogram.arguments.objects import kind_error
-from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message
@@ -403,8 +403,6 @@ def named(
         return RankError(phrase("adjust.no-intersection", point=point_names[0]), [], point_names)
     if kind == "coarse":
         return too_coarse([block.photo_ids[i] for i in combinations[0][0]], point_names)
-    if kind == "memory":
-        return OutOfMemoryError(message)
     if kind == "outside":
         return AdjustmentError(beyond_trajectory(block, combinations[0][0][0], points, seconds))
-    return AdjustmentError(message)
+    return failure_of_core(kind, message)

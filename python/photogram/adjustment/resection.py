@@ -418,7 +418,7 @@ def solve(
         kind, message = error.args
         if kind in RANK_FAILURES:
             raise RankError(phrase(f"resection.{kind}"), [], observed.names) from None
-        raise AdjustmentError(message) from None
+        raise AdjustmentError(message if kind == "input" else phrase(f"resection.{kind}")) from None
 
 
 def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:

@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.adjustment.remarks import too_coarse
 from photogram.arguments.types import Indices
 from photogram.collection.parameters import POSE
-from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.memory import available_memory
 from photogram.network.core_arrays import CoreOptions
 from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
@@ -64,9 +64,7 @@ def named(
         return too_coarse([str(photo) for photo in combinations[0][0]], [str(point) for point in points])
     if kind == "left out":
         return InputError(phrase("collection.point-excluded", point=points[0]))
-    if kind == "memory":
-        return OutOfMemoryError(message)
-    return AdjustmentError(message)
+    return failure_of_core(kind, message)
 
 
 def collection_trial(

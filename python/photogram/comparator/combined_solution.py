@@ -35,7 +35,7 @@ class SinglePolynomial:
 
     @property
     def covariance(self) -> Floats:
-        """(18, 18) coefficient covariance in metre units, x first (equation 61)."""
+        """(18, 18) coefficient covariance, metre units (m^2 times powers of 1/m), x first (equation 61)."""
         return self.residuals.sigma0_um**2 * self.polynomial.cofactors
 
 
@@ -56,7 +56,7 @@ class CombinedPolynomial:
 
     @property
     def covariance(self) -> Floats:
-        """(18, 18) coefficient covariance in metre units, x first (equation 61)."""
+        """(18, 18) coefficient covariance, metre units (m^2 times powers of 1/m), x first (equation 61)."""
         return self.sigma0_um**2 * self.polynomial.cofactors
 
 

@@ -380,7 +380,8 @@ def _deviations(camera: Camera) -> dict[str, float]:
     deviations = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     affine = ("b1", "b2", "r0")
     if camera.model != "brown" or camera.unit != "mm" or any(camera.parameters[name] for name in affine):
-        raise InputError(phrase("comparators.camera", camera=camera.title))
+        own = {"camera": camera.title, "model": camera.model, "unit": camera.unit}
+        raise InputError(phrase("comparators.camera", **own))
     if deviations["b1"] or deviations["b2"]:
         raise InputError(phrase("comparators.camera-free", camera=camera.title))
     return {name: deviations[name] for name in camera.names if name not in affine}

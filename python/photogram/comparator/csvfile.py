@@ -83,5 +83,5 @@ def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -
             settings[name] = Setting(name, value.strip(), place)
     units = [{unit for unit in MICROMETRES if f"{axis}_{unit}" in records.columns} for axis in "xy"]
     if units[0] != units[1] or len(units[0]) != 1:
-        raise records.head.error(phrase("comparators.units"))
+        raise records.head.error(phrase("comparators.units", names=list(records.columns)))
     return Table(records, settings, units[0].pop())

@@ -174,7 +174,7 @@ class AffineFit:
 
     @property
     def covariance(self) -> Floats:
-        """(4, 4) covariance of scales, lack of orthogonality and rotation (equation 53)."""
+        """(4, 4) covariance of scale x, scale y, lack of orthogonality and rotation (rad; equation 53)."""
         return self.residuals.sigma0_um**2 * self.cofactors
 
     @property

@@ -64,7 +64,8 @@ class Grid(Brief):
         if (counts > 1).any():
             self._refuse("points", "error.repeated", kind="point", name=str(values[counts > 1][0]))
         if self.xy_um.shape != (*np.shape(self.points)[:1], 2) or not np.isfinite(self.xy_um).all():
-            self._refuse("xy_um", "comparators.grid-shape")
+            shape = str(self.xy_um.shape)
+            self._refuse("xy_um", "comparators.grid-shape", count=len(values), shape=shape)
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
             self._refuse("sigma_um", "error.not-negative", value=self.sigma_um)
         if self.expansion_per_k is not None and not abs(self.expansion_per_k) < MOST_EXPANSION:

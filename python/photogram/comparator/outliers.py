@@ -252,7 +252,7 @@ def problems(
     far: Sequence[FarPointing],
     joint: JointFit | None,
 ) -> list[Message]:
-    """Return problems: harmful outliers, inaccurate grids, single outliers."""
+    """Return problems: an unusable correction, grids worse than their standard deviations, outliers."""
     messages = []
     if screening.harmful:
         fields = {"change": screening.change_um, "sd": screening.sigma_um}

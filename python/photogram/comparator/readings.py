@@ -93,7 +93,8 @@ class Case:
             If a reading is invalid. The message locates the first one.
         """
         if not len(self.points) == len(self.legs) == len(self.xy_um) == len(self.places):
-            raise InputError(phrase("comparators.lengths", case=self.number))
+            lengths = [len(self.points), len(self.legs), len(self.xy_um), len(self.places)]
+            raise InputError(phrase("comparators.lengths", case=self.number, lengths=lengths))
         largest = np.abs(self.xy_um).max(axis=1, initial=0.0)
         for code, bad in (
             ("error.finite", ~np.isfinite(largest)),

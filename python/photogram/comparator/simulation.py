@@ -96,7 +96,8 @@ def simulate_calibration(
         another shape.
     """
     if not operators or not math.isfinite(rotation_rad) or seed < 0:
-        raise InputError(phrase("comparators.simulation"))
+        fields = {"operators": list(operators), "rotation": rotation_rad, "seed": seed}
+        raise InputError(phrase("comparators.simulation", **fields))
     random = np.random.default_rng(seed)
     drawn = grid_um * random.standard_normal((len(grid.points), 2))
     errors = drawn if grid_errors_um is None else shaped("grid_errors_um", grid_errors_um, drawn.shape)

@@ -64,7 +64,7 @@ def variance(calibration: Calibration) -> Table:
 def linear(
     found: Correction | Decomposition, covariance: Floats, freedom: int = 0, key: str = "linear"
 ) -> Table:
-    """Return scales, their ratio and lack of orthogonality with their sd."""
+    """Return scales, their ratio and lack of orthogonality, with sd from the covariance of all three."""
     x, y, lean = (getattr(found, name) for name in LINEAR)
     of_ratio = np.array([1 / y, -x / y**2])
     sd = np.sqrt([*np.diag(covariance)[:2], of_ratio @ covariance[:2, :2] @ of_ratio, covariance[2, 2]])

@@ -40,7 +40,7 @@ class Suspect:
 
 
 def tests(result: Result) -> dict[str, Floats]:
-    """Return test values by type, in sd of the residuals; 0 without redundancy."""
+    """Return test values by type, in standard deviations of the residuals; 0 without redundancy."""
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
     others = {
         "control": (result.point_redundancy, result.point_standardized),

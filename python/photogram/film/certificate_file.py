@@ -125,7 +125,7 @@ class _Frame:
         for key in table.values:
             parts = [self.mark(part) for part in key.split("-")]
             if len(parts) != 2 or not all(parts) or parts[0] == parts[1]:
-                raise table.error(key, phrase("films.pair-of-marks"))
+                raise table.error(key, phrase("films.pair-of-marks", value=key))
             distance = MarkDistance(parts[0], parts[1], table.positive(key), sd)
             if distance.length > LARGEST:
                 raise table.error(key, phrase("error.most", high=LARGEST, value=distance.length))

@@ -64,7 +64,7 @@ def degrees(text: str) -> float:
     if not match or (before and behind) or not all(each.is_integer() for each in values[:-1]):
         raise ValueError(f"{quoted(text)} must be an angle in degrees, minutes and seconds")
     if any(each >= 60 for each in values[1:]):
-        raise ValueError(f"{quoted(text)} has minutes or seconds of 60 or more")
+        raise ValueError(f"{quoted(text)} must have minutes and seconds below 60")
     value = sum((each / 60.0**k for k, each in enumerate(values)), 0.0)
     return -value if (sign == "-") != (before + behind in ("S", "W")) else value
 
@@ -278,7 +278,7 @@ def heading_of(table: ColumnTable, column: str) -> str:
 
 def _on_axis(other: str, text: str) -> float:
     if any(letter in text for letter in other):
-        raise ValueError(f"{quoted(text)} is of the other axis")
+        raise ValueError(f"{quoted(text)} must not have a letter of the other axis")
     return degrees(text)
 
 

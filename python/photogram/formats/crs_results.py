@@ -72,7 +72,7 @@ class Placed:
     attitudes: Attitudes
 
     def angles(self) -> tuple[Floats, Floats]:
-        """Return (P, 3) omega, phi, kappa and standard deviations, radians.
+        """Return (P, 3) omega, phi, kappa relative to the system's axes and standard deviations, radians.
 
         The sense of the angles is the one of the block.
         """

@@ -86,7 +86,7 @@ def in_unit(settings: Settings, xy: Floats, *, pixels: bool) -> Floats:
 
 
 def from_tables(settings: Settings, camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Convert image coordinates of tables to the axes of a camera."""
+    """Convert (m, 2) image coordinates of tables, in the unit of a camera, to the axes of the camera."""
     if settings.image == "px" and settings.image_y == "down":
         return from_corner(camera, size, xy)
     if settings.image == "px" and camera.image_y == "down":

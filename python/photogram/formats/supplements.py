@@ -47,7 +47,7 @@ SIMILAR = 10.0  # Smallest improvement of the fit of control for which a similar
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Return standard deviations by table from `control=0.02,0.02,0.03`."""
+    """Return standard deviations by table from `images=0.5` or `control=0.02,0.02,0.03`."""
     found = {}
     for each in given:
         name, equals, numbers = each.partition("=")

@@ -43,15 +43,11 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
     """Read a packed DMS field."""
     packed = parse_real(field, decimals)
     if abs(packed) > LARGEST_PACKED:
-        raise ValueError(
-            f"**ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is beyond 360 degrees"
-        )
+        raise ValueError(phrase("giant.dms", value=field.strip(), angle="beyond 360 degrees"))
     sign, degrees, minutes, seconds = unpack_dms(packed)
     if degrees > 360 or minutes > 60 or seconds > 60:
-        raise ValueError(
-            f"**ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is"
-            f" {degrees} degrees {minutes} minutes {seconds} seconds"
-        )
+        angle = f"{degrees} degrees {minutes} minutes {seconds} seconds"
+        raise ValueError(phrase("giant.dms", value=field.strip(), angle=angle))
     return sign * float(3600 * degrees + 60 * minutes + seconds) * ARCSEC, minutes == 60 or seconds == 60
 
 

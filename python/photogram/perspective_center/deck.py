@@ -64,8 +64,8 @@ class CardFormat:
             # Read as text, the ruler gives the columns of a field; a card of zeros gives its type.
             fields = fortranformat.FortranRecordReader(_NUMERIC.sub(r"A\2", self.text)).read(ruler)
             kinds = [type(value) for value in self._reader.read("0" * 4 * COLUMNS)]
-        except Exception as error:  # fortranformat raises many types of exceptions, including its own
-            raise ValueError(phrase("format.invalid", format=self.text, error=str(error))) from None
+        except Exception:  # fortranformat raises many types of exceptions, including its own
+            raise ValueError(phrase("format.invalid", format=self.text)) from None
         wanted = [int] * integers + [float] * reals
         if kinds[: len(wanted)] != wanted:
             raise ValueError(phrase("format.numbers", format=self.text, integers=integers, reals=reals))

@@ -114,12 +114,13 @@ class Grid(Brief):
             shapes["initial"] = (6,)
         for name, shape in shapes.items():
             values = shaped(name, getattr(self, name), shape)
-            if not np.isfinite(values).all():
-                raise InputError(phrase("projector.finite", name=name))
+            for value in values[~np.isfinite(values)].tolist():
+                raise InputError(phrase("projector.finite", name=name, value=value))
             object.__setattr__(self, name, values)
         readings = shaped("readings", self.readings, (count,))
-        if not ((readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))).all():
-            raise InputError(phrase("projector.readings"))
+        good = (readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))
+        for value in readings[~good].tolist():
+            raise InputError(phrase("projector.readings", value=value))
         object.__setattr__(self, "readings", readings.astype(np.int64))
         if not 0 < number("principal_distance", self.principal_distance) < math.inf:
             raise InputError(phrase("projector.principal-distance", value=self.principal_distance))
@@ -162,7 +163,7 @@ def reduce(
     title: str = "",
     number: int = 1,
 ) -> Grid:
-    """Reduce readings to a grid: means, sd (divisor k - 1), corrections.
+    """Reduce readings to a grid: means, standard deviations (divisor k - 1), corrections.
 
     Parameters
     ----------
@@ -178,8 +179,9 @@ def reduce(
     InputError
         If readings have another shape.
     """
-    if any(each.ndim != 2 or each.shape[1] != 3 or not len(each) for each in readings):
-        raise InputError(phrase("projector.shape"))
+    for each in readings:
+        if each.ndim != 2 or each.shape[1] != 3 or not len(each):
+            raise InputError(phrase("projector.shape", actual=str(each.shape)))
     means = np.array([np.mean(each, axis=0) for each in readings])
     sd = [np.std(each[:, :2], axis=0, ddof=1) if len(each) > 1 else np.zeros(2) for each in readings]
     if coordinatograph is not None:

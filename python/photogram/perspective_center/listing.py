@@ -85,7 +85,8 @@ def listing(run: Run) -> str:
         return text
     text += "" if stop.title is None else _head(stop.title, stop.number)
     text += "" if stop.grid is None else _input(stop.grid)
-    error = SINGULAR if isinstance(stop.error, RankError) else getattr(stop.error, "message", str(stop.error))
+    message = getattr(stop.error, "message", str(stop.error))
+    error = SINGULAR if isinstance(stop.error, RankError) else message.partition("; ")[0]  # No remedy
     return f"{text}\n     {error}\n"
 
 

@@ -30,7 +30,7 @@ MAX_TEST_VALUE = 6.0  # The histogram counts test values beyond at its ends
 
 
 def tests(result: Any) -> Plot:
-    """Plot test values w: histogram and quantiles against the normal distribution.
+    """Plot test values w of all observations: histogram and quantiles against the normal distribution.
 
     w = residual / (standard deviation x root of redundancy number) is standard normal if the given standard
     deviations are correct and the data are free of gross errors.

@@ -61,7 +61,7 @@ class VarianceComponents(Judged, Documented, Brief):
         return [each for each in self.components if each.worth_changing]
 
     def plot(self) -> Plot:
-        """Plot factors of standard deviations with intervals; circles are fixed components."""
+        """Plot factors of standard deviations with 95 percent intervals; circles are fixed components."""
         marks: list[Mark] = []
         for place, each in enumerate(self.components):
             at = np.array([[each.factor_of_sd, place]])

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, value_field
-from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
+from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, unknown_name
 from photogram.network.block import Block
@@ -184,8 +184,6 @@ def refused(
     block: Block, network: BlockNetwork, state: _photocore.BlockState | None, error: Failure
 ) -> AdjustmentError | InputError:
     kind, message, _, points, *_ = error.args
-    if kind == "memory":
-        return OutOfMemoryError(message)
     if kind == "left out":
         return InputError(phrase("free.left-out", point=block.point_ids[points[0]]))
     if kind == "datum":
@@ -195,4 +193,4 @@ def refused(
         resistance = sorted(network.resistance(state, threads=0), key=lambda each: -each[1])
         parts = [phrase("free.part", kind=kind, share=share) for kind, share in resistance]
         return AdjustmentError(phrase("free.not-free", kinds=parts))
-    return AdjustmentError(message)
+    return failure_of_core(kind, message)

@@ -88,7 +88,7 @@ class GroupSum:
 
     @property
     def factor(self) -> float:
-        """Ratio of residuals to their expectation by sd; NaN without redundancy."""
+        """Ratio of residuals to their expectation by standard deviations; NaN without redundancy."""
         return math.sqrt(self.squares / self.redundancy) if self.redundancy > 0 else math.nan
 
 
@@ -123,7 +123,7 @@ class GroupSums(Documented, Brief):
         return found
 
     def groups_table(self) -> Table:
-        """Return the declared table: sums, factors of deviations, probabilities."""
+        """Return the declared table: sums, factors of standard deviations, probabilities of sums."""
         groups, tests = self.groups, [each.test for each in self.groups]
         sides = [
             (math.nan, math.nan) if test is None else (test.probability_below, test.probability_above)

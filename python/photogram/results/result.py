@@ -149,7 +149,7 @@ class Result(OnFilm, AdjustedNetwork):
         messages: list[Message],
         freedom: float,
     ) -> Self:
-        """Return the result of a core solution; `freedom` is of the unit variance."""
+        """Return the result of a core solution; `freedom`: degrees of freedom of the unit variance."""
         variance = solution.variance_of_unit_weight
         scale = 1.0 if variance is None else variance
         return cls.taken_over(
@@ -429,7 +429,7 @@ class Result(OnFilm, AdjustedNetwork):
         return photogram.statement(self, **asked)
 
     def check_table(self) -> pd.DataFrame:
-        """Return check points as a data frame: adjusted minus given, deviations."""
+        """Return check points as a data frame: adjusted minus given coordinates, standard deviations."""
         return self._table("check")
 
     @property

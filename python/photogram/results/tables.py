@@ -35,7 +35,7 @@ _EITHER = "standard deviation that was given, or is assumed: {}"
 
 
 def check_points(result: Result) -> list[Quantity]:
-    """Return check points: adjusted minus given, deviations, tests."""
+    """Return check points: adjusted minus given, standard deviations of both, tests with probabilities."""
     checks = result.check_points
     statistic, p = checks.statistics
     return [

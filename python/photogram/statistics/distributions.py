@@ -31,14 +31,14 @@ LEVEL = 0.05  # Level of the global test, and of all single tests together
 
 
 def critical_normal(level: float) -> float:
-    """Return the two-sided critical value of a standard normal variable."""
+    """Return the two-sided critical value of a standard normal variable for a level."""
     from statistics import NormalDist  # takes long to import
 
     return -NormalDist().inv_cdf(probability("level", level) / 2)
 
 
 def critical_student(level: float, dof: float) -> float:
-    """Return the two-sided critical value of Student's variable.
+    """Return the two-sided critical value of Student's variable for a level.
 
     The normal distribution is used if `dof` is infinite. Infinite if `dof` is not positive.
     """

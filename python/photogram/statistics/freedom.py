@@ -26,7 +26,7 @@ ROUNDING = 1e-9
 
 
 def effective_freedom(covariance: ArrayLike) -> float:
-    """Return the freedom of a sum of correlated squares: (tr C)^2 / tr C^2.
+    """Return the degrees of freedom of a sum of correlated squares: (tr C)^2 / tr C^2.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[fl
 
 
 def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
-    """Return the freedom of a combined uncertainty, u^4 / sum(u_k^4 / nu_k) (G.4).
+    """Return the degrees of freedom of a combined uncertainty, u^4 / sum(u_k^4 / nu_k) (JCGM 100:2008, G.4).
 
     Parameters
     ----------

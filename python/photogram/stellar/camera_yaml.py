@@ -96,7 +96,7 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
         float(_member(content, "image_height", "image_Height", "height").whole(1)),
     )
     if values[0, 1] or not np.array_equal(values[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
-        raise matrix.error(phrase("stars.camera-matrix"))
+        raise matrix.error(phrase("stars.camera-matrix", value=str(values.tolist())))
     fisheye = _is_fisheye(content)
     terms = _FISHEYE if fisheye else _BROWN
     if any(coefficients[len(terms) :]):

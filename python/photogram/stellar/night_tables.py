@@ -157,7 +157,7 @@ def _exposure(result: CalibratedNight) -> Quantity:
 
 
 def images(result: CalibratedNight) -> Table:
-    """Return the used images with stars, residuals, tests and star probabilities."""
+    """Return the used images: exposures, stars, pixels, residuals, tests and star probabilities."""
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
     names, likely = np.array(result.names, dtype=object)[found.exposures], result.star_probabilities
     columns = [

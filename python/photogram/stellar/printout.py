@@ -232,7 +232,7 @@ def _row(values: Sequence[float] | Floats, width: int) -> str:
 
 
 def plate_list(result: Result) -> bytes:
-    """Return plate coordinates and residuals (m) in the format of option 11."""
+    """Return plate coordinates and residuals (m) in the format of option 11: 4(1X,E14.8), I6, problem."""
     number = result.problem.labels.get("problem", "")
     rows = zip(result.problem.image_xy, result.solved.residuals, result.problem.image_points, strict=True)
     lines = [

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import AdjustmentError, InputError
+from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import unknown_name
 from photogram.show.methods import Brief
@@ -385,5 +385,5 @@ def failure(problem: Problem, error: _photocore.StellarError) -> AdjustmentError
         return singular(indices)
     codes = {"undetermined stars": "stars.error-2", "not finite": "stars.not-visible"}
     if kind not in codes:
-        return AdjustmentError(message)
+        return failure_of_core(kind, message)
     return AdjustmentError(phrase(codes[kind], names=[problem.star_ids[i] for i in indices]))

@@ -61,7 +61,7 @@ def _of_toml(path: Path) -> Board:
     fields |= {key: _number(file, key) for key in _LENGTHS if key in content}
     both = [key for key in ("spacing_x", "spacing_y") if key in content]
     if both and ("spacing" in content or len(both) == 1):
-        raise file.error(both[0], phrase("targets.spacings"))
+        raise file.error(both[0], phrase("targets.spacings", names=both))
     if both:
         fields["spacing"] = (_number(file, "spacing_x"), _number(file, "spacing_y"))
     elif "spacing" in content:

@@ -175,7 +175,7 @@ def convert_lens(
     Parameters
     ----------
     source
-        Camera with pixel origin at the centre of the first pixel.
+        Camera; pixels count from 0 at the centre of the first pixel.
     model
         Model name from `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`.
     size

@@ -63,7 +63,7 @@ def nominal_camera(
         unknown or cannot represent the camera.
     """
     if (field is None) == (focal is None):
-        raise InputError(phrase("targets.nominal"))
+        raise InputError(phrase("targets.nominal", count=2 * (field is not None)))
     if field is None:
         focal = number("focal", focal)
         if not 0 < focal < math.inf:

@@ -30,7 +30,7 @@ from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 PREFIX = "LENSMODEL_"
 CORE = ("fx", "fy", "cx", "cy")
@@ -90,8 +90,8 @@ def read_model(path: Path) -> Calibration:
         raise InputError(phrase("targets.mrcal-no-corners", key=KEY), file=path)
     try:
         archive = base64.b85decode(packed)
-    except ValueError as error:
-        raise InputError(phrase("targets.mrcal-damaged", key=KEY, reason=str(error)), file=path) from None
+    except ValueError:
+        raise InputError(phrase("targets.mrcal-damaged", key=KEY), file=path) from None
     arrays = read_arrays(path, archive)
     for name in ("observations_point", "observations_point_triangulated"):
         if name in arrays:
@@ -137,10 +137,8 @@ def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
         camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)
         width, height = map(int, content["imagersize"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        message = phrase("targets.mrcal-no-model", reason=repr(error))
-        if isinstance(error, InputError) and error.phrase:
-            message = error.phrase
-        raise InputError(message, file=path) from None
+        own = error.phrase if isinstance(error, InputError) else None
+        raise InputError(own or phrase("targets.mrcal-no-model"), file=path) from None
     return camera, (width, height)
 
 
@@ -150,15 +148,10 @@ def _content(path: Path) -> dict[str, Any]:
         # Literals only: names, calls and operations are rejected.
         content: Any = ast.literal_eval(text.lstrip())
     except (ValueError, SyntaxError, MemoryError, RecursionError) as error:
-        reason: str | Phrase = phrase("targets.mrcal-code")
-        record = None
-        if isinstance(error, SyntaxError):
-            reason, record = error.msg, error.lineno
-        message = phrase("targets.mrcal-dictionary", reason=reason)
-        raise InputError(message, file=path, record=record) from None
+        record = error.lineno if isinstance(error, SyntaxError) else None
+        raise InputError(phrase("targets.mrcal-dictionary"), file=path, record=record) from None
     if not isinstance(content, dict) or "lensmodel" not in content:
-        missing = phrase("error.missing", name="lensmodel")
-        raise InputError(phrase("targets.mrcal-no-model", reason=missing), file=path)
+        raise InputError(phrase("targets.mrcal-no-model"), file=path)
     return content
 
 

@@ -105,9 +105,8 @@ def _array(path: Path, name: str, content: bytes) -> NDArray[Any]:
         version = np.lib.format.read_magic(stream)
         shape, by_columns, kind = _HEADERS[version](stream)
         announced = math.prod(shape) * kind.itemsize
-    except Exception as error:  # any error of the parser for a damaged header
-        reason = f"{type(error).__name__}: {error}"
-        raise InputError(phrase("targets.array-header", name=name, reason=reason), file=path) from None
+    except Exception:  # any error of the parser for a damaged header
+        raise InputError(phrase("targets.array-header", name=name), file=path) from None
     if kind.hasobject:
         raise InputError(phrase("targets.array-objects", name=name), file=path)
     actual = len(content) - stream.tell()

@@ -91,8 +91,9 @@ class Start(Valued, Brief):
             self._set(name, shaped(name, getattr(self, name), (count,)))
         for name, shape in (("sd_sensors", (count, 6)), ("sd_bend", (2,))):
             self._set(name, shaped(name, getattr(self, name), shape))
-            if not (np.asarray(getattr(self, name)) > 0).all():
-                raise InputError(phrase("targets.free-sd", name=name))
+            values = np.asarray(getattr(self, name))
+            for value in values[~(values > 0)].tolist():
+                raise InputError(phrase("targets.free-sd", name=name, value=value))
         if self.sync == "offset":
             self._set_motion()
 

@@ -60,9 +60,9 @@ def test_other_commands_know_networks(given, tmp_path):
     [
         (
             ("--jigsaw", "CAMSOLV=all"),
-            "the setting of jigsaw 'CAMSOLV' is unknown; the nearest name is 'CAMSOLVE'",
+            "the setting of jigsaw 'CAMSOLV' is unknown; use an existing name, such as the nearest, 'CAMSOLVE'",
         ),
-        (("--jigsaw", "nowhere.txt"), "nowhere.txt: the file cannot be read"),
+        (("--jigsaw", "nowhere.txt"), "nowhere.txt: the file must be readable"),
     ],
 )
 def test_wrong_settings_end_the_command(given, words, sentence):

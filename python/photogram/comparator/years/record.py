@@ -209,7 +209,8 @@ def _case(members: Any, placed: Any, counts: Mapping[tuple[int, int], int]) -> R
     means = np.array(members["means_um"], dtype=float)
     if means.shape != (len(points), 2) or not np.isfinite(means).all():
         name = phrase("comparators.case", case=int(members["case"]))
-        raise InputError(phrase("error.at", what=name, message=phrase("comparators.grid-shape")))
+        wrong = phrase("comparators.grid-shape", count=len(points), shape=str(means.shape))
+        raise InputError(phrase("error.at", what=name, message=wrong))
     return RecordedCase(
         number=int(members["case"]),
         operator=int(members["operator"]),

@@ -298,7 +298,7 @@ def _start(instrument: Tree, keywords: Tree) -> float:
             try:
                 return float(struct.unpack("<d", bytes.fromhex(str(value.value)))[0])
             except (ValueError, struct.error):
-                raise value.error(phrase("csm.time")) from None
+                raise value.error(phrase("csm.time", value=str(value.value))) from None
     raise keywords.error(phrase("csm.clock"))
 
 

@@ -63,7 +63,7 @@ def read_network(path: Path) -> ControlNetwork:
     elif kind == _TEXT:
         network = _text(data, path)
     else:
-        raise InputError(phrase("isis.network"), file=path)
+        raise InputError(phrase("isis.network", value=str(kind)), file=path)
     _check_names(network.points.ids, path)
     return network
 

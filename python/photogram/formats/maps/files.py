@@ -98,7 +98,7 @@ def check_map(path: Path) -> str:
     """Return the suffix of a map file; reject other suffixes."""
     suffix = path.suffix.lower()
     if suffix != GEOPACKAGE and suffix not in GEOJSON:
-        raise InputError(phrase("maps.suffix"), file=path)
+        raise InputError(phrase("maps.suffix", value=suffix), file=path)
     return suffix
 
 

@@ -174,7 +174,7 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
 
     frame = project.frame
     if project.block.linear_unit != "m":
-        raise InputError(phrase("photos.metres"), file=project.path)
+        raise InputError(phrase("photos.metres", unit=project.block.linear_unit), file=project.path)
     if not known.systems[0]:
         if frame.kind == "geographic":
             raise InputError(phrase("photos.crs", option=GNSS_CRS))
@@ -301,7 +301,7 @@ class Located:
         return xyz, turned, remarks
 
     def geographic(self) -> tuple[Floats, Floats]:
-        """Return (n, 3) longitudes, latitudes (deg), ellipsoidal heights, and sd.
+        """Return (n, 3) longitudes, latitudes (deg), ellipsoidal heights (WGS 84), and (n, 3) sd.
 
         Positions that are already in this system are not changed.
         """

@@ -165,7 +165,7 @@ class _WithoutDoctype(ElementTree.TreeBuilder):
     """An XML tree builder that rejects document types, and so entities."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise ValueError("has a <!DOCTYPE, which no packet needs: it is not read")
+        raise ValueError("the <!DOCTYPE must be removed")
 
 
 def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:

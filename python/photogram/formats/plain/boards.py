@@ -28,7 +28,7 @@ def read_boards(tables: Tables) -> dict[str, Board]:
     """Read boards of columns and rows; others use control points."""
     table = tables.rows("boards")
     if table.count > 1:
-        raise table.error(1, phrase("plain.several-boards"))
+        raise table.error(1, phrase("plain.several-boards", count=table.count))
     return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
 
 

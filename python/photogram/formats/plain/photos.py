@@ -122,7 +122,7 @@ def _attitude_weights(
     sd = table.vectors(columns, math.inf, infinite=True, read=tables.angle)
     if (sd < 0).any():
         row = int(np.argwhere(sd < 0)[0][0])
-        raise table.error(row, phrase("plain.negative-angle-sd"))
+        raise table.error(row, phrase("plain.negative-angle-sd", value=float(sd[row].min())))
     unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
     if unknown.any():
         raise table.error(int(np.flatnonzero(unknown)[0]), phrase("plain.no-angles"))

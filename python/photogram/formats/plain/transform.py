@@ -40,7 +40,7 @@ class Transform:
         from photogram.formats.crs import to_frame
 
         if self.settings.length != "m":
-            raise InputError(phrase("plain.crs-unit"), file=self.settings.path)
+            raise InputError(phrase("plain.crs-unit", unit=self.settings.length), file=self.settings.path)
         partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
         if partly.any():
             row = int(np.flatnonzero(partly)[0])

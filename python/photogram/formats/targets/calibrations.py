@@ -254,8 +254,8 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
         return board.replace(points=block.point_positions, point_names=block.point_ids)
     far = np.abs(board.places[number] - block.point_positions)
     if not far.max(initial=0.0) < NEAR * min(board.pitch):
-        row = int(np.argmax(far.max(axis=1)))
-        raise InputError(phrase("board-project.position", point=block.point_ids[row]))
+        fields = {"point": block.point_ids[int(np.argmax(far.max(axis=1)))], "difference": float(far.max())}
+        raise InputError(phrase("board-project.position", **fields))
     if board.shape != "points":
         return board
     sd = np.zeros((len(board.places), 3))

@@ -49,7 +49,7 @@ class Texts(Words):
                 fields = {"field": sorted(strange)[0], "names": sorted(known)}
                 raise InputError(phrase("request.field", code=key, **fields))
             if any(form or conversion for *_, form, conversion in Formatter().parse(sentence)):
-                raise InputError(phrase("request.form", code=key))
+                raise InputError(phrase("request.form", code=key, value=sentence))
         super().__init__(language, own)
         own = table_of(language)
         families = {key.partition(".")[0] for key in own}  # Other families do not belong to statements

@@ -87,7 +87,7 @@ impl Form {
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum FeatureError {
     /// Fewer points than the form needs.
-    #[error("a {} takes {} points, not {given}", .form.name(), .form.needed())]
+    #[error("a {} takes {} points, not {given}; add points", .form.name(), .form.needed())]
     TooFew {
         /// Requested form.
         form: Form,
@@ -95,7 +95,7 @@ pub enum FeatureError {
         given: usize,
     },
     /// Coordinates or covariances that are not finite.
-    #[error("coordinates and covariances of the points are not all known")]
+    #[error("coordinates and covariances of the points must all be known; add the missing ones")]
     NotFinite,
     /// Covariance matrix for another number of points.
     #[error("{points} points have {} x {} covariances, not {rows} x {columns}", 3 * points, 3 * points)]
@@ -108,14 +108,14 @@ pub enum FeatureError {
         columns: usize,
     },
     /// Distance of two coincident points.
-    #[error("the two points are in one place: their distance has no direction")]
+    #[error("the two points are in one place: a direction requires two places, so choose other points")]
     Coincident,
     /// The points do not determine the form.
-    #[error("the points do not determine a {}: they are {}, or nearly so", .0.name(), .0.degenerate())]
+    #[error("the points do not determine a {}: they are {}, or nearly so; add points elsewhere", .0.name(), .0.degenerate())]
     Undetermined(Form),
     /// The points do not determine the form within their standard deviations.
     #[error(
-        "the points determine a {} too badly ({what} to {:.2} of itself): they are nearly {}",
+        "the points determine a {} too badly ({what} to {:.2} of itself): they are nearly {}; add points elsewhere",
         .form.name(), .sd, .form.degenerate()
     )]
     Loose {
@@ -127,9 +127,9 @@ pub enum FeatureError {
         sd: f64,
     },
     /// Several features fit equally well.
-    #[error("more than one {} fits the points as well: take points in other places", .0.name())]
+    #[error("more than one {} fits the points as well: add points elsewhere", .0.name())]
     Ambiguous(Form),
     /// The iteration does not converge.
-    #[error("no {} is found that fits the points best", .0.name())]
+    #[error("the points must fit one {}, but the iteration does not converge; check them", .0.name())]
     NotAtRest(Form),
 }
