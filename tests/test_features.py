@@ -213,7 +213,7 @@ def test_a_project_declares_them(run, tmp_path):
         ('bore = { circle = ["nobody-*"] }', "[features] bore: the point 'nobody-*' is unknown"),
         (
             'bore = { circel = ["hole-1"] }',
-            "[features] bore: the kind of features 'circel' is unknown; use an existing name, such as the nearest, 'circle'",
+            "the kind of features 'circel' is unknown; use an existing name, such as the nearest, 'circle'",
         ),
         ('bore = "hole-1"', "[features] bore: must have the form"),
         ("bore = { circle = 3 }", "[features.bore] circle: must be a list"),

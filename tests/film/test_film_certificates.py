@@ -259,7 +259,7 @@ def test_what_a_calibration_says_is_not_said_beside_it(tmp_path: Path) -> None:
     (tmp_path / "scanners.csv").write_text(
         text.replace("calibration\n", "calibration,Sx\n").replace("json\n", "json,1.0\n")
     )
-    with pytest.raises(InputError, match=r"column sx: this value must be in the calibration of the scanner scan1"):
+    with pytest.raises(InputError, match=r"column sx: this value must be in the calibration of the scanner"):
         read(tmp_path)
 
 

@@ -110,7 +110,7 @@ def test_halves_are_fitted_before(tmp_path: Path) -> None:
     ("row", "message"),
     [
         ({"seam_column": "6000", "seam_row": "6000"}, "either seam_column or seam_row"),
-        ({"seam_column": "6000", "film": "", "scanner": "", "mirrored": ""}, "has a seam and must have a film"),
+        ({"seam_column": "6000", "film": "", "scanner": "", "mirrored": ""}, "a seam and must have a film"),
     ],
 )
 def test_seams_that_cannot_be_are_refused(tmp_path: Path, row: dict[str, str], message: str) -> None:

@@ -60,7 +60,7 @@ def test_other_commands_know_networks(given, tmp_path):
     [
         (
             ("--jigsaw", "CAMSOLV=all"),
-            "the setting of jigsaw 'CAMSOLV' is unknown; use an existing name, such as the nearest, 'CAMSOLVE'",
+            "'CAMSOLV' is unknown; use an existing name, such as the nearest, 'CAMSOLVE'",
         ),
         (("--jigsaw", "nowhere.txt"), "nowhere.txt: the file must be readable"),
     ],
