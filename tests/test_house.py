@@ -110,7 +110,6 @@ def test_arrows_point_down():
 
 CRATE = Path(__file__).parents[1] / "crates" / "photocore" / "src"
 KNOWS = {
-    "programs": {"network", "adjustment", "normals", "geometry"},
     "network": {"adjustment", "normals", "geometry"},
     "adjustment": {"normals"},
     "normals": set(),
@@ -131,7 +130,7 @@ def test_floors_of_the_crate():
             )
             assert named <= below | {folder}, f"{path.relative_to(CRATE)} knows {named - below - {folder}}"
             arrows |= {(folder, other) for other in named - {folder}}
-    assert arrows >= {("programs", "network"), ("network", "adjustment"), ("adjustment", "normals")}
+    assert arrows >= {("network", "adjustment"), ("adjustment", "normals")}
 
 
 def _inside(folder):
@@ -140,7 +139,7 @@ def _inside(folder):
     return {file: {other for other in arrows if other in graph} for file, arrows in graph.items()}
 
 
-@pytest.mark.parametrize("folder", ["normals", "adjustment", "network", "geometry", "programs"])
+@pytest.mark.parametrize("folder", ["normals", "adjustment", "network", "geometry"])
 def test_files_of_the_engine_name_each_other_in_no_circle(folder):
     inside = _inside(folder)
     assert len(inside) > 20

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parent
-CORE = TESTS.parents[1] / "crates" / "photocore" / "tests"
+CORE = TESTS.parents[1] / "crates" / "photogram-programs" / "tests"
 
 FEATURES = {
     "hour-angle and standard coordinates both ways": [

@@ -2,7 +2,7 @@
 //!
 //! The crate has four layers; each layer uses only the layers below it:
 //!
-//! * [`network`]: simultaneous adjustment of cameras, photos, points and observations, and [`programs`]: other photogrammetric models;
+//! * [`network`]: simultaneous adjustment of cameras, photos, points and observations;
 //! * [`adjustment`]: iteration, weights, convergence and statistics, independent of photogrammetry;
 //! * [`normals`]: ordering, reduction, factorisation, solution and selected inverse of block normal equations;
 //! * [`geometry`]: poses, cameras, projection, ellipsoid and refraction as pure functions with partial derivatives.
@@ -14,9 +14,18 @@ pub mod geometry;
 pub mod network;
 pub mod normals;
 mod parallel;
-pub mod programs;
 mod sorting;
 mod threads;
+
+/// Functions that other crates of this project use; they may change at any time.
+#[doc(hidden)]
+pub mod internal {
+    pub use crate::adjustment::go_on;
+    pub use crate::geometry::principal_axes;
+    pub use crate::network::{median, meet};
+    pub use crate::parallel::map;
+    pub use crate::sorting::{order, sort_by};
+}
 
 pub use nalgebra;
 pub use threads::{Stopped, Threads};

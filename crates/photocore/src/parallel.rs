@@ -59,7 +59,7 @@ pub(crate) fn by_parts<T: Send>(
 }
 
 /// Maps every index below `count`, at least `at_least` per thread: for work of nearly equal cost.
-pub(crate) fn map<T: Send>(count: usize, at_least: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub fn map<T: Send>(count: usize, at_least: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     by_parts(count, at_least, &|numbers| numbers.map(&of).collect())
 }
 

@@ -11,8 +11,6 @@ use photocore::adjustment::Status;
 mod block;
 #[path = "../examples/collection.rs"]
 mod collection;
-#[path = "../examples/comparator.rs"]
-mod comparator;
 #[path = "../examples/scale_bar.rs"]
 mod scale_bar;
 
@@ -31,16 +29,6 @@ fn the_stations_of_the_block_come_out_within_their_standard_deviations() {
         }
     }
     block::main().unwrap();
-}
-
-#[test]
-fn the_comparator_comes_out_within_its_standard_deviations() {
-    let solution = comparator::adjusted().unwrap();
-    let ([x, y], angle) = comparator::TRUTH;
-    for (k, truth) in [x, y, angle].into_iter().enumerate() {
-        assert!((solution.comparator[k] - truth).abs() < 4.0 * solution.comparator_cofactors[4 * k].sqrt());
-    }
-    comparator::main().unwrap();
 }
 
 #[test]

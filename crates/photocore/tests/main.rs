@@ -11,11 +11,8 @@ mod camera_models;
 mod cameras;
 mod close_range;
 mod collection;
-mod comparator;
 mod cut;
 mod examples;
-mod features;
-mod first_values;
 mod forward;
 mod free_networks;
 mod free_unknowns;
@@ -27,19 +24,14 @@ mod normals;
 mod observations;
 mod parts;
 mod refraction;
-mod relative_orientation;
-mod resection;
 mod shared_cameras;
-mod similarity;
 mod slow_steps;
 mod splined_camera;
-mod stellar;
-mod stellar_dense;
 mod ties;
 mod trajectories;
 
 /// This file, and separate programs: a table for the page, global threads of the process.
-const OTHERS: [&str; 3] = ["main", "nist", "own_threads"];
+const OTHERS: [&str; 2] = ["main", "nist"];
 
 #[test]
 fn every_file_is_part_of_the_program() {

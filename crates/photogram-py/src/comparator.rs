@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photocore::adjustment::{Method, Options, Status, Stop};
-use photocore::programs::comparator::{
+use photogram_programs::comparator::{
     Basis, Calibration, CalibrationError, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
 use pyo3::create_exception;

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use photocore::geometry::Vector3;
-use photocore::programs::features::{Form, Measured, distance, measure};
+use photogram_programs::features::{Form, Measured, distance, measure};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

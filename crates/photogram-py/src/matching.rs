@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 use numpy::PyArray1;
 use photocore::geometry::nearest;
-use photocore::programs::stellar::{Agreement, Similarity, best_voted, hypotheses};
+use photogram_programs::stellar::{Agreement, Similarity, best_voted, hypotheses};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

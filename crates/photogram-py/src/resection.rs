@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use photocore::adjustment::{Method, Options, Published, Stop};
-use photocore::programs::resection::{
+use photogram_programs::resection::{
     AdjustedControl, AdjustedImage, ControlPoint, Degeneracy, Known, Partials, Pose, Resection,
     ResectionError as Failure, Solution,
 };

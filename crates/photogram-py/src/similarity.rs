@@ -1,7 +1,7 @@
 //! Absolute orientation; the documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3};
-use photocore::programs::similarity::{
+use photogram_programs::similarity::{
     AdjustedStation, Matrix7, Method, Options, Parameters, Similarity, SimilarityError as Failure, Solution,
     Start, Started, Station, Trace, gauss_crout as crout, orient_on,
 };

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArrayMethods};
 use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
 use photocore::geometry::{Air, Camera as Lens, Station, pointing, pointing_angles};
-use photocore::programs::stellar::{
+use photogram_programs::stellar::{
     Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, INTERIOR, Image, Kind, Observations,
     Options, Rows, Star, StellarError as Failure, Tested, Tolerances, Weights,
 };

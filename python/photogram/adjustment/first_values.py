@@ -1,6 +1,6 @@
 """Initial values: poses of photos with unknown position or attitude, from all other data.
 
-The core performs the search (`photocore::programs::first_values`). `docs/first-values.md` describes its
+The core performs the search (`photogram_programs::first_values`). `docs/first-values.md` describes its
 steps.
 """
 

@@ -1,6 +1,6 @@
 """Rigorous joint adjustment of cases, comparator, polynomials and grid, with covariances.
 
-The engine (`photocore::programs::comparator`) uses grid points as local unknowns, weighted by the standard
+The engine (`photogram_programs::comparator`) uses grid points as local unknowns, weighted by the standard
 deviation of the grid. Cases are retained unknowns, and the comparator is the border. The variance of a mean
 is the random comparator variance plus the pointing variance over the number of pointings. The random part,
 and an unknown grid variance, are estimated from the residuals.

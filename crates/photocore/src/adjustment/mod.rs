@@ -110,7 +110,8 @@ pub use part::{PartError, PartOptions};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
-pub(crate) use run::go_on;
+#[doc(hidden)]
+pub use run::go_on;
 pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum};
 pub(crate) use statistics::weighted;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};

@@ -19,7 +19,7 @@ use crate::{Stopped, Threads};
 pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
 
 /// Progress callback that never stops the work.
-pub(crate) fn go_on(_: Event) -> ControlFlow<()> {
+pub fn go_on(_: Event) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 

@@ -11,7 +11,7 @@ pub type Matrix3 = nalgebra::Matrix3<f64>;
 const SWEEPS: usize = 1000;
 
 /// Returns the eigenvalues of a symmetric matrix in descending order and its unit eigenvectors as columns; None if it is not finite.
-pub(crate) fn principal_axes(matrix: &Matrix3) -> Option<(Vector3, Matrix3)> {
+pub fn principal_axes(matrix: &Matrix3) -> Option<(Vector3, Matrix3)> {
     if !matrix.iter().all(|element| element.is_finite()) {
         return None;
     }

@@ -56,7 +56,8 @@ pub mod trajectory;
 
 pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
 pub use attitude::{AttitudeNumbers, RotationSense};
-pub(crate) use axes::principal_axes;
+#[doc(hidden)]
+pub use axes::principal_axes;
 pub use axes::{Matrix3, Vector3};
 pub use camera::{Bal, Brown, Camera, CameraModel, Image, Perspective, Unit};
 pub use ellipsoid::{Ellipsoid, local_vertical};

@@ -104,8 +104,10 @@ pub use covariance::{Covariances, Of};
 pub use error::{Coarse, Combination, NetworkError, PosePart};
 pub use group_tests::Tests;
 pub use groups::Groups;
-pub(crate) use intersection::meet;
-pub(crate) use median::median;
+#[doc(hidden)]
+pub use intersection::meet;
+#[doc(hidden)]
+pub use median::median;
 pub use mounts::{Mount, Trajectory};
 pub use node::{FormedNode, Node, NodePrediction};
 pub use node_datum::{AdjustedInParts, UnknownName};

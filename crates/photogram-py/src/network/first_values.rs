@@ -2,7 +2,7 @@
 
 use numpy::PyArray1;
 use photocore::geometry::{Matrix3, Pose, Vector3};
-use photocore::programs::first_values::{
+use photogram_programs::first_values::{
     FirstValues, FirstValuesError, Found, Frame, KnownPhoto, KnownPoint, Missing, Sighting, Source,
 };
 use pyo3::exceptions::PyValueError;

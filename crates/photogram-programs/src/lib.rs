@@ -1,0 +1,10 @@
+//! Photogrammetric models other than the network, and published algorithms, on the engine of [`photocore`].
+
+pub mod comparator;
+pub mod features;
+pub mod first_values;
+pub mod relative_orientation;
+pub mod resection;
+mod sampling;
+pub mod similarity;
+pub mod stellar;

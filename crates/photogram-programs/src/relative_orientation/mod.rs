@@ -1,0 +1,102 @@
+//! Relative orientation: the pose of one photo in the axes of another, from the rays of common points.
+//!
+//! The first photo is at the origin, its attitude is the identity, and the base has length 1. Samples of five points give essential
+//! matrices ([`five_points`]). Samples of four points give the poses of a homography, the alternative for plane scenes. The score of a pose
+//! is the largest angular misfit of the best two fifths of the pairs of rays; pairs that intersect behind a photo (u3 > 0) count as
+//! misfits. Least squares follows in `first_values`.
+//!
+//! ```
+//! use photocore::geometry::{Pose, Vector3, rotation};
+//! use photogram_programs::relative_orientation::relative_orientation;
+//!
+//! let second = Pose { position: Vector3::new(1.0, 0.0, 0.0), attitude: rotation([0.1, -0.2, 0.3]).transpose() };
+//! let point = |k: usize| Vector3::new((k % 4) as f64 - 1.0, (k / 4) as f64 - 1.0, -4.0 - (k * k % 5) as f64);
+//! let pairs: Vec<[Vector3; 2]> =
+//!     (0..12).map(point).map(|p| [p.normalize(), second.sight(&p).normalize()]).collect();
+//! let best = &relative_orientation(&pairs)[0];
+//! assert!((best.oriented.base - second.position).norm() < 1e-6);
+//! assert!((best.oriented.attitude - second.attitude).norm() < 1e-6);
+//! ```
+
+mod five_points;
+mod oriented;
+
+pub use five_points::{five_points, over_plane};
+pub use oriented::Oriented;
+
+use super::sampling::Samples;
+use photocore::geometry::{Matrix3, Vector3};
+use photocore::internal::sort_by;
+
+/// Number of samples: if a third of the pairs is wrong, one sample in eight is free of errors.
+const SAMPLES: usize = 80;
+/// Maximum number of pairs for the score of a pose, evenly distributed.
+const JUDGES: usize = 120;
+/// Maximum ratio of scores of an alternative and the best pose.
+const RIVAL: f64 = 3.0;
+/// Maximum number of poses returned.
+const MOST: usize = 3;
+/// Maximum number of steps of a decomposition.
+const STEPS: usize = 1000;
+
+/// Pose and its score.
+#[derive(Debug, Clone, Copy)]
+pub struct Candidate {
+    /// Pose.
+    pub oriented: Oriented,
+    /// Score: largest misfit of the best two fifths of the pairs of rays, radians.
+    pub misfit: f64,
+}
+
+/// Returns the poses of the second photo that agree with pairs of unit rays, each in the axes of its photo: the best and similarly good
+/// alternatives (two over a plane). The result is empty for fewer than six pairs, or if every pose has half of them behind.
+pub fn relative_orientation(pairs: &[[Vector3; 2]]) -> Vec<Candidate> {
+    if pairs.len() < 6 {
+        return vec![];
+    }
+    let step = pairs.len().div_ceil(JUDGES);
+    let judges: Vec<[Vector3; 2]> = pairs.iter().step_by(step).copied().collect();
+    let mut samples = Samples::new(pairs.len());
+    let mut found: Vec<Candidate> = Vec::new();
+    for _ in 0..SAMPLES {
+        let of_five = samples.draw::<5>().map(|k| pairs[k]);
+        let of_four = samples.draw::<4>().map(|k| pairs[k]);
+        let spatial = five_points(&of_five).into_iter().filter_map(|e| in_front(&e, &of_five));
+        let all: Vec<Oriented> = spatial.chain(over_plane(&of_four)).collect();
+        let judged = all.into_iter().map(|oriented| Candidate { oriented, misfit: oriented.score(&judges) });
+        found.extend(judged.filter(|candidate| candidate.misfit < 0.5));
+        found = rivals(found);
+    }
+    found
+}
+
+/// Returns the best pose, and different poses that fit nearly as well.
+fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
+    sort_by(&mut found, &|a, b| a.misfit.total_cmp(&b.misfit));
+    let Some(best) = found.first().map(|candidate| candidate.misfit) else { return found };
+    let mut retained: Vec<Candidate> = Vec::new();
+    for candidate in found {
+        let another = !retained.iter().any(|other| other.oriented.is_like(&candidate.oriented));
+        if another && retained.len() < MOST && candidate.misfit <= RIVAL * best {
+            retained.push(candidate);
+        }
+    }
+    retained
+}
+
+/// Returns the pose with most pairs in front of both photos, among the four poses of an essential matrix E = [b]x A.
+fn in_front(e: &Matrix3, pairs: &[[Vector3; 2]]) -> Option<Oriented> {
+    let svd = e.try_svd(true, true, f64::EPSILON, STEPS)?;
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let upright = |m: Matrix3| if m.determinant() < 0.0 { -m } else { m };
+    let turn = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let base = Vector3::from(u.column(2));
+    let all = [turn, turn.transpose()].into_iter().flat_map(|turn| {
+        let attitude = upright(u * turn * v_t);
+        [base, -base].map(|base| Oriented { base, attitude })
+    });
+    let count = |oriented: &Oriented| {
+        pairs.iter().filter(|pair| oriented.distances(pair).iter().all(|&distance| distance > 0.0)).count()
+    };
+    all.max_by_key(count)
+}
