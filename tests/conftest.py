@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import functools
 from pathlib import Path
 
 import pytest
+import typer.testing
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
@@ -17,6 +19,9 @@ from photogram.cli import app
 # A busy machine is slow; what is slow by itself shows in the durations of the suite.
 settings.register_profile("photogram", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("photogram")
+
+# The runner of typer builds all commands for every run, which takes more time than most commands need.
+typer.testing._get_command = functools.cache(typer.testing._get_command)
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ from fuzz.programs import PROGRAMS
 from fuzz.sound import SOUND
 
 ROOT = Path(__file__).parents[2]
-INPUTS = 1500
+INPUTS = 700
 
 
 def test_damaged_inputs_end_in_good_order(tmp_path):

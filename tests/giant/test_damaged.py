@@ -15,8 +15,8 @@ from photogram.giant.files import NAMES, to_bytes
 from photogram.io.files import read_text
 from photogram.io.writing import write_whole
 
-PROJECTS = 840
-RUNS = 8
+PROJECTS = 600
+RUNS = 5
 ERROR_AT = re.compile(r"error: (?P<file>.+?)(, record (?P<record>\d+))?: ")
 WRITTEN = {"RESTART", "report.txt"}
 NOT_CONVERGED = "Not converged"
