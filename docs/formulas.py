@@ -19,6 +19,9 @@ from math_core import LatexError, LatexToMathML
 FORMULA = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
 LINES = re.compile(r'(<div class="language-(\w+) highlight")(>.*?</div>)', re.DOTALL)
 NAMED = re.compile(r"&(?!amp;|lt;|gt;|quot;)[a-zA-Z]+;")
+CODE = re.compile(r"(?<=<code>)[^<]+(?=</code>)")
+OPTION = re.compile(r"(?<![^\s>])--?[a-z][\w-]*(?![^<]*>)")
+ROW = re.compile(r'<span class="go">(?=.*\S  +\S.*\S  +\S)(.{1,138})</span>')
 MARKS = re.compile(r"\\[(\[](.*)\\[)\]]", re.DOTALL)
 PRIMES = ("′", "″", "‴")
 STRUT = {"height": "0.8em", "depth": "0.2em"}
@@ -104,18 +107,36 @@ def as_mathml(latex: str, displayed: bool) -> str:
     return f'<div class="formula" style="--width: {width(formula):.0f}">{marked}</div>'
 
 
+def _text(html: str) -> str:
+    """Return the text of a line of HTML."""
+    return unescape(re.sub(r"<[^>]*>", "", html))
+
+
+def unbroken(html: str) -> str:
+    """Return code whose options, such as `--example`, are not divided at the end of a line."""
+    return OPTION.sub(r'<span class="option">\g<0></span>', html)
+
+
 def measured(lines: re.Match[str]) -> str:
     """Return a block of code with the number of characters of its longest line, by which it has its size.
 
-    Lines of a terminal that are longer than those of a page are commands, or sentences: they are wrapped.
+    Lines of a terminal that are longer than those of a page are commands or sentences, which are wrapped, or
+    rows of tables, which are not.
     """
-    text = unescape(re.sub(r"<[^>]*>", "", lines[3][1:]))
-    lengths = [len(line) for line in text.splitlines() if lines[2] != "console" or len(line) <= WRAPPED]
-    return f'{lines[1]} style="--characters: {max(lengths, default=1)}"{lines[3]}'
+    content = lines[3]
+    if lines[2] in ("console", "sh"):
+        content = unbroken(ROW.sub(r'<span class="go row">\1</span>', content))
+    rows = [
+        line
+        for line in content.removeprefix(">").splitlines()
+        if lines[2] != "console" or "go row" in line or len(_text(line)) <= WRAPPED
+    ]
+    longest = max((len(_text(line)) for line in rows), default=1)
+    return f'{lines[1]} style="--characters: {longest}"{content}'
 
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:
-    """Set all formulas of a page."""
+    """Set all formulas of a page, and the sizes and line breaks of its code."""
 
     def formula(match: re.Match[str]) -> str:
         marked = MARKS.search(unescape(match[2]))
@@ -126,4 +147,4 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
             log.warning("%s: a formula cannot be set: %s: %s", page.file.src_uri, marked[1].strip(), error)
             return match[0]
 
-    return LINES.sub(measured, FORMULA.sub(formula, html))
+    return CODE.sub(lambda code: unbroken(code[0]), LINES.sub(measured, FORMULA.sub(formula, html)))
