@@ -20,13 +20,19 @@ WIDTH = "500"  # Columns of the help, so that no line is wrapped
 PANEL = re.compile(r"^╭─ (.*?) ─+╮\n(.*?)^╰", re.DOTALL | re.MULTILINE)
 VARIANT = re.compile(r"(\.one(\.\w+)?)?(\.cli)?$")
 FIELD = re.compile(r"\{(\w+)[^}]*\}")
+APPENDED = re.compile(
+    r"(?=\{\w+:\+[;&]?\})"
+)  # Before fields that begin with a semicolon if they are not empty
 COMMAND = "\n"  # Between the sentences of Python and of the command line
 DECIDED = {"take-out": "snoop", "lens": "calibrate"}  # Usual case of next steps that the program decides
 
 
 def cell(text: str) -> str:
     """Return text for a cell of an HTML table: backquotes are code, the fields of messages are variables."""
-    text = FIELD.sub(lambda field: f"<var>{field[1].replace('_', ' ')}</var>", escape(text, quote=False))
+    text = FIELD.sub(
+        lambda field: f"<var>{field[1].replace('_', ' ')}</var>",
+        escape(APPENDED.sub("; ", text), quote=False),
+    )
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
     return text.replace(COMMAND, "<br><em>On the command line:</em> ")
 
