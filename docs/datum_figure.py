@@ -24,7 +24,7 @@ from free_network import in_three_datums
 
 FIGURE = Path(__file__).with_name("datum.svg")
 TITLES = (
-    "minimum constraints:\nphoto {} and one coordinate held",
+    "minimum constraints:\nphoto {} and one coordinate fixed",
     "inner constraints\nover all points",
     "inner constraints\nover four points (filled)",
 )

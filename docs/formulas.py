@@ -19,6 +19,12 @@ from math_core import LatexError, LatexToMathML
 FORMULA = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
 LINES = re.compile(r'(<div class="language-(\w+) highlight")(>.*?</div>)', re.DOTALL)
 NAMED = re.compile(r"&(?!amp;|lt;|gt;|quot;)[a-zA-Z]+;")
+CODE = re.compile(r"(?<=<code>)[^<]+(?=</code>)")
+LONG_WORD = re.compile(r"[^\s<>&]{17,}")
+BREAK = re.compile(r"(?<=[_/:,=(])(?=[A-Za-z])|(?<=\w)(?=\.[A-Za-z])")
+OPTION = re.compile(r"(?<![^\s>])--?[a-z][\w-]*(?![^<]*>)")
+ROW = re.compile(r'<span class="go">(?=.*\S  +\S.*\S  +\S)(.{1,138})</span>')
+SENTENCE = re.compile(r"(?<=\n|>)(?!.*\S  +\S.*\S  +\S)(?=.*\S \S)[^\n<>]{60,}(?=\n)")
 MARKS = re.compile(r"\\[(\[](.*)\\[)\]]", re.DOTALL)
 PRIMES = ("′", "″", "‴")
 STRUT = {"height": "0.8em", "depth": "0.2em"}
@@ -104,18 +110,45 @@ def as_mathml(latex: str, displayed: bool) -> str:
     return f'<div class="formula" style="--width: {width(formula):.0f}">{marked}</div>'
 
 
+def _text(html: str) -> str:
+    """Return the text of a line of HTML."""
+    return unescape(re.sub(r"<[^>]*>", "", html))
+
+
+def unbroken(html: str) -> str:
+    """Return code whose options, such as `--example`, are not divided at the end of a line."""
+    return OPTION.sub(r'<span class="option">\g<0></span>', html)
+
+
+def divisible(code: str) -> str:
+    """Return code whose long words can be divided after underscores and other signs."""
+    return LONG_WORD.sub(lambda word: BREAK.sub("<wbr>", word[0]), code)
+
+
 def measured(lines: re.Match[str]) -> str:
     """Return a block of code with the number of characters of its longest line, by which it has its size.
 
-    Lines of a terminal that are longer than those of a page are commands, or sentences: they are wrapped.
+    Commands and sentences that are longer than a line of the page are wrapped. Rows of tables are not.
     """
-    text = unescape(re.sub(r"<[^>]*>", "", lines[3][1:]))
-    lengths = [len(line) for line in text.splitlines() if lines[2] != "console" or len(line) <= WRAPPED]
-    return f'{lines[1]} style="--characters: {max(lengths, default=1)}"{lines[3]}'
+    content = lines[3]
+    if lines[2] in ("console", "sh"):
+        content = unbroken(ROW.sub(r'<span class="go row">\1</span>', content))
+    if lines[2] == "text":
+        content = SENTENCE.sub(r'<span class="sentence">\g<0></span>', content)
+    rows, sentences = [1], [1]
+    for line in content.removeprefix(">").splitlines():
+        length = len(_text(line))
+        long = lines[2] == "console" and length > WRAPPED and "go row" not in line
+        if long or 'class="sentence"' in line:
+            sentences.append(length if length <= WRAPPED else 1)
+        else:
+            rows.append(length)
+    style = f"--characters: {max(rows + sentences)}; --rows: {max(rows)}"
+    return f'{lines[1]} style="{style}"{content}'
 
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:
-    """Set all formulas of a page."""
+    """Set all formulas of a page, and the sizes and line breaks of its code."""
 
     def formula(match: re.Match[str]) -> str:
         marked = MARKS.search(unescape(match[2]))
@@ -126,4 +159,6 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
             log.warning("%s: a formula cannot be set: %s: %s", page.file.src_uri, marked[1].strip(), error)
             return match[0]
 
-    return LINES.sub(measured, FORMULA.sub(formula, html))
+    return CODE.sub(
+        lambda code: unbroken(divisible(code[0])), LINES.sub(measured, FORMULA.sub(formula, html))
+    )

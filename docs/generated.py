@@ -30,13 +30,19 @@ REMEDY = re.compile(
     re.IGNORECASE,
 )
 """The part of a message that begins with an imperative, or an option in parentheses."""
+APPENDED = re.compile(
+    r"(?=\{\w+:\+[;&]?\})"
+)  # Before fields that begin with a semicolon if they are not empty
 COMMAND = "\x1f"  # Between the sentences of Python and of the command line
 DECIDED = {"take-out": "snoop", "lens": "calibrate"}  # Usual case of next steps that the program decides
 
 
 def cell(text: str) -> str:
     """Return text for a cell of an HTML table: backquotes are code, the fields of messages are variables."""
-    text = FIELD.sub(lambda field: f"<var>{field[1].replace('_', ' ')}</var>", escape(text, quote=False))
+    text = FIELD.sub(
+        lambda field: f"<var>{field[1].replace('_', ' ')}</var>",
+        escape(APPENDED.sub("; ", text), quote=False),
+    )
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
     return text.replace(COMMAND, "<br><em>On the command line:</em> ")
 

@@ -34,28 +34,30 @@ def shares() -> dict[int, np.ndarray]:
 
 
 def rays() -> list[str]:
-    """Return the shares, and from which error on one is found."""
+    """Return rows with the shares, the minimal detectable bias and its effect."""
     root = np.sqrt(lambda0(0.001, 0.80))
-    lines = [f"{'rays':>4}{'':>4}{'shows':>8}{'hides':>8}{'found from':>12}{'until then it moves by':>24}"]
+    lines = [f"{'rays':>4}{'':>4}{'residual':>10}{'unknowns':>10}{'detectable':>12}{'largest effect':>16}"]
     for count, both in shares().items():
         for axis, r in zip("xy", both, strict=True):
-            found = f"{root / np.sqrt(r):.1f} sd" if r >= 0.01 else "never"
-            moves = f"{root * np.sqrt((1 - r) / r):.1f} sd" if r >= 0.01 else "anything"
-            lines.append(f"{count:>4}{axis:>4}{100 * r:>7.0f}%{100 * (1 - r):>7.0f}%{found:>12}{moves:>24}")
+            detectable = f"{root / np.sqrt(r):.1f} sd" if r >= 0.01 else "never"
+            effect = f"{root * np.sqrt((1 - r) / r):.1f} sd" if r >= 0.01 else "unlimited"
+            lines.append(
+                f"{count:>4}{axis:>4}{100 * r:>9.0f}%{100 * (1 - r):>9.0f}%{detectable:>12}{effect:>16}"
+            )
     return lines
 
 
 def draw() -> Figure:
-    """Draw what shows of an error, a bar for each number of rays and each axis."""
+    """Draw the share of an error in its residual, one bar per number of rays and axis."""
     figure = new_figure(8.0, 3.0)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, axis, title in zip(
         panels, (0, 1), ("error in x, along the base", "error in y, across the base"), strict=True
     ):
         shown = np.array([both[axis] for both in shares().values()])
-        axes.barh(np.arange(len(RAYS)), shown, color=BLUE, label="shows in its own residual")
+        axes.barh(np.arange(len(RAYS)), shown, color=BLUE, label="appears in its residual")
         axes.barh(
-            np.arange(len(RAYS)), 1 - shown, left=shown, color=LIGHT, label="moves the unknowns, unseen"
+            np.arange(len(RAYS)), 1 - shown, left=shown, color=LIGHT, label="changes the unknowns, undetected"
         )
         axes.set_title(title, fontsize=10, loc="left")
         axes.set(xlim=(0, 1), xticks=(0, 0.5, 1), xticklabels=("0", "half", "all"))

@@ -1,4 +1,4 @@
-"""Pictures of an adjustment: all of them as files, and two side by side in a figure of one's own.
+"""Plots of an adjustment: all plots as files, and two plots side by side in one figure.
 
 python examples/pictures.py DIRECTORY
 
@@ -22,12 +22,12 @@ def side_by_side(result: Result) -> Figure:
     left, right = figure.subplots(1, 2)
     result.plot.network().on(left)
     result.plot.correlations().on(right)
-    right.set_title("which parameters of the lens stand for one another", loc="left")
+    right.set_title("correlations of the lens parameters", loc="left")
     return figure
 
 
 def main(arguments: list[str]) -> None:
-    """Write the pictures."""
+    """Write the plots."""
     folder = Path(arguments[0] if arguments else ".")
     folder.mkdir(parents=True, exist_ok=True)
     result = adjust(measured())

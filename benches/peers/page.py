@@ -95,7 +95,7 @@ def _covariances(
         peak = record["peak"]["marginals"]
         yield _covariance_row(name, f"all marginals{what}", took, reference, peak, differ)
     elif "covariances" in seconds:
-        what, peak = "covariances of poses; of points with the poses held", record["peak"]["covariances"]
+        what, peak = "covariances of poses; of points with fixed poses", record["peak"]["covariances"]
         yield _covariance_row(name, what, seconds["covariances"], reference, peak, differ)
     elif "phases" in record and name == "photogram":
         took = covariance_seconds(record)

@@ -143,7 +143,7 @@ def _photo_by_photo(block: photogram.Block) -> list[int]:
 def run_pycolmap(
     block: photogram.Block, points: Floats, record: Record, limit: float, setting: str
 ) -> dict[str, Floats]:
-    """Solve; then the covariances of poses, and of points with the poses held."""
+    """Solve; then the covariances of poses, and of points with fixed poses."""
     import colmap_block
 
     own = setting == "own-solver"

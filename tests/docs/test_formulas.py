@@ -99,4 +99,24 @@ def test_widths_are_those_of_the_widest_line():
 def test_long_lines_of_figures_are_measured():
     html = '<div class="language-text highlight"><pre><code>ab\n<a>cdef</a>\n</code></pre></div>'
     made = formulas.on_page_content(html, PAGE)
-    assert 'class="language-text highlight" style="--characters: 4"' in made
+    assert 'class="language-text highlight" style="--characters: 4; --rows: 4"' in made
+
+
+def test_sentences_are_wrapped_and_rows_of_tables_are_not():
+    def block(language, line):
+        html = f'<div class="language-{language} highlight"><pre><code>{line}\n</code></pre></div>'
+        return formulas.on_page_content(html, PAGE)
+
+    sentence, row = "a sentence " * 12, "name   1.234   " * 8
+    assert '<span class="sentence">' in block("text", sentence)
+    assert "--characters: 1;" in block("text", sentence)
+    assert '<span class="sentence">' not in block("text", row)
+    assert f"--characters: {len(row)};" in block("text", row)
+    assert '<span class="go row">' in block("console", f'<span class="go">{row}</span>')
+    assert '<span class="go">' in block("console", f'<span class="go">{sentence}</span>')
+
+
+def test_options_are_not_divided_and_long_words_are():
+    made = formulas.on_page_content("<code>adjust --plots a_long_name_of_a_table.csv</code>", PAGE)
+    assert '<span class="option">--plots</span>' in made
+    assert "a_<wbr>long_<wbr>name_<wbr>of_<wbr>a_<wbr>table<wbr>.csv" in made

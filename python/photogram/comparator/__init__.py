@@ -1,8 +1,7 @@
 """Calibration of measuring comparators with a grid plate (Fritz, NOAA TR NOS 57, 1973).
 
-session = comparator.read(["measurements.csv"])[0]
-calibration = comparator.calibrate(session)
-calibration.correction.apply(xy_um)
+`calibrate(read(["measurements.csv"])[0])` returns a calibration. Its method
+`correction.apply(xy_um)` corrects measurements.
 """
 
 from photogram.arguments.on_demand import attach_checked
