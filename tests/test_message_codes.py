@@ -24,7 +24,7 @@ FORMATS = ("number.", "date")
 COMMANDS = {
     "adjust": (0, "adjust", "project", "--json", "o.json"),
     "snoop": (4, "adjust", "project", "--snoop", "--sd", "images=0.1", "--json", "o.json"),
-    "weights": (0, "adjust", "project", "--sd", "images=5", "--json", "o.json"),
+    "weights": (4, "adjust", "project", "--sd", "images=5", "--json", "o.json"),
     "strict": (4, "adjust", "project", "--sd", "images=0.2", "--strict", "--json", "o.json"),
     "German statement": (0, "statement", "survey", "--language", "de"),
     "check": (0, "check", "project", "--json", "o.json"),

@@ -258,12 +258,14 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """
         from photogram.results.reliability import Reliability
 
-        trial = self._trial()
+        trial, lost = self._trial(), None
         if self.loss is not None:
             from photogram.results.robust import downweighted
 
-            trial.downweighted = downweighted(self, trial)
-        return Reliability(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
+            weights = self.image_weights, self.used_images
+            lost = downweighted(trial, self._terms(), *weights)
+            trial.out = lost.out
+        return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 
     @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:

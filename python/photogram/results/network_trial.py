@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -40,9 +40,6 @@ ROBUST_ITERATIONS = 20
 
 _TESTS = ("active", "rank", "statistic", "least", "shared", "residual", "error", "error_sd")
 
-if TYPE_CHECKING:
-    from photogram.results.robust import Downweighted
-
 T = TypeVar("T")
 
 
@@ -67,7 +64,7 @@ class NetworkTrial:
         row = np.arange(starts[-1]) - np.repeat(starts[:-1], sizes)
         self._diagonal = np.repeat(self._block_starts[:-1], sizes) + row * (np.repeat(sizes, sizes) + 1)
         self._tests: dict[str, np.ndarray] = {}
-        self.downweighted: Downweighted | None = None  # by a robust loss
+        self.out: Out | None = None  # Observations that a robust loss removes
 
     def restart(self, core: _photocore.NetworkTrial) -> None:
         """Continue the same network from other initial values; its groups are unchanged."""
@@ -112,8 +109,8 @@ class NetworkTrial:
 
     def stand(self) -> Standing:
         """Use the final state of the adjustment; with a loss, adjust without removed observations."""
-        if self.downweighted is not None:
-            return self.adjust(self.downweighted.out, exact=True)
+        if self.out is not None:
+            return self.adjust(self.out, exact=True)
         status, _, omega, freedom, _ = self.core.stand()
         return Standing(status, omega, freedom)
 

@@ -35,6 +35,8 @@ from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.results.robust import Downweighted
+
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
 SEARCHED = 100  # Number of examined observations: those of the largest norm
 
@@ -79,6 +81,7 @@ class Reliability:
         self,
         trial: NetworkTrial,
         covariances: Callable[[], Covariances],
+        downweighted: Downweighted | None = None,  # Observations that a robust loss removes
         *,
         level: float,  # alpha0 and beta0 of the test of one observation or group
         power: float,
@@ -90,6 +93,7 @@ class Reliability:
             probability("power", number("power", power)),
         )
         self.trial, self._covariances, self.known = trial, covariances, unit_weight == "known"
+        self.downweighted = downweighted
         self.standing: Standing = trial.stand()
         self.tests: Tests = trial.tests()
         self.suspects: Suspects = trial.suspects

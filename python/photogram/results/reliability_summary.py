@@ -130,7 +130,7 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
         tests=tests,
         hypotheses=hypotheses,
         standing=found.standing,
-        downweighted=found.trial.downweighted,
+        downweighted=found.downweighted,
     )
 
 

@@ -18,8 +18,8 @@ from photogram.statistics.snooping.suspects import Out
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.results.network import AdjustedNetwork
+    from photogram.arguments.types import Bools, Floats
+    from photogram.results.axes import Terms
 
 REMOVED = 0.1  # Weight factor below which an observation counts as removed
 SUPPORT = 2  # Smallest number of images of a point that are not removed
@@ -35,13 +35,16 @@ class Downweighted:
     unsupported: list[Phrase]  # names of points with too few images
 
 
-def downweighted(result: AdjustedNetwork, trial: NetworkTrial) -> Downweighted:
-    """Return the observations that the loss of an adjustment removes in effect."""
+def downweighted(trial: NetworkTrial, terms: Terms, image_weights: Floats, used: Bools) -> Downweighted:
+    """Return the observations that the loss of an adjustment removes in effect.
+
+    `image_weights` and `used` are the (m,) weight factors of the images, and whether they were used.
+    """
     suspects = trial.suspects
-    weights = _weights(result, suspects)
+    weights = _weights(suspects, terms, np.where(used, image_weights, np.nan))
     removed = weights < REMOVED
     points, images = suspects.points, (suspects.kinds == IMAGE) & np.isfinite(weights)
-    count = len(result.point_rays)
+    count = len(terms.points)
     rays, left = (np.bincount(points[own], minlength=count) for own in (images, images & ~removed))
     alone = np.flatnonzero((left < SUPPORT) & (rays > left))
     rows = np.repeat(removed | np.isin(points, alone), np.diff(suspects.row_starts))
@@ -56,17 +59,16 @@ def downweighted(result: AdjustedNetwork, trial: NetworkTrial) -> Downweighted:
         ),
         [
             Phrase("named.control" if point in control else "named.object_point", {"point": str(name)})
-            for point, name in zip(alone.tolist(), result._terms().points[alone].tolist(), strict=True)
+            for point, name in zip(alone.tolist(), terms.points[alone].tolist(), strict=True)
         ],
     )
 
 
-def _weights(result: AdjustedNetwork, suspects: NamedSuspects) -> Floats:
+def _weights(suspects: NamedSuspects, terms: Terms, image_weights: Floats) -> Floats:
     """Return (G,) weight factors of groups; NaN if not used."""
-    weights, terms = np.ones(len(suspects)), result._terms()
+    weights = np.ones(len(suspects))
     images, others = suspects.kinds == IMAGE, suspects.kinds == OBSERVATION
-    own = suspects.subjects[images]
-    weights[images] = np.where(result.used_images[own], result.image_weights[own], np.nan)
+    weights[images] = image_weights[suspects.subjects[images]]
     if others.any():
         factors = np.ones(len(terms.observation_rows))
         for kind in terms.kinds:

@@ -495,7 +495,7 @@ RULES = (
         "unsupported",
         _listing("unsupported", "names", "unsupported"),
         EXIT_NOT_USABLE,
-        ("take-out", "measure-again"),
+        ("measure-again",),
         warning=True,
         grave=lambda e: any(getattr(name, "code", "") == CONTROL for name in e.found.unsupported),
     ),
