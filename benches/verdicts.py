@@ -256,12 +256,12 @@ def surveys(rng: np.random.Generator, count: int) -> Iterator[Survey]:
 
 def size_of(result: Result, hypothesis: str) -> float:
     """Return the largest component of the MDB of a mistake; NaN if an error of any size is undetected."""
+    if result.reliability_summary is None:
+        return math.nan
     code, _, axis = hypothesis.partition(" ")
-    for each in result.reliability_summary.hypotheses.every if result.reliability_summary else ():
-        component = None if not axis else "XYZ".index(axis)
-        if each.code == code and each.component == component and each.mdb is not None:
-            return max(abs(value) for value in each.mdb)
-    return math.nan
+    every, component = result.reliability_summary.hypotheses, "XYZ".index(axis) if axis else -1
+    own = (every.code == code) & (every.component == component) & np.isfinite(every.mdb[:, 0])
+    return float(np.nanmax(np.abs(every.mdb[own][:1]), initial=0.0)) if own.any() else math.nan
 
 
 def moved(clean: Result, wrong: Result, own: list[int]) -> float:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, Distance, Position, adjust
+from photogram import Block, Camera, Distance, InputError, Position, adjust
 
 GOLDEN = json.loads(gzip.decompress((Path(__file__).parent / "data/hypotheses/golden.json.gz").read_bytes()))
 SETS = {
@@ -148,7 +148,8 @@ def test_scores_are_correlated_as_a_dense_program_has_it(case):
 def test_the_verdict_names_the_errors_that_the_data_cannot_distinguish(case, verdict, codes):
     result = adjust(block_of(case))
     assert result.verdict.code == verdict
-    found = [each.code for each in result._hypotheses().common()]
+    every = result._hypotheses()
+    found = [every.code[row] for row in every.common()]
     assert [code for code in codes if code in found] == codes
     assert bool(found) is bool(codes)
 
@@ -183,3 +184,16 @@ def test_one_distance_alone_leaves_the_scale_unchecked():
     assert (distances.redundancy < 1e-6).all()
     assert (distances.points > 40).all()
     assert len(result.hypotheses()) == len(effects)
+
+
+def test_the_limit_of_undetected_errors_decides_the_verdict():
+    result = adjust(block_of("clean"))
+    assert result.verdict.code == "accepted"
+    strict = result.with_max_bias_ratio(0.5)
+    assert strict.verdict.code == "accepted-not-checked"
+    assert strict.with_max_bias_ratio(100.0).verdict.code == "accepted"
+    points = [each.external_reliability().points.sum() for each in (strict, result)]
+    assert points[0] > points[1]
+    for wrong in (0.0, np.inf, "six"):
+        with pytest.raises(InputError):
+            result.with_max_bias_ratio(wrong)

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import finite_rows, freeze_fields, standard_deviations
+from photogram.arguments.arrays import argument_error, finite_rows, freeze_fields, number, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.io import json
-from photogram.lazy_dataclasses import dataclass, fields
+from photogram.lazy_dataclasses import dataclass, fields, replace
 from photogram.messages import Message
 from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
@@ -122,6 +122,9 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         Options and final state of the core, from which covariances are computed.
     snooped
         The observations that data snooping removed before; None without data snooping.
+    max_bias_ratio
+        Standard deviations from which on an undetected error of a point counts for the verdict; see
+        :meth:`with_max_bias_ratio`.
     """
 
     status: str
@@ -149,6 +152,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     options: CoreOptions
     state: _photocore.BlockState
     snooped: Removed | None = None
+    max_bias_ratio: float = 6.0
 
     KNOWN: ClassVar[bool] = True
     """Whether standard deviations are given, so that the unit weight is known."""
@@ -279,7 +283,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
             return None
         estimated = None if self.KNOWN else self.sum_and_freedom
         axes, facts = self._terms().point_axes, self._hypothesis_facts()
-        own = hypotheses(found, facts, self.given, axes, estimated)
+        own = hypotheses(found, facts, self.given, axes, estimated, self.max_bias_ratio)
         return reliability_summary(found, own, heights=self.geographic)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
@@ -311,7 +315,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
         Columns are the redundancy, the minimal detectable bias (MDB), and its largest effect on any function
         of the unknowns in standard deviations. They also include the number of points that it moves by more
-        than 4 standard deviations, and the largest change of a point.
+        than `max_bias_ratio` standard deviations, and the largest change of a point.
 
         Raises
         ------
@@ -320,6 +324,24 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """
         found = self._hypotheses()
         return found.external_reliability(found.every).frame()
+
+    def with_max_bias_ratio(self, ratio: float) -> Self:
+        """Return the result with a verdict that permits larger or smaller effects of undetected errors.
+
+        Parameters
+        ----------
+        ratio
+            Standard deviations from which on an undetected error of a point counts (default: 6). If such an
+            error moves too many points, the verdict is `accepted-not-checked` (docs/tests.md).
+
+        Raises
+        ------
+        InputError
+            If the ratio is not a positive number.
+        """
+        if not 0 < number("max_bias_ratio", ratio) < math.inf:
+            raise argument_error("max_bias_ratio", "positive", value=ratio)
+        return replace(self, max_bias_ratio=float(ratio))
 
     @property
     def image_points(self) -> Indices:
