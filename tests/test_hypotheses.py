@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, Distance, InputError, Position, adjust
+from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result
 
 GOLDEN = json.loads(gzip.decompress((Path(__file__).parent / "data/hypotheses/golden.json.gz").read_bytes()))
 SETS = {
@@ -197,3 +197,18 @@ def test_the_limit_of_undetected_errors_decides_the_verdict():
     for wrong in (0.0, np.inf, "six"):
         with pytest.raises(InputError):
             result.with_max_bias_ratio(wrong)
+
+
+def test_the_limit_is_an_option_and_a_setting(run, tmp_path):
+    for number, given in enumerate((["--max-bias-ratio", 0.5], ["--set", "adjust.max_bias_ratio=0.5"])):
+        folder = tmp_path / str(number)
+        found = run("adjust", "--example", *given, "--strict", "--out", folder, "--parquet", folder / "saved")
+        assert found.exit_code == 4
+        result = read_result(folder / "saved")
+        assert (result.max_bias_ratio, result.verdict.code) == (0.5, "accepted-not-checked")
+        settings = (folder / "adjusted/project.toml").read_text(encoding="utf-8")
+        assert "max_bias_ratio = 0.5" in settings
+    assert run("adjust", "--example", "--set", "adjust.max_bias_ratio=-1").exit_code == 1
+    found = run("giant", "--example", "--max-bias-ratio", 1000, "--json", "verdict.json", "--strict")
+    assert json.loads((tmp_path / "verdict.json").read_text())["verdict"]["code"] == "accepted"
+    assert found.exit_code == 0

@@ -145,6 +145,8 @@ class Hypotheses:
 
     def _unit(self, row: int) -> str:
         """Return the unit of an error, behind a blank."""
+        if self.code[row] == "observation":
+            return f" {self.suspects.unit(int(self.suspects.row_starts[self.group[row]]))}".rstrip()
         return self.units.get(str(self.code[row]), self.length)
 
     @property
@@ -387,7 +389,7 @@ def _units(image: str, *, timed: bool) -> dict[str, str]:
     return {
         **dict.fromkeys(("camera-f", "camera-point"), f" {image}"),
         **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
-        **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown", "observation"), ""),
+        **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
         **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
     }
 

@@ -325,20 +325,22 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         found = self._hypotheses()
         return found.external_reliability(found.every).frame()
 
-    def with_max_bias_ratio(self, ratio: float) -> Self:
+    def with_max_bias_ratio(self, ratio: float | None) -> Self:
         """Return the result with a verdict that permits larger or smaller effects of undetected errors.
 
         Parameters
         ----------
         ratio
-            Standard deviations from which on an undetected error of a point counts (default: 6). If such an
-            error moves too many points, the verdict is `accepted-not-checked` (docs/tests.md).
+            Standard deviations from which on an undetected error of a point counts; None: unchanged. If such
+            an error moves too many points, the verdict is `accepted-not-checked` (docs/tests.md).
 
         Raises
         ------
         InputError
             If the ratio is not a positive number.
         """
+        if ratio is None:
+            return self
         if not 0 < number("max_bias_ratio", ratio) < math.inf:
             raise argument_error("max_bias_ratio", "positive", value=ratio)
         return replace(self, max_bias_ratio=float(ratio))
