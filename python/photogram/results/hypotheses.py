@@ -134,7 +134,8 @@ class Hypotheses:
         if group < 0:
             fields: dict[str, Any] = {"set": max(index, 0) + 1, "parameters": self.sets[row]["parameters"]}
             if index >= 0 and code in OF_CAMERAS:
-                fields["camera"] = self.cameras[index] if index < len(self.cameras) else "1"
+                other = phrase("hypothesis.camera", number=index + 1)
+                fields["camera"] = self.cameras[index] if index < len(self.cameras) else other
             return Phrase(f"hypothesis.{code}", fields)
         named, component = self.suspects.name(group), int(self.component[row])
         if component < 0:
@@ -181,8 +182,16 @@ class Hypotheses:
     @property
     def assumptions(self) -> list[Phrase]:
         """Names of untested observations that define the datum."""
-        every = enumerate(self.code[: len(self.sets)].tolist())
-        untested = {code for row, code in every if code in DATUM and self.undetected(row) >= RARE}
+        return self.assumed()
+
+    def assumed(self, least: int = 0) -> list[Phrase]:
+        """Return these names; with `least`, only those whose errors move as many points or more."""
+        rows = [
+            row for row in range(len(self.sets)) if self.code[row] in DATUM and self.undetected(row) >= RARE
+        ]
+        if least:
+            rows = [row for row in rows if row in self.effects and self.effects[row].points >= least]
+        untested = {str(self.code[row]) for row in rows}
         sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
         codes = [codes[0] for codes in sources if untested.intersection(codes)]
         return [phrase(f"datum.{code}") for code in codes]
