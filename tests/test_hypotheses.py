@@ -212,3 +212,31 @@ def test_the_limit_is_an_option_and_a_setting(run, tmp_path):
     found = run("giant", "--example", "--max-bias-ratio", 1000, "--json", "verdict.json", "--strict")
     assert json.loads((tmp_path / "verdict.json").read_text())["verdict"]["code"] == "accepted"
     assert found.exit_code == 0
+
+
+def test_the_plot_shows_what_an_undetected_error_changes():
+    block = block_of("clean")
+    result = adjust(block)
+    found = result._hypotheses()
+    row = next(row for row in found.effects if found.code[row] == "control-point")
+    moved = result._plot_data().moved(row)
+    point = found.suspects.points[found.group[row]]
+    np.testing.assert_array_equal(moved.suspects, result.point_positions[[point]])
+    assert moved.ratios.max() == pytest.approx(found.effects[row].ratio, rel=1e-6)
+    assert np.count_nonzero(moved.ratios > moved.limit) == found.effects[row].points
+
+    positions = block.point_positions.copy()
+    positions[point] += found.mdb[row]
+    wrong = adjust(block.replace(point_positions=positions))
+    changes = wrong.point_positions[moved.points] - result.point_positions[moved.points]
+    assert np.abs(changes - moved.changes).max() < 0.02 * np.abs(changes).max()
+
+    plot = result.plot.undetected(error=row)
+    labels = [mark.label for mark in plot.panels[0].labelled]
+    assert {"observation with the error", "control point"} <= set(labels)
+    assert str(found.sentence(row)) in plot.panels[0].notes
+    small = next(row for row in range(len(found.code)) if row not in found.effects)
+    for refused in (lambda: result.plot.undetected(error=small), adjust(block, loss="huber").plot.undetected):
+        with pytest.raises(InputError) as error:
+            refused()
+        assert error.value.code == "plot.undetected"

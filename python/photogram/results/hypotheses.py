@@ -35,7 +35,7 @@ Facts = dict[str, Any]  # Additional facts for hypotheses; see `NetworkTrial.hyp
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Smallest number of other points that it moves
 EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise ratios
-DRAWN = 400  # Largest number of points whose changes are stored for plots
+DRAWN = 300  # Largest number of points whose changes are stored for plots
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
@@ -155,6 +155,12 @@ class Hypotheses:
         """Rows whose undetected errors move too many points, the worst first."""
         rows = [row for row in self.effects if self._is_harmful(row)]
         return sorted(rows, key=lambda row: (not np.isnan(self.mdb[row, 0]), -self.effects[row].ratio))
+
+    @property
+    def worst(self) -> int | None:
+        """The first of these rows, else the row with the largest effect, errors of the datum last."""
+        rows = sorted(self.effects, key=lambda row: (self.code[row] in DATUM, -self.effects[row].ratio))
+        return next(iter([*self.harmful, *rows]), None)
 
     def unchecked(self) -> list[Phrase]:
         """Return messages on these errors, the worst first."""
