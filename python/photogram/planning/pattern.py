@@ -23,7 +23,8 @@ from photogram.network.block import Block
 from photogram.network.hull import hull
 from photogram.network.motion import on_shared, timed_images
 from photogram.network.trajectories import Readout
-from photogram.results.hypotheses import Hypotheses, block_facts, hypotheses
+from photogram.results.hypotheses import Hypotheses, hypotheses
+from photogram.results.hypothesis_facts import block_facts
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.strips import strips_of
+from photogram.results.hypothesis_facts import NO_FACTS, Facts
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
 from photogram.statistics.findings import Tested
@@ -25,12 +25,9 @@ from photogram.statistics.snooping.suspects import Suspects
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.network.block import Block
     from photogram.network.unadjusted import Given
     from photogram.results.network_trial import NamedSuspects
     from photogram.results.reliability import Reliability
-
-Facts = dict[str, Any]  # Additional facts for hypotheses; see `NetworkTrial.hypotheses`
 
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Smallest number of other points that it moves
@@ -65,8 +62,6 @@ DATUM = frozenset(
 UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
 whose causes (terms of distortion) are hypotheses of their own."""
-
-MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
 
 @dataclass(frozen=True, eq=False)
@@ -453,61 +448,3 @@ def _log_odds(statistic: ArrayLike, k: ArrayLike, observations: ArrayLike, count
     """Return T/2 - k/2 ln n_h - ln N_h: the log odds of an error of any size against no error."""
     half = np.asarray(k) / 2 * np.log(observations)
     return np.asarray(np.asarray(statistic) / 2 - half - np.log(count))
-
-
-NO_FACTS: Facts = {
-    "velocities": np.empty((0, 3)),
-    "times": [],
-    "position_sets": [],
-    "control_sets": [],
-    "readouts": [],
-    "widths": [],
-    "checks": [],
-    "centre": None,
-}
-
-
-def block_facts(block: Block, places: Floats) -> Facts:
-    """Return facts for hypotheses on a block: velocities, sets, sizes of images.
-
-    `places` are the (P, 3) adjusted positions of photos.
-    """
-    count = len(block.photo_ids)
-    cameras = np.zeros(count, dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
-    facts: Facts = {"widths": [], "readouts": []}
-    of_images = cameras[block.image_photos]
-    low, high = (np.full((max(len(block.cameras), 1), 2), end) for end in (math.inf, -math.inf))
-    np.minimum.at(low, of_images, block.image_xy)
-    np.maximum.at(high, of_images, block.image_xy)
-    for camera, (width, height) in enumerate((high - low).tolist()):
-        facts["widths"].append(width if width > 0 else math.nan)
-        digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0
-        middle = float(low[camera, 1] + high[camera, 1]) / 2
-        facts["readouts"].append([0.0, 1 / height, -middle / height] if digital else None)
-    if block.geographic:
-        return facts
-    seconds = np.full(count, math.nan)
-    row = {name: k for k, name in enumerate(block.photo_ids)}
-    for each in block.observations:
-        if each.KIND == "position" and each.photos and each.photos[0] in row:
-            seconds[row[each.photos[0]]] = each.time  # type: ignore[attr-defined]
-    timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
-    times = seconds if timed else np.arange(count, dtype=np.float64)
-    velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)
-    strips = strips_of(places) if count > 1 else []
-    for number, strip in enumerate(strips):
-        sets[strip] = number
-        if len(strip) > 1 and (np.diff(times[strip]) > 0).all():
-            velocities[strip] = np.gradient(places[strip], times[strip], axis=0)
-    facts["velocities"] = velocities
-    if timed:
-        facts["times"] = seconds.tolist()
-    if 1 < len(strips) <= MOST_SETS:
-        facts["position_sets"] = sets.tolist()
-    control = np.isfinite(block.point_sd).any(axis=1)
-    _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
-    own = np.unique(kinds[control])
-    if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        set_of = {int(kind): k for k, kind in enumerate(own)}
-        facts["control_sets"] = [set_of.get(kind) for kind in kinds.tolist()]
-    return facts
