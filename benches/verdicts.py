@@ -337,12 +337,12 @@ ACCURACY = "images less accurate", "images more accurate"
 
 def size_of(result: Result, hypothesis: str) -> float:
     """Return the largest component of the MDB of a mistake; NaN if an error of any size is undetected."""
+    if result.reliability_summary is None:
+        return math.nan
     code, _, axis = hypothesis.partition(" ")
-    for each in result.reliability_summary.hypotheses.every if result.reliability_summary else ():
-        component = None if not axis else "XYZ".index(axis)
-        if each.code == code and each.component == component and each.mdb is not None:
-            return max(abs(value) for value in each.mdb)
-    return math.nan
+    every, component = result.reliability_summary.hypotheses, "XYZ".index(axis) if axis else -1
+    own = (every.code == code) & (every.component == component) & np.isfinite(every.mdb[:, 0])
+    return float(np.nanmax(np.abs(every.mdb[own][:1]), initial=0.0)) if own.any() else math.nan
 
 
 def moved(clean: Result, wrong: Result, own: list[int]) -> float:
@@ -368,8 +368,9 @@ def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
         # Errors whose statistics differ by less than odds of 20 : 1 are inseparable by the data.
         true, first = hypothesis.partition(" ")[0], fields["errors"][0].fields["named"].code.partition(".")[2]
         largest: dict[str, float] = defaultdict(float)
-        for each in result.reliability_summary.hypotheses.every:
-            largest[each.code] = max(largest[each.code], each.statistic)
+        every = result.reliability_summary.hypotheses
+        for code, statistic in zip(every.code.tolist(), every.statistic.tolist(), strict=True):
+            largest[code] = max(largest[code], statistic)
         return first == true or largest[true] > largest[first] - 2 * math.log(20)
     if code == "gross-errors" and hypothesis.startswith("control-point"):
         return f"control point {point}" in str(fields["suspects"][0])

@@ -73,7 +73,7 @@ def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
     """Return adjustments, and which pictures are taken of each."""
     galveston = adjust(read_project(files("photogram") / "examples" / "galveston").to_block())
     return {
-        "giant": (galveston, ("network", "redundancy", "tests")),
+        "giant": (galveston, ("network", "redundancy", "undetected", "tests")),
         "lens": (adjust(measured()), ("correlations", "distortion")),
         "bent": (adjust(bent()), ("residuals",)),
         "part": (part(), ("features",)),

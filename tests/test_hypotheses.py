@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, Distance, Position, adjust
+from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result
 
 GOLDEN = json.loads(gzip.decompress((Path(__file__).parent / "data/hypotheses/golden.json.gz").read_bytes()))
 SETS = {
@@ -148,7 +148,8 @@ def test_scores_are_correlated_as_a_dense_program_has_it(case):
 def test_the_verdict_names_the_errors_that_the_data_cannot_distinguish(case, verdict, codes):
     result = adjust(block_of(case))
     assert result.verdict.code == verdict
-    found = [each.code for each in result._hypotheses().common()]
+    every = result._hypotheses()
+    found = [every.code[row] for row in every.common()]
     assert [code for code in codes if code in found] == codes
     assert bool(found) is bool(codes)
 
@@ -183,3 +184,62 @@ def test_one_distance_alone_leaves_the_scale_unchecked():
     assert (distances.redundancy < 1e-6).all()
     assert (distances.points > 40).all()
     assert len(result.hypotheses()) == len(effects)
+
+
+def test_the_limit_of_undetected_errors_decides_the_verdict():
+    result = adjust(block_of("clean"))
+    assert result.verdict.code == "accepted"
+    strict = result.with_max_bias_ratio(0.5)
+    assert strict.verdict.code == "accepted-not-checked"
+    assert strict.with_max_bias_ratio(100.0).verdict.code == "accepted"
+    points = [each.external_reliability().points.sum() for each in (strict, result)]
+    assert points[0] > points[1]
+    for wrong in (0.0, np.inf, "six"):
+        with pytest.raises(InputError):
+            result.with_max_bias_ratio(wrong)
+
+
+def test_the_limit_is_an_option_and_a_setting(run, tmp_path):
+    for number, given in enumerate((["--max-bias-ratio", 0.5], ["--set", "adjust.max_bias_ratio=0.5"])):
+        folder = tmp_path / str(number)
+        found = run("adjust", "--example", *given, "--strict", "--out", folder, "--parquet", folder / "saved")
+        assert found.exit_code == 4
+        result = read_result(folder / "saved")
+        assert (result.max_bias_ratio, result.verdict.code) == (0.5, "accepted-not-checked")
+        settings = (folder / "adjusted/project.toml").read_text(encoding="utf-8")
+        assert "max_bias_ratio = 0.5" in settings
+    assert run("adjust", "--example", "--set", "adjust.max_bias_ratio=-1").exit_code == 1
+    found = run("giant", "--example", "--max-bias-ratio", 1000, "--json", "verdict.json", "--strict")
+    assert json.loads((tmp_path / "verdict.json").read_text())["verdict"]["code"] == "accepted"
+    assert found.exit_code == 0
+
+
+def test_the_plot_shows_what_an_undetected_error_changes():
+    block = block_of("clean")
+    result = adjust(block)
+    found = result._hypotheses()
+    row = next(row for row in found.effects if found.code[row] == "control-point")
+    moved = result._plot_data().moved(row)
+    point = found.suspects.points[found.group[row]]
+    np.testing.assert_array_equal(moved.suspects, result.point_positions[[point]])
+    assert moved.ratios.max() == pytest.approx(found.effects[row].ratio, rel=1e-6)
+    assert np.count_nonzero(moved.ratios > moved.limit) == found.effects[row].points
+
+    positions = block.point_positions.copy()
+    positions[point] += found.mdb[row]
+    wrong = adjust(block.replace(point_positions=positions))
+    changes = wrong.point_positions[moved.points] - result.point_positions[moved.points]
+    assert np.abs(changes - moved.changes).max() < 0.02 * np.abs(changes).max()
+
+    plot = result.plot.undetected(error=row)
+    labels = [mark.label for mark in plot.panels[0].labelled]
+    assert {"observation with the error", "control point"} <= set(labels)
+    assert str(found.sentence(row)) in plot.panels[0].notes
+    small = next(row for row in range(len(found.code)) if row not in found.effects)
+    for refused in (
+        lambda: result.plot.undetected(error=small),
+        adjust(block, covariance=False).plot.undetected,
+    ):
+        with pytest.raises(InputError) as error:
+            refused()
+        assert error.value.code == "plot.undetected"

@@ -35,6 +35,7 @@ from photogram.adjustment.prediction import at_adjusted
 from photogram.cli.plan import plan as plan_command
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.planning import Pattern
+from photogram.planning.document import advice
 from photogram.planning.pattern import locations
 from photogram.statistics import largest_effect, minimal_detectable_error, noncentrality
 
@@ -406,6 +407,35 @@ def test_the_document_of_three_networks_and_of_one():
     alone = plan({"alone": network(control="none", position_sd=0.1)})
     assert not parts_of(alone, "control")
     assert len(parts_of(alone, "comparison")[0].columns) == 4
+
+
+def test_a_plan_names_errors_that_would_remain_undetected():
+    patterns = {
+        "positions": network(control="none", position_sd=0.05),
+        "both": network(position_sd=0.05, control_spacing=1),
+    }
+    made = plan(patterns)
+    positions, both = made.patterns
+    codes = {pattern.name: set() for pattern in made.patterns}
+    for sentence in advice(made.patterns):
+        codes[sentence.fields["pattern"]].add(sentence.code)
+    # A time offset moves all stations along the strips like a shift of the network.
+    assert {"plan.undetected.strips", "plan.assumed"} <= codes["positions"]
+    assert codes["both"] == {"plan.unchecked", "plan.control"}
+    (time,) = np.flatnonzero(positions.hypotheses.code == "time-offset")
+    assert np.isnan(positions.hypotheses.mdb[time]).all()
+    tables = parts_of(made, "undetected")
+    assert [len(table.columns[0].values) for table in tables] == [10, 10]
+    rows = json.loads(made.to_json())["patterns"][1]["undetected"]
+    assert {"code", "hypothesis", "mdb", "points", "ratio"} <= set(rows[0])
+
+    # An adjustment of measurements finds the predicted biases and effects.
+    result = adjust(measured(patterns["both"], np.random.default_rng(1)), unit_variance="unity")
+    found = result._hypotheses()
+    np.testing.assert_array_equal(found.code, both.hypotheses.code)
+    np.testing.assert_allclose(found.redundancy, both.hypotheses.redundancy, rtol=0.02, atol=1e-9)
+    for row, effect in both.hypotheses.effects.items():
+        assert found.effects[row].ratio == pytest.approx(effect.ratio, rel=0.05, abs=0.05)
 
 
 def test_equal_networks_do_not_differ():

@@ -38,8 +38,9 @@ from photogram.network.subset import image_rows, with_rejected_points
 from photogram.results.axes import point_axes
 from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.fixed_tests import held_remark, held_tested
-from photogram.results.hypotheses import block_facts, hypotheses
-from photogram.results.network import AdjustedNetwork
+from photogram.results.hypotheses import hypotheses
+from photogram.results.hypothesis_facts import block_facts
+from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
@@ -190,7 +191,7 @@ def _snoop_block(
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
         own = standing.weighted_sum_of_squares, standing.degrees_of_freedom
-        found = hypotheses(trial, tests, facts, block, point_axes(block), own, known=True)
+        found = hypotheses(trial, tests, facts, block, point_axes(block), own, MAX_BIAS_RATIO, known=True)
         return found.common_errors() if found.common_is_harmful else []
 
     try:

@@ -212,7 +212,8 @@ def _snooped(
             **snooping.options,
             progress=progress,
         )
-        result = diagnosed(cast("Result", found.result))
+        result = cast("Result", found.result).with_max_bias_ratio(project.options.max_bias_ratio)
+        result = diagnosed(result)
     assert isinstance(result, Result)
     _check_control(job, project, choices, result)
     messages = []
@@ -263,7 +264,7 @@ def adjusted_block(
                 result = adjust_started(block, by=call, **how)
             else:
                 result = call(block, **how)
-        result = diagnosed(result)
+        result = diagnosed(result.with_max_bias_ratio(project.options.max_bias_ratio))
     _check_control(job, project, choices, result)
     again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
     told = replace(result, messages=[*project.messages, *again, *result.messages])

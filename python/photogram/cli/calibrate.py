@@ -18,7 +18,7 @@ from photogram.cli.calibration_options import (
 )
 from photogram.cli.choices import LossName
 from photogram.cli.command_classes import misuse
-from photogram.cli.components import COMPONENTS
+from photogram.cli.components import COMPONENTS, MaxBiasRatio
 from photogram.cli.console import print_document, print_remark, print_summary
 from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, adjustment_status, estimation_status, with_job
@@ -150,6 +150,7 @@ def calibrate(
     outliers: PriorName | None = None,
     to: list[str] | None = None,
     components: list[CornerBasisName] | None = None,
+    max_bias_ratio: MaxBiasRatio = None,
     uncertainty: Uncertainty,
     planned: Planned,
     threads: Threads = None,
@@ -181,7 +182,7 @@ def calibrate(
     uncertainty.asked()
     found = uncertainty.told(
         job,
-        _adjusted(job, calibration, how, threads, snooping),
+        _adjusted(job, calibration, how, threads, snooping, max_bias_ratio),
         lambda other: seen.read(other).adjust(**how, threads=threads),
     )
     weights = _weights(job, found, components or [], threads)
@@ -201,15 +202,22 @@ def calibrate(
 
 
 def _adjusted(
-    job: Job, calibration: Calibration, how: dict[str, Any], threads: int | None, snooping: Snooping
+    job: Job,
+    calibration: Calibration,
+    how: dict[str, Any],
+    threads: int | None,
+    snooping: Snooping,
+    max_bias_ratio: float | None,
 ) -> Calibrated:
     """Adjust a calibration, without gross errors on request."""
     if snooping.snoop:
         check_alone(job, "--snoop", ("--loss", "--outliers"))
     with adjustment_status(job) as progress:
         if snooping.snoop:
-            return calibration.snoop(**snooping.options, threads=threads, progress=progress)
-        return calibration.adjust(**how, threads=threads, progress=progress)
+            found = calibration.snoop(**snooping.options, threads=threads, progress=progress)
+        else:
+            found = calibration.adjust(**how, threads=threads, progress=progress)
+    return replace(found, result=found.result.with_max_bias_ratio(max_bias_ratio))
 
 
 def _files(found: Calibrated, report: str) -> dict[str, bytes]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from photogram.cli.command_classes import misuse
-from photogram.cli.components import UnitVarianceName
+from photogram.cli.components import MaxBiasRatio, UnitVarianceName
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ class Choices:
     loss: LossName | None = None
     unit_variance: UnitVarianceName | None = None
     iterations: Annotated[int | None, typer.Option(min=1)] = None
+    max_bias_ratio: MaxBiasRatio = None
     self_calibrate: str | None = None
 
     def datum_of(self, project: Project) -> str | None:
@@ -70,5 +71,6 @@ class Choices:
                 datum=None if self.hold else options.datum,
                 unit_variance=self.unit_variance or options.unit_variance,
                 max_iterations=self.iterations or options.max_iterations,
+                max_bias_ratio=self.max_bias_ratio or options.max_bias_ratio,
             )
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photogram.cli.command_classes import misuse
-from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, snooped
+from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, MaxBiasRatio, snooped
 from photogram.cli.console import print_sections, print_summary
 from photogram.cli.documents import TEXT, Documents
 from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
@@ -33,6 +33,7 @@ class CollectionFit:
     tolerance: float | None = None
     max_iterations: Annotated[int, typer.Option(min=1)] = 200
     covariance: Annotated[bool, typer.Option("--covariance/--no-covariance")] = True
+    max_bias_ratio: MaxBiasRatio = None
 
     @property
     def robust(self) -> robust.Loss | None:
@@ -82,6 +83,7 @@ def collection(
     # The value of --sd is not verified, so the default differs from blocks.
     snooping = replace(snooping, unit_weight=unit_weight)
     result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
+    result = result.with_max_bias_ratio(fit.max_bias_ratio)
     result = result.estimated(job, photos, components, threads)
     written = documents.plots_of(result.result, out)
     if out is not None:

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
+
+import typer
 
 from photogram.cli.job import Job, estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
@@ -24,6 +26,7 @@ COMPONENTS = "components.txt"
 
 
 UnitVarianceName = Literal["constrained", "unity", "redundancy"]
+MaxBiasRatio = Annotated[float | None, typer.Option(min=0.001)]
 
 
 class Basis(StrEnum):
@@ -74,6 +77,11 @@ class AdjustmentOutcome(Generic[Network]):
     def verdict(self) -> Verdict:
         """The verdict that determines the exit code."""
         return (self.components or self.subject).verdict
+
+    def with_max_bias_ratio(self, ratio: float | None) -> AdjustmentOutcome[Network]:
+        """Return the outcome with another limit of the effects of undetected errors."""
+        result = self.result.with_max_bias_ratio(ratio)
+        return replace(self, result=result, log=self.log and replace(self.log, result=result))
 
     def estimated(
         self, job: Job, network: object, bases: list[Basis] | None, threads: int | None

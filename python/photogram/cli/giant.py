@@ -11,7 +11,14 @@ from rich.markup import escape
 
 from photogram.cli.check import EXAMPLE
 from photogram.cli.command_classes import misuse
-from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, UnitVarianceName, snooped
+from photogram.cli.components import (
+    COMPONENTS,
+    AdjustmentOutcome,
+    Basis,
+    MaxBiasRatio,
+    UnitVarianceName,
+    snooped,
+)
 from photogram.cli.console import SHOWN, errors, print_summary
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, adjustment_status, with_job
@@ -48,6 +55,7 @@ class GiantOptions:
     air_refraction: AirModel | None = None
     water_refraction: WaterModel | None = None
     water_index: Annotated[float | None, typer.Option(min=1)] = None
+    max_bias_ratio: MaxBiasRatio = None
 
     def basis(self, common: Common) -> UnitVariance:
         """Return the basis of the variance of unit weight."""
@@ -201,7 +209,7 @@ def _adjusted_project(
         raise
     result = replace(found.result, messages=[*project.messages, *found.result.messages])
     log = None if found.log is None else replace(found.log, result=result)
-    return replace(found, result=result, log=log)
+    return replace(found, result=result, log=log).with_max_bias_ratio(how.max_bias_ratio)
 
 
 def _snooped(

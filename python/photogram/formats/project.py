@@ -54,12 +54,15 @@ class Options:
     ----------
     datum, loss, unit_variance, max_iterations
         As in :func:`photogram.adjust`.
+    max_bias_ratio
+        As in :meth:`photogram.Result.with_max_bias_ratio`.
     """
 
     datum: DatumName | None = None
     loss: Literal["huber", "cauchy"] | None = None
     unit_variance: Literal["constrained", "unity", "redundancy"] = "constrained"
     max_iterations: int | None = None
+    max_bias_ratio: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

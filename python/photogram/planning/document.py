@@ -11,6 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import PhotogramError
 from photogram.lazy_dataclasses import replace
 from photogram.planning.pattern import Pattern
+from photogram.results.hypotheses import FEWEST
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
@@ -26,6 +27,11 @@ ALIKE = 1.05  # largest ratio of standard deviations of patterns that count as e
 MIN_IMPROVEMENT = 1.1  # ratio of standard deviations from which a known readout time is recommended
 MAX_UNCHECKED = 0.01  # share of image coordinates without a check from which more rays are recommended
 MIN_REDUNDANCY = 0.2  # redundancy number of control below which more control is recommended
+REMEDIES = {
+    **dict.fromkeys(("time-offset", "lever-arm", "gnss-drift", "boresight", "camera-point"), "strips"),
+    **dict.fromkeys(("camera-f", "camera-term", "readout-time"), "heights"),
+}
+"""Observations that detect errors of these types; other types need points."""
 SHARE = (Axis("", "", small="percent", factor=100.0),)
 IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
 MOTION_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
@@ -48,6 +54,10 @@ def plan_document(patterns: Sequence[Pattern]) -> Document:
         " change of an unknown by an undetected error of this size, in standard deviations."
     )
     control = "An error of control that is smaller than the detectable one changes the result undetected."
+    errors = (
+        "The table contains errors of sets of observations and of single ones, the largest effects first."
+        " Without an MDB, an error of any size remains undetected, and the effect has a plausible size."
+    )
     new = any(pattern.new_points.any() for pattern in patterns)
     return Document(
         what="Prediction of a network before it is flown",
@@ -63,6 +73,7 @@ def plan_document(patterns: Sequence[Pattern]) -> Document:
             _layers("photos", "Photos", patterns, _photos),
             _layers("motion", "Motion", patterns, _motion),
             _layers("control", "Control", patterns, _control, control),
+            _layers("undetected", "Undetected errors", patterns, _undetected, errors),
             remarks_section(_remarks(patterns)),
         ],
         details=[
@@ -80,6 +91,7 @@ def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
         "points": f"standard deviations {linear}, detectable mm, effect standard deviations",
         "photos": f"positions {linear}, angles rad",
         "control": f"sd and detectable {linear}, effect standard deviations",
+        "undetected": f"change {linear} or rad, bias_to_noise and ratio standard deviations",
     }
     if any(pattern.motion for pattern in patterns):
         units["motion"] = "as each says"
@@ -102,6 +114,7 @@ def _pattern_members(pattern: Pattern) -> dict[str, object]:
         "points": records(_points(pattern).columns),
         "photos": [*map(vars, pattern.photos)],
         "control": records(_control(pattern).columns),
+        "undetected": records(_undetected(pattern).columns),
         **{name: value for name, value in optional.items() if value},
     }
 
@@ -192,6 +205,15 @@ def _control(pattern: Pattern) -> Table:
     return Table("", pattern.name, columns, shown=shown)
 
 
+def _undetected(pattern: Pattern) -> Table:
+    found = pattern.hypotheses
+    if found is None:
+        return Table("", pattern.name, [Quantity([], kind="name", head="Error")])
+    table, members_only = found.external_reliability(found.effective), ("redundancy", "bias_to_noise")
+    columns = [replace(each, head="") if each.name in members_only else each for each in table.columns]
+    return replace(table, key="", title=pattern.name, columns=columns)
+
+
 def _layers(
     key: str, title: str, patterns: Sequence[Pattern], table: Callable[[Pattern], Table], intro: str = ""
 ) -> Section:
@@ -272,6 +294,15 @@ def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
         weak = [each.component for each in pattern.control if each.held and each.redundancy < MIN_REDUNDANCY]
         if weak:
             phrases.append(about("plan.control", components=weak))
+        if found := pattern.hypotheses:
+            worst: dict[str, int] = {}
+            for row in found.harmful:
+                worst.setdefault(REMEDIES.get(str(found.code[row]), "points"), row)
+            phrases += [
+                about(f"plan.undetected.{remedy}", error=found.sentence(row)) for remedy, row in worst.items()
+            ]
+            if assumed := found.assumed(FEWEST):
+                phrases.append(about("plan.assumed", errors=assumed))
         readout = [quality for quality in pattern.motion if quality.unit == "s"]
         ratio = max(_improvements(pattern))
         if readout and ratio > MIN_IMPROVEMENT:

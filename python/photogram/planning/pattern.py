@@ -23,6 +23,8 @@ from photogram.network.block import Block
 from photogram.network.hull import hull
 from photogram.network.motion import on_shared, timed_images
 from photogram.network.trajectories import Readout
+from photogram.results.hypotheses import Hypotheses
+from photogram.results.hypothesis_facts import block_facts
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
@@ -265,6 +267,15 @@ class Pattern:
             found.append(_quality("position of trajectories", linear, sd[:, :3]))
             found.append(_quality("rotation of trajectories", "rad", sd[:, 3:]))
         return found
+
+    @cached_property
+    def hypotheses(self) -> Hypotheses | None:
+        """Undetected errors and their effects without check points; None without redundancy."""
+        result = self.result
+        if not result.degrees_of_freedom > 0:
+            return None
+        # In a plan, all points have given coordinates, but these check nothing.
+        return result._evaluated(result.reliability(), block_facts(self.block, result.photo_positions))
 
     @property
     def known_rms_sd(self) -> tuple[float, float, float] | None:

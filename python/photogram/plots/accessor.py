@@ -17,6 +17,7 @@ from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import residuals
 from photogram.plots.tests import tests
 from photogram.plots.trajectories import trajectory
+from photogram.plots.undetected import undetected
 from photogram.show.sketch.plot import Plot
 
 P = ParamSpec("P")
@@ -25,6 +26,7 @@ PLOTS: dict[str, Callable[[Any], Plot]] = {
     "network": network,
     "residuals": residuals,
     "redundancy": redundancy,
+    "undetected": undetected,
     "tests": tests,
     "correlations": correlations,
     "distortion": distortion,
@@ -55,6 +57,7 @@ class Plots:
     network = _Method(network)
     residuals = _Method(residuals)
     redundancy = _Method(redundancy)
+    undetected = _Method(undetected)
     tests = _Method(tests)
     correlations = _Method(correlations)
     distortion = _Method(distortion)
@@ -72,7 +75,8 @@ class Plots:
         """Return the plots for which the result has data, by name.
 
         Plots are omitted if the result has no data for them: correlations and distortion of fixed cameras,
-        redundancy and tests without covariances, features and films of a block without them.
+        redundancy, undetected errors and tests without covariances, features and films of a block without
+        them.
         """
         plots = {name: sketch_of(self._result, name) for name in PLOTS}
         return {name: plot for name, plot in plots.items() if plot is not None}

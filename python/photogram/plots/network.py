@@ -76,7 +76,7 @@ def network(result: Any, *, plane: str | None = None) -> Plot:
         bars=bars,
         legend="beside",
     )
-    return Plot(*_size(limits), [panel])
+    return Plot(*size_of(limits), [panel])
 
 
 def view_of_plan(plan: Plan) -> tuple[Panel, tuple[int, int, int]]:
@@ -136,7 +136,8 @@ def _limits(plan: Plan, seen: tuple[int, int, int], outlines: Floats | None = No
     return np.array([low - margin, high + margin])
 
 
-def _size(limits: Floats) -> tuple[float, float]:
+def size_of(limits: Floats) -> tuple[float, float]:
+    """Return width and height of a plot of a network with a legend beside it, inches."""
     width, height = limits[1] - limits[0]
     longer = 6.5
     across = longer * min(1.0, width / height)
@@ -276,29 +277,46 @@ def _vectors(
     if not drawn:
         return [], NOWHERE
     # One scale for both types: the scale of the larger differences.
-    size = max(_usual(plan.differences[rows]) for rows in drawn)
-    if size == 0:
-        return [], NOWHERE
+    size = max(usual(plan.differences[rows]) for rows in drawn)
     rows = np.concatenate(drawn)
-    across, out = plan.differences[rows][:, pair], plan.differences[rows, seen[2]]
+    what = "difference", "differences of control and check points, adjusted less given"
+    return vectors(plan, seen, limits, rows, plan.differences[rows], size, what, marks)
+
+
+def vectors(
+    plan: Plan,
+    seen: tuple[int, int, int],
+    limits: Floats,
+    rows: Indices,
+    differences: Floats,
+    size: float,
+    what: tuple[str, str],
+    marks: list[Mark],
+) -> tuple[list[ScaleBar], Floats]:
+    """Add (k, 3) differences of points; return scale bars, and (k, 2) positions on the arrows.
+
+    `size` is a usual length; `what` the name of one difference, and the meaning of the scale bar.
+    """
+    if not size:
+        return [], NOWHERE
+    across, out = differences[:, list(seen[:2])], differences[:, seen[2]]
     extent = float((limits[1] - limits[0]).max())
     scale = round_length(0.08 * extent / size)
-    places, moved = plan.points[rows][:, pair], scale * np.nan_to_num(across)
+    places, moved = plan.points[rows][:, list(seen[:2])], scale * np.nan_to_num(across)
     if (long := np.hypot(*moved.T) > 0).any():
-        label = "difference in plan"
+        label = f"{what[0]} in plan"
         marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label=label, layer=6.0))
     if (high := np.isfinite(out) & (out != 0)).any():
         tops = places[high] + np.column_stack([np.zeros(high.sum()), scale * out[high]])
-        label = "difference in height, + upwards"
+        label = f"{what[0]} in height, + upwards"
         marks.append(Line(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label=label, layer=5.5))
     unit = f" {plan.unit}" if plan.unit else ""
     bar = round_length(0.12 * extent / scale)
-    what = f"differences of control and check points, adjusted less given (× {scale:,g})"
     between = np.concatenate([places + moved, places + 0.5 * moved])
-    return [(scale * bar, VERMILION, f"{bar:g}{unit}: {what}")], between
+    return [(scale * bar, VERMILION, f"{bar:g}{unit}: {what[1]} (× {scale:,g})")], between
 
 
-def _usual(differences: Floats) -> float:
+def usual(differences: Floats) -> float:
     """Return a size above nine tenths of (k, 3) differences; 0 without any."""
     sizes = np.sqrt(np.nansum(differences**2, axis=1))
     return float(np.quantile(sizes[sizes > 0], 0.9)) if (sizes > 0).any() else 0.0

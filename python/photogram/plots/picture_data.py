@@ -128,6 +128,19 @@ class VectorField:
     labels: Sequence[str] = ()  # Names of the points, or nothing
 
 
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Changes of n points by an undetected error."""
+
+    sentence: str  # The error
+    points: Indices  # (n,) rows
+    changes: Floats  # (n, 3) along the axes of the plan
+    ratios: Floats  # (n,) largest changes of a coordinate, standard deviations
+    limit: float  # Standard deviations from which on a change counts
+    suspects: Floats  # (k, 3) points and stations of an erroneous observation
+    several: int  # Number of points in the network
+
+
 class Pictured(Protocol):
     """The plot data of an adjusted network; each part is computed on demand."""
 
@@ -160,6 +173,9 @@ class Pictured(Protocol):
     @property
     def outlying(self) -> list[Bools]:
         """Masks of components that are outliers of the verdict."""
+
+    def moved(self, error: int | None) -> Moved | None:
+        """Return the effect of an undetected error, by default of the worst; None if not computed."""
 
     @property
     def unit_weight(self) -> float:

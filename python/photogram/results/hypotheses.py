@@ -9,38 +9,38 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.strips import strips_of
+from photogram.results.hypothesis_facts import NO_FACTS, Facts
 from photogram.show.cells import unit_written
-from photogram.show.quantity import Axis, Quantity, Table, records
+from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
 from photogram.statistics.findings import Tested
+from photogram.statistics.snooping.suspects import Suspects
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.network.block import Block
     from photogram.network.unadjusted import Given
     from photogram.results.network_trial import NamedSuspects, NetworkTrial
     from photogram.statistics.snooping.suspects import Tests
 
-Facts = dict[str, Any]  # Additional facts for hypotheses; see `NetworkTrial.hypotheses`
-
-LIMIT = 6.0  # Standard deviations from which on an undetected error of a point counts
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Smallest number of other points that it moves
 EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise ratios
+DRAWN = 300  # Largest number of points whose changes are stored for plots
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 LENSES = frozenset(
     {"camera-term", "bending"}
 )  # Errors that patterns of residuals reveal, or that have such a cause
+OF_CAMERAS = frozenset({"camera-f", "camera-point", "camera-term", "readout-time"})
+EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
 LISTED = 10  # Rows of each table of documents
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
@@ -64,76 +64,43 @@ UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
 whose causes (terms of distortion) are hypotheses of their own."""
 
-EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
-MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Effect:
     """Effects of an undetected error on points, by the most changed coordinates."""
 
+    checked: bool  # Whether check points detect it
+    changes: Floats  # (d, 3) changes of the `drawn` points
     points: int  # beyond the limit
     others: int  # the same without the points that the error belongs to
     ratio: float  # largest change, standard deviations
     at: tuple[int, int] | None  # point and coordinate of this change
     change: float  # largest change in the linear unit
-    checks: Sequence[tuple[float, float, float]] = ()  # Changes of check points
-
-
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """An error of observations or fixed values: its test and its external reliability."""
-
-    code: str
-    group: int | None  # Type of a group of observations; None for a set
-    index: int | None  # of the group, set or camera
-    component: int | None  # None for all components
-    parameters: Sequence[str]
-    observations: int  # that depend on the parameters
-    plausible: Sequence[float]  # Standard deviations before the data are used; empty if unknown
-    rank: int
-    statistic: float
-    probability: float
-    estimate: Sequence[float]
-    cofactors: Sequence[float]
-    redundancy: float
-    noncentrality: float
-    mdb: Sequence[float] | None
-    error: Sequence[float] | None  # whose effect is reported: MDB or plausible size
-    bias_to_noise: float
-    effect: Effect | None
-    log_odds: float  # against "no error"
-    checked: bool  # Whether check points detect it
-
-    @property
-    def undetected(self) -> float:
-        """Share of plausible errors that remain undetected; 1 without a plausible size."""
-        if self.mdb is None or not self.plausible:
-            return 1.0
-        size = max(abs(d) / p for d, p in zip(self.mdb, self.plausible, strict=True))
-        return math.erf(size / math.sqrt(2))
-
-    def moves(self) -> bool:
-        """Whether the estimated error moves a point beyond the limit."""
-        if self.effect is None or self.error is None:
-            return False
-        share = float(np.linalg.norm(self.estimate) / np.linalg.norm(self.error))
-        return share * self.effect.ratio > LIMIT
-
-    def is_harmful(self, points: int) -> bool:
-        """Whether an undetected error moves too many of a number of points."""
-        if self.effect is None or self.checked or self.code in UNGRADED:
-            return False
-        if self.undetected < RARE or self.code in DATUM:
-            return False
-        return self.effect.others >= max(FEWEST, math.ceil(SHARE * points))
 
 
 @dataclass(frozen=True, eq=False)
 class Hypotheses:
-    """All hypotheses of an adjusted network: errors of sets first."""
+    """All h hypotheses of an adjusted network as columns: errors of s sets first.
 
-    every: Sequence[Hypothesis]
+    Rows with k columns have a NaN for each parameter that a hypothesis does not have.
+    """
+
+    code: NDArray[np.str_]
+    index: Indices  # Set or camera; -1 for neither
+    group: Indices  # Group of `suspects`; -1 for a set
+    component: Indices  # -1 for all components
+    rank: Floats
+    statistic: Floats
+    probability: Floats
+    log_odds: Floats  # against "no error"
+    estimate: Floats  # (h, k)
+    redundancy: Floats
+    mdb: Floats  # (h, k); NaN if an error of any size remains undetected
+    bias_to_noise: Floats
+    sets: Sequence[Mapping[str, Any]]  # Other facts of the s sets; see `NetworkTrial.hypotheses`
+    effects: Mapping[int, Effect]  # of some rows
+    drawn: Indices  # (d,) points whose changes effects contain
+    limit: float  # Standard deviations from which on an undetected error of a point counts
     suspects: NamedSuspects
     cameras: Sequence[str]  # names
     points: int  # number of adjusted points
@@ -144,202 +111,211 @@ class Hypotheses:
     single_odds: float  # Largest log odds of an error of a single observation, images among them
     excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
 
-    @cached_property
-    def _group_of(self) -> dict[tuple[int, int], int]:
-        kinds, subjects = self.suspects.kinds, self.suspects.subjects
-        groups = np.flatnonzero(kinds != 0)
-        return dict(
-            zip(
-                zip(kinds[groups].tolist(), subjects[groups].tolist(), strict=True),
-                groups.tolist(),
-                strict=True,
-            )
-        )
+    def undetected(self, row: int) -> float:
+        """Return the share of plausible errors that remain undetected; 1 without a plausible size."""
+        plausible = self.sets[row]["plausible"] if row < len(self.sets) else ()
+        if np.isnan(self.mdb[row, 0]) or not plausible:
+            return 1.0
+        return math.erf(float(np.nanmax(np.abs(self.mdb[row, : len(plausible)]) / plausible)) / math.sqrt(2))
 
-    def name(self, own: Hypothesis) -> Phrase:
+    def _is_harmful(self, row: int) -> bool:
+        """Whether an undetected error moves too many points."""
+        code, effect = self.code[row], self.effects[row]
+        if effect.checked or code in UNGRADED or code in DATUM or self.undetected(row) < RARE:
+            return False
+        return effect.others >= max(FEWEST, math.ceil(SHARE * self.points))
+
+    def name(self, row: int) -> Phrase:
         """Return the name of a hypothesis."""
-        if own.group is None:
-            fields: dict[str, Any] = {"set": (own.index or 0) + 1, "parameters": list(own.parameters)}
-            if own.index is not None and own.code in (
-                "camera-f",
-                "camera-point",
-                "camera-term",
-                "readout-time",
-            ):
-                fields["camera"] = self.cameras[own.index] if own.index < len(self.cameras) else "1"
-            return Phrase(f"hypothesis.{own.code}", fields)
-        group = self._group_of[own.group, own.index or 0]
-        named = self.suspects.name(group)
-        if own.component is None:
+        code, index, group = str(self.code[row]), int(self.index[row]), int(self.group[row])
+        if group < 0:
+            fields: dict[str, Any] = {"set": max(index, 0) + 1, "parameters": self.sets[row]["parameters"]}
+            if index >= 0 and code in OF_CAMERAS:
+                other = phrase("hypothesis.camera", number=index + 1)
+                fields["camera"] = self.cameras[index] if index < len(self.cameras) else other
+            return Phrase(f"hypothesis.{code}", fields)
+        named, component = self.suspects.name(group), int(self.component[row])
+        if component < 0:
             return named
         rows = self.suspects.rows(group).tolist()
-        axes = [self.suspects.row_name(k) for k in rows if self.suspects.components[k] == own.component]
+        axes = [self.suspects.row_name(k) for k in rows if self.suspects.components[k] == component]
         return phrase("named.parts", axes=axes, named=named)
 
-    def unit(self, code: str) -> str:
-        """Return the unit of the errors of a type, behind a blank."""
-        return self.units.get(code, self.length)
+    def _unit(self, row: int) -> str:
+        """Return the unit of an error, behind a blank."""
+        if self.code[row] == "observation":
+            return f" {self.suspects.unit(int(self.suspects.row_starts[self.group[row]]))}".rstrip()
+        return self.units.get(str(self.code[row]), self.length)
 
     @property
-    def harmful(self) -> list[Hypothesis]:
-        """Hypotheses whose undetected errors move too many points, the worst first."""
-        found = [each for each in self.every if each.is_harmful(self.points)]
-        return sorted(
-            found, key=lambda each: (each.mdb is not None, -each.effect.ratio if each.effect else 0)
-        )
+    def harmful(self) -> list[int]:
+        """Rows whose undetected errors move too many points, the worst first."""
+        rows = [row for row in self.effects if self._is_harmful(row)]
+        return sorted(rows, key=lambda row: (not np.isnan(self.mdb[row, 0]), -self.effects[row].ratio))
+
+    @property
+    def worst(self) -> int | None:
+        """The first of these rows, else the row with the largest effect, errors of the datum last."""
+        rows = sorted(self.effects, key=lambda row: (self.code[row] in DATUM, -self.effects[row].ratio))
+        return next(iter([*self.harmful, *rows]), None)
 
     def unchecked(self) -> list[Phrase]:
         """Return messages on these errors, the worst first."""
-        messages = []
-        for each in self.harmful:
-            effect = each.effect or Effect(0, 0, 0.0, None, 0.0)
-            if each.mdb is None:
-                messages.append(phrase("unchecked.any", named=self.name(each)))
-                continue
-            size, named = self._main_component(each, each.mdb)
-            share = 100 * effect.points / self.points
-            fields = {"size": size, "named": named, "percent": share, "ratio": effect.ratio}
-            messages.append(Phrase("unchecked.mdb", fields))
-        return messages
+        return [self.sentence(row) for row in self.harmful]
 
-    def _main_component(self, own: Hypothesis, mdb: Sequence[float]) -> tuple[str, Phrase]:
+    def sentence(self, row: int) -> Phrase:
+        """Return the message on an undetected error with a known effect."""
+        if np.isnan(self.mdb[row, 0]):
+            return phrase("unchecked.any", named=self.name(row))
+        size, named = self._main_component(row)
+        effect = self.effects[row]
+        fields = {"size": size, "named": named, "percent": 100 * effect.points / self.points}
+        return Phrase("unchecked.mdb", {**fields, "ratio": effect.ratio})
+
+    def _main_component(self, row: int) -> tuple[str, Phrase]:
         """Return the size of an error, and its name if one component is nearly all of it."""
-        unit = self.unit(own.code)
+        unit, mdb = self._unit(row), self.mdb[row][~np.isnan(self.mdb[row])]
         squares = np.square(mdb)
-        parts = [each for each in self.every if each.component is not None]
-        of_group = [each for each in parts if (each.group, each.index) == (own.group, own.index)]
-        if len(of_group) == len(mdb) and squares.max() > MAIN * squares.sum():
+        parts = np.flatnonzero((self.group == self.group[row]) & (self.component >= 0))
+        if len(parts) == len(mdb) and squares.max() > MAIN * squares.sum():
             main = int(squares.argmax())
-            return f"{abs(mdb[main]):.3g}{unit}", self.name(of_group[main])
-        if len(mdb) == 1:
-            return f"{abs(mdb[0]):.3g}{unit}", self.name(own)
-        return f"{math.sqrt(squares.sum()):.3g}{unit}", self.name(own)
+            return f"{abs(mdb[main]):.3g}{unit}", self.name(int(parts[main]))
+        return f"{math.sqrt(squares.sum()):.3g}{unit}", self.name(row)
 
     @property
     def assumptions(self) -> list[Phrase]:
         """Names of untested observations that define the datum."""
-        untested = {each.code for each in self.every if each.code in DATUM and each.undetected >= RARE}
+        return self.assumed()
+
+    def assumed(self, least: int = 0) -> list[Phrase]:
+        """Return these names; with `least`, only those whose errors move as many points or more."""
+        rows = [
+            row for row in range(len(self.sets)) if self.code[row] in DATUM and self.undetected(row) >= RARE
+        ]
+        if least:
+            rows = [row for row in rows if row in self.effects and self.effects[row].points >= least]
+        untested = {str(self.code[row]) for row in rows}
         sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
         codes = [codes[0] for codes in sources if untested.intersection(codes)]
         return [phrase(f"datum.{code}") for code in codes]
 
-    def common(self, rivals: float = -math.inf) -> list[Hypothesis]:
-        """Return detected errors of sets that explain more than any single value, the most likely first.
+    def common(self, rivals: float = -math.inf) -> list[int]:
+        """Return rows of detected errors of sets that explain more than any single value.
 
-        `rivals` are the largest log odds of an error of a fixed value.
+        The first is the most likely. `rivals` are the largest log odds of an error of a fixed value.
         """
-        found = [
-            each
-            for each in self.every
-            if each.group is None and each.code not in LENSES and each.probability < DETECTION[0]
-        ]
-        found.sort(key=lambda each: -each.log_odds)
-        if not found or found[0].log_odds < max(self.single_odds, rivals):
+        odds, sets = self.log_odds, range(len(self.sets))
+        found = [k for k in sets if self.code[k] not in LENSES and self.probability[k] < DETECTION[0]]
+        found.sort(key=lambda row: -odds[row])
+        if not found or odds[found[0]] < max(self.single_odds, rivals):
             return []
-        if found[0].statistic < EXPLAINED * self.excess:
+        if self.statistic[found[0]] < EXPLAINED * self.excess:
             return []
-        return [each for each in found if each.log_odds > found[0].log_odds - math.log(ALTERNATIVES)]
+        return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first."""
         found = self.common(rivals)
         return [
             phrase(
-                "common.error" if each is found[0] else "common.alternative",
-                named=self.name(each),
-                size=_size(each, self.unit(each.code)),
-                odds=math.exp(found[0].log_odds - each.log_odds),
+                "common.error" if row == found[0] else "common.alternative",
+                named=self.name(row),
+                size=self._size(row),
+                odds=math.exp(self.log_odds[found[0]] - self.log_odds[row]),
             )
-            for each in found
+            for row in found
         ]
+
+    def _size(self, row: int) -> str:
+        """Return the estimate of a set with its standard deviation; the largest of several."""
+        estimate, parameters = self.sets[row]["estimate"], self.sets[row]["parameters"]
+        k = int(np.argmax(np.abs(estimate)))
+        sd = math.sqrt(max(self.sets[row]["cofactors"][k * (len(estimate) + 1)], 0.0))
+        axis = f"{parameters[k]} " if len(estimate) > 1 else ""
+        return f"{axis}{estimate[k]:.4g}{self._unit(row)} (sd {sd:.2g})"
 
     @property
     def common_is_harmful(self) -> bool:
         """Whether the most likely of these errors moves a point beyond the limit."""
-        return any(each.moves() for each in self.common()[:1])
+        for row in self.common()[:1]:
+            estimate, error = self.sets[row]["estimate"], self.sets[row]["error"]
+            if row in self.effects and error is not None:
+                share = float(np.linalg.norm(estimate) / np.linalg.norm(error))
+                return share * self.effects[row].ratio > self.limit
+        return False
 
     @property
-    def likely(self) -> Sequence[Hypothesis]:
-        """The most likely hypotheses, for documents."""
-        return sorted(self.every, key=lambda each: -each.log_odds)[:LISTED]
+    def likely(self) -> Indices:
+        """Rows of the most likely hypotheses, for documents."""
+        return np.argsort(-self.log_odds, kind="stable")[:LISTED]
 
     @property
-    def effective(self) -> Sequence[Hypothesis]:
-        """The hypotheses with the largest effects of undetected errors, for documents."""
-        return sorted(self.every, key=lambda each: -each.effect.ratio if each.effect else 0.0)[:LISTED]
+    def effective(self) -> Indices:
+        """Rows of the largest effects of undetected errors, for documents."""
+        ratios = np.zeros(len(self.code))
+        ratios[[*self.effects]] = [effect.ratio for effect in self.effects.values()]
+        return np.argsort(-ratios, kind="stable")[:LISTED]
 
-    def tests(self, some: Sequence[Hypothesis]) -> Table:
+    @property
+    def every(self) -> Indices:
+        """All rows."""
+        return np.arange(len(self.code))
+
+    def tests(self, rows: Indices) -> Table:
         """Return the declared table of the tests of some hypotheses."""
         columns = [
-            *self._names(some),
-            _column("dimension", [each.rank for each in some], "Parameters", decimals=0),
-            _column("statistic", [each.statistic for each in some], "T", decimals=2),
-            _column("p", [each.probability for each in some], "p", figures=2),
-            _column("log_odds", [each.log_odds for each in some], "Log odds", decimals=1),
-            _column("estimate", [_written(each, each.estimate) for each in some], "Estimate", kind="name"),
+            *self._names(rows),
+            column("dimension", self.rank[rows], "Parameters", decimals=0),
+            column("statistic", self.statistic[rows], "T", decimals=2),
+            column("p", self.probability[rows], "p", figures=2),
+            column("log_odds", self.log_odds[rows], "Log odds", decimals=1),
+            self._written("estimate", rows, "Estimate"),
         ]
         note = "Log odds compare an error of a plausible size with no error."
         return Table("hypotheses", "Tested hypotheses", columns, note)
 
-    def external_reliability(self, some: Sequence[Hypothesis]) -> Table:
+    def external_reliability(self, rows: Indices) -> Table:
         """Return the declared table of undetected errors of some hypotheses, and of their effects."""
-        effects = [each.effect or Effect(0, 0, math.nan, None, math.nan) for each in some]
-        worst = [
-            "" if each.at is None else f"{self.axes[each.at[1]]} of {self.point_ids[each.at[0]]}"
-            for each in effects
-        ]
+        none = Effect(False, np.empty((0, 3)), 0, 0, math.nan, None, math.nan)
+        effects = [self.effects.get(row, none) for row in rows.tolist()]
+        at = [each.at and f"{self.axes[each.at[1]]} of {self.point_ids[each.at[0]]}" for each in effects]
         columns = [
-            *self._names(some),
-            _column("redundancy", [each.redundancy for each in some], "Redundancy", decimals=4),
-            _column("mdb", [_written(each, each.mdb or ()) for each in some], "MDB", kind="name"),
-            _column("bias_to_noise", [each.bias_to_noise for each in some], "Moves up to, sd", decimals=1),
-            _column("points", [each.points for each in effects], "Points moved", decimals=0),
-            _column("ratio", [each.ratio for each in effects], "Largest effect, sd", decimals=1),
-            _column("change", [each.change for each in effects], "Largest effect", decimals=3),
-            _column("at", worst, "At", kind="name"),
+            *self._names(rows),
+            column("redundancy", self.redundancy[rows], "Redundancy", decimals=4),
+            self._written("mdb", rows, "MDB"),
+            column("bias_to_noise", self.bias_to_noise[rows], "Moves up to, sd", decimals=1),
+            of_each(effects, "points", name="points", head="Points moved", decimals=0),
+            of_each(effects, "ratio", name="ratio", head="Largest effect, sd", decimals=1),
+            of_each(effects, "change", name="change", head="Largest effect", decimals=3),
+            column("at", np.array([each or "" for each in at], dtype=object), "At", kind="name"),
         ]
         note = (
             f"MDB: the error that tests of the level {DETECTION[0]:g} detect in {100 * DETECTION[1]:.0f} of"
-            f" 100 cases. Otherwise, points moved change by more than {LIMIT:g} standard deviations."
+            f" 100 cases. Otherwise, points moved change by more than {self.limit:g} standard deviations."
         )
         return Table("external-reliability", "Undetected errors", columns, note)
 
     def document(self) -> list[dict[str, Any]]:
         """Return the rows of both tables of documents as JSON objects."""
-        listed = {id(each) for each in (*self.likely, *self.effective)}
-        some = [each for each in self.every if id(each) in listed]
-        tables = self.tests(some), self.external_reliability(some)
-        tests, effects = (records(table.columns) for table in tables)
+        rows = np.union1d(self.likely, self.effective)
+        tests, effects = (records(own(rows).columns) for own in (self.tests, self.external_reliability))
         return [{**test, **effect} for test, effect in zip(tests, effects, strict=True)]
 
-    def _names(self, some: Sequence[Hypothesis]) -> list[Quantity]:
+    def _names(self, rows: Indices) -> list[Quantity]:
+        names = [str(self.name(row)) for row in rows.tolist()]
         return [
-            _column("code", [each.code for each in some], "", kind="name"),
-            _column("hypothesis", [str(self.name(each)) for each in some], "Error", kind="name"),
+            column("code", self.code[rows].astype(object), kind="name"),
+            column("hypothesis", np.array(names, dtype=object), "Error", kind="name"),
         ]
 
-
-def _column(name: str, values: Any, head: str, **more: Any) -> Quantity:
-    return Quantity(
-        np.array(values, dtype=object if more.get("kind") == "name" else float),
-        name=name,
-        member=name,
-        head=head,
-        **more,
-    )
-
-
-def _size(own: Hypothesis, unit: str) -> str:
-    """Return an estimate with standard deviation; the largest of several."""
-    k = int(np.argmax(np.abs(own.estimate)))
-    sd = math.sqrt(max(own.cofactors[k * (len(own.estimate) + 1)], 0.0))
-    axis = f"{own.parameters[k]} " if len(own.estimate) > 1 else ""
-    return f"{axis}{own.estimate[k]:.4g}{unit} (sd {sd:.2g})"
-
-
-def _written(own: Hypothesis, values: Sequence[float]) -> str:
-    names = own.parameters or [""] * len(values)
-    return ", ".join(f"{name} {value:.4g}".lstrip() for name, value in zip(names, values, strict=False))
+    def _written(self, name: str, rows: Indices, head: str) -> Quantity:
+        """Return a column of errors as texts with the names of parameters."""
+        texts = []
+        for row, values in zip(rows.tolist(), getattr(self, name)[rows].tolist(), strict=True):
+            names = self.sets[row]["parameters"] if row < len(self.sets) else [""] * len(values)
+            pairs = [pair for pair in zip(names, values, strict=False) if not math.isnan(pair[1])]
+            texts.append(", ".join(f"{name} {value:.4g}".lstrip() for name, value in pairs))
+        return column(name, np.array(texts, dtype=object), head, kind="name")
 
 
 def hypotheses(
@@ -349,63 +325,121 @@ def hypotheses(
     given: Given,
     axes: Sequence[Axis],
     standing: tuple[float, float],
+    limit: float,
     *,
     known: bool,
 ) -> Hypotheses:
     """Return the hypotheses of an adjusted network with the `tests` of its observations.
 
-    `axes` are those of its points, `standing` the sum of squares and the degrees of freedom. `known` is
-    whether the unit weight is known.
+    `axes` are those of its points, `standing` the sum of squares and the degrees of freedom, `known` is
+    whether the unit weight is known. `limit`: standard deviations from which on an undetected error of a
+    point counts.
     """
-    suspects = trial.suspects
-    estimated = None if known else standing
+    suspects, estimated = trial.suspects, None if known else standing
+    images = (suspects.kinds == 0) & tests.active
+    adjusted = drawn = np.unique(suspects.points[images])
+    if len(adjusted) > DRAWN:
+        # Every n-th point of a regular network would form patterns.
+        drawn = np.sort(np.random.default_rng(0).choice(adjusted, DRAWN, replace=False))
     core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
     core.pop("check_sd", None)
     timed = core.pop("timed", False)
+    checks = len(core["checks"])
+    core["checks"] = [*core["checks"], *drawn.tolist()]
     rows, _ = trial.core.hypotheses(
-        **core, estimated=estimated, detection=DETECTION, limit=LIMIT, effects=EFFECTS
+        **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
-    numbers = Counter((row["code"], row["component"] is None) for row in rows)
-    every = []
-    for row in rows:
-        effect = None if row["effect"] is None else Effect(*row["effect"])
-        absurd = sum((d / p) ** 2 for d, p in zip(row["estimate"], row["plausible"], strict=False))
-        count = numbers[row["code"], row["component"] is None]
-        k, statistic = max(len(row["estimate"]), 1), row["statistic"]
-        if estimated is not None:
-            omega, freedom = estimated
-            statistic = -freedom * math.log(max(1 - statistic / omega, 1e-300))
-        odds = float(_log_odds(statistic, k, max(row["observations"], k + 1), count)) - absurd / 2
-        checked = _is_checked(effect, check_sd)
-        every.append(Hypothesis(**{**row, "effect": effect}, log_odds=odds, checked=checked))
-    length, image = unit_written(axes[2].small), given.image_unit
-    units = {"camera-f": f" {image}", "camera-point": f" {image}"}
-    units |= dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad")
-    units |= dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown", "observation"), "")
-    units |= dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures")
-    images = (suspects.kinds == 0) & tests.active
+
+    def of(name: str) -> Any:
+        return np.array([-1 if row[name] is None else row[name] for row in rows])
+
+    width = max((len(row["estimate"]) for row in rows), default=1)
+    estimate, plausible, mdb = (_padded(rows, name, width) for name in ("estimate", "plausible", "mdb"))
+    kinds = [(row["code"], row["component"] is None) for row in rows]
+    numbers = Counter(kinds)
+    count, statistic = np.array([numbers[kind] for kind in kinds]), of("statistic")
+    k = np.maximum(np.count_nonzero(~np.isnan(estimate), axis=1), 1)
+    if estimated is None:
+        change = statistic
+    else:
+        omega, freedom = estimated
+        change = -freedom * np.log(np.maximum(1 - statistic / omega, 1e-300))
+    odds = _log_odds(change, k, np.maximum(of("observations"), k + 1), count)
+    odds -= np.nansum(np.square(estimate / plausible), axis=1) / 2
+    effects = {}
+    for row, own in enumerate(rows):
+        if (effect := own.pop("effect")) is not None:
+            of_checks, of_points = np.split(np.reshape(effect[-1], (-1, 3)), [checks])
+            effects[row] = Effect(_is_checked(of_checks, check_sd), of_points, *effect[:-1])
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(largest, 2, 3, max(int(np.count_nonzero(images)), 1)))
+    kind, index = of("group"), of("index")
+    sets = int(np.count_nonzero(kind < 0))
     return Hypotheses(
-        every,
+        code=np.array([code for code, _ in kinds], dtype=np.str_),
+        index=index,
+        group=_groups(suspects, kind, index),
+        component=of("component"),
+        rank=of("rank"),
+        statistic=statistic,
+        probability=of("probability"),
+        log_odds=odds,
+        estimate=estimate,
+        redundancy=of("redundancy"),
+        mdb=mdb,
+        bias_to_noise=of("bias_to_noise"),
+        sets=rows[:sets],
+        effects=effects,
+        drawn=drawn,
+        limit=limit,
         suspects=suspects,
         cameras=getattr(given, "camera_names", ()),
-        points=len(np.unique(suspects.points[images])),
+        points=len(adjusted),
         point_ids=given.point_ids,
         axes=[axis.name for axis in axes],
-        units=units,
-        length=f" {length}",
+        units=_units(given.image_unit, timed=timed),
+        length=f" {unit_written(axes[2].small)}",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
-        single_odds=max([of_images, *(each.log_odds for each in every if each.group is not None)]),
+        single_odds=float(np.nanmax(odds[sets:], initial=of_images)),
     )
 
 
-def _is_checked(effect: Effect | None, check_sd: Floats | None) -> bool:
+def _units(image: str, *, timed: bool) -> dict[str, str]:
+    """Return the units of errors that are no lengths; `image` is the unit of image coordinates."""
+    return {
+        **dict.fromkeys(("camera-f", "camera-point"), f" {image}"),
+        **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
+        **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
+        **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
+    }
+
+
+def _padded(rows: Sequence[Mapping[str, Any]], name: str, width: int) -> Floats:
+    """Return lists of numbers as rows of an array, with NaN behind them."""
+    values = [row[name] or () for row in rows]
+    found = np.full((len(rows), width), np.nan)
+    found[np.arange(width) < np.array([*map(len, values)], dtype=int)[:, np.newaxis]] = [*chain(*values)]
+    return found
+
+
+def _groups(suspects: Suspects, kinds: Indices, subjects: Indices) -> Indices:
+    """Return the groups with these types and subjects; -1 for a negative type."""
+    most = max(int(suspects.subjects.max(initial=0)), int(subjects.max(initial=0))) + 1
+    others = np.flatnonzero(suspects.kinds != 0)
+    keys = suspects.kinds[others] * most + suspects.subjects[others]
+    order = np.argsort(keys)
+    found = np.full(len(kinds), -1)
+    own = kinds >= 0
+    found[own] = others[order[np.searchsorted(keys, (kinds * most + subjects)[own], sorter=order)]]
+    return found
+
+
+def _is_checked(changes: Floats, check_sd: Floats | None) -> bool:
     """Whether an error moves a check point by an amount that its test detects."""
-    if effect is None or check_sd is None or not len(effect.checks):
+    if check_sd is None or not len(changes):
         return False
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.abs(np.array(effect.checks)) / check_sd
+        ratios = np.abs(changes) / check_sd
     return bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
 
 
@@ -420,66 +454,7 @@ def largest_odds(tests: Iterable[Tested]) -> float:
     return max(found)
 
 
-def _log_odds(statistic: ArrayLike, k: ArrayLike, observations: ArrayLike, count: int) -> Floats:
+def _log_odds(statistic: ArrayLike, k: ArrayLike, observations: ArrayLike, count: ArrayLike) -> Floats:
     """Return T/2 - k/2 ln n_h - ln N_h: the log odds of an error of any size against no error."""
     half = np.asarray(k) / 2 * np.log(observations)
-    return np.asarray(np.asarray(statistic) / 2 - half - math.log(count))
-
-
-NO_FACTS: Facts = {
-    "velocities": np.empty((0, 3)),
-    "times": [],
-    "position_sets": [],
-    "control_sets": [],
-    "readouts": [],
-    "widths": [],
-    "checks": [],
-    "centre": None,
-}
-
-
-def block_facts(block: Block, places: Floats) -> Facts:
-    """Return facts for hypotheses on a block: velocities, sets, sizes of images.
-
-    `places` are the (P, 3) adjusted positions of photos.
-    """
-    count = len(block.photo_ids)
-    cameras = np.zeros(count, dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
-    facts: Facts = {"widths": [], "readouts": []}
-    of_images = cameras[block.image_photos]
-    low, high = (np.full((max(len(block.cameras), 1), 2), end) for end in (math.inf, -math.inf))
-    np.minimum.at(low, of_images, block.image_xy)
-    np.maximum.at(high, of_images, block.image_xy)
-    for camera, (width, height) in enumerate((high - low).tolist()):
-        facts["widths"].append(width if width > 0 else math.nan)
-        digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0
-        middle = float(low[camera, 1] + high[camera, 1]) / 2
-        facts["readouts"].append([0.0, 1 / height, -middle / height] if digital else None)
-    if block.geographic:
-        return facts
-    seconds = np.full(count, math.nan)
-    row = {name: k for k, name in enumerate(block.photo_ids)}
-    for each in block.observations:
-        if each.KIND == "position" and each.photos and each.photos[0] in row:
-            seconds[row[each.photos[0]]] = each.time  # type: ignore[attr-defined]
-    timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
-    times = seconds if timed else np.arange(count, dtype=np.float64)
-    velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)
-    strips = strips_of(places) if count > 1 else []
-    for number, strip in enumerate(strips):
-        sets[strip] = number
-        if len(strip) > 1 and (np.diff(times[strip]) > 0).all():
-            velocities[strip] = np.gradient(places[strip], times[strip], axis=0)
-    facts["velocities"] = velocities
-    if count > 1:
-        # Without times, the order of the photos is used.
-        facts |= {"times": times.tolist(), "timed": timed}
-    if 1 < len(strips) <= MOST_SETS:
-        facts["position_sets"] = sets.tolist()
-    control = np.isfinite(block.point_sd).any(axis=1)
-    _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
-    own = np.unique(kinds[control])
-    if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        set_of = {int(kind): k for k, kind in enumerate(own)}
-        facts["control_sets"] = [set_of.get(kind) for kind in kinds.tolist()]
-    return facts
+    return np.asarray(np.asarray(statistic) / 2 - half - np.log(count))

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import finite_rows, freeze_fields, standard_deviations
+from photogram.arguments.arrays import argument_error, finite_rows, freeze_fields, number, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.io import json
-from photogram.lazy_dataclasses import dataclass, fields
+from photogram.lazy_dataclasses import dataclass, fields, replace
 from photogram.messages import Message
 from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from photogram.plots.picture_data import Pictured
     from photogram.results.axes import Determined, Terms
     from photogram.results.hypotheses import Hypotheses
+    from photogram.results.hypothesis_facts import Facts
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
@@ -68,6 +69,9 @@ class Observed:
     def tests(self) -> Floats:
         """(r, k) standardized residuals with the sign of the differences."""
         return 0.0 - self.standardized
+
+
+MAX_BIAS_RATIO = 6.0  # Permitted effect of undetected errors on points, in standard deviations
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -122,6 +126,9 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         Options and final state of the core, from which covariances are computed.
     snooped
         The observations that data snooping removed before; None without data snooping.
+    max_bias_ratio
+        Standard deviations from which on an undetected error of a point counts for the verdict; see
+        :meth:`with_max_bias_ratio`.
     """
 
     status: str
@@ -149,6 +156,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     options: CoreOptions
     state: _photocore.BlockState
     snooped: Removed | None = None
+    max_bias_ratio: float = MAX_BIAS_RATIO
 
     KNOWN: ClassVar[bool] = True
     """Whether standard deviations are given, so that the unit weight is known."""
@@ -276,7 +284,6 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         computed = bool(finite_rows(self.redundancy)[self.used_images].all())
         if not (computed and self.converged and self.degrees_of_freedom > 0):
             return None
-        from photogram.results.hypotheses import hypotheses
         from photogram.results.reliability_summary import reliability_summary
         from photogram.statistics.snooping.suspects import LostSupportError
 
@@ -285,12 +292,18 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
             # Other results remain valid; a network that is singular by rounding has a message already.
             return None
-        own = found.standing
-        known = own.weighted_sum_of_squares, float(own.degrees_of_freedom)
-        standing = known if self.KNOWN else self.sum_and_freedom
-        axes, facts = self._terms().point_axes, self._hypothesis_facts()
-        errors = hypotheses(found.trial, found.tests, facts, self.given, axes, standing, known=self.KNOWN)
+        errors = self._evaluated(found, self._hypothesis_facts())
         return reliability_summary(found, errors, heights=self.geographic)
+
+    def _evaluated(self, found: Reliability, facts: Facts) -> Hypotheses:
+        """Evaluate the hypotheses of the catalogue with some facts."""
+        from photogram.results.hypotheses import hypotheses
+
+        own, axes = found.standing, self._terms().point_axes
+        standing = own.weighted_sum_of_squares, float(own.degrees_of_freedom)
+        standing = standing if self.KNOWN else self.sum_and_freedom
+        parts = found.trial, found.tests, facts, self.given, axes, standing, self.max_bias_ratio
+        return hypotheses(*parts, known=self.KNOWN)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""
@@ -321,7 +334,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
         Columns are the redundancy, the minimal detectable bias (MDB), and its largest effect on any function
         of the unknowns in standard deviations. They also include the number of points that it moves by more
-        than 4 standard deviations, and the largest change of a point.
+        than `max_bias_ratio` standard deviations, and the largest change of a point.
 
         Raises
         ------
@@ -330,6 +343,26 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """
         found = self._hypotheses()
         return found.external_reliability(found.every).frame()
+
+    def with_max_bias_ratio(self, ratio: float | None) -> Self:
+        """Return the result with a verdict that permits larger or smaller effects of undetected errors.
+
+        Parameters
+        ----------
+        ratio
+            Standard deviations from which on an undetected error of a point counts; None: unchanged. If such
+            an error moves too many points, the verdict is `accepted-not-checked` (docs/tests.md).
+
+        Raises
+        ------
+        InputError
+            If the ratio is not a positive number.
+        """
+        if ratio is None:
+            return self
+        if not 0 < number("max_bias_ratio", ratio) < math.inf:
+            raise argument_error("max_bias_ratio", "positive", value=ratio)
+        return replace(self, max_bias_ratio=float(ratio))
 
     @property
     def image_points(self) -> Indices:

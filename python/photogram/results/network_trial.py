@@ -279,6 +279,11 @@ class NamedSuspects(Suspects):
             return np.array([subject])
         return self.other_loads(kind, subject)
 
+    def touched(self, group: int) -> tuple[list[int], list[int]]:
+        """Return the points and photos that a group observes."""
+        points, photos = int(self.points[group]), int(self.photos[group])
+        return [points] * (points >= 0), [photos] * (photos >= 0)
+
     def photo_name(self, photo: int) -> Phrase:
         return Phrase("named.photo", {"photo": str(self.given.photo_ids[photo])})
 
@@ -408,6 +413,12 @@ class BlockSuspects(NamedSuspects):
         if kind in (CONTROL, POSITION, ATTITUDE) and len(components) > 1:
             return [(row,) for row in range(len(components))]
         return None
+
+    def touched(self, group: int) -> tuple[list[int], list[int]]:
+        if self.kinds[group] != OBSERVATION:
+            return super().touched(group)
+        own = self.observations[int(self.subjects[group])]
+        return [self.point_row[name] for name in own.points], [self.photo_row[name] for name in own.photos]
 
     def other_loads(self, kind: int, subject: int) -> Indices:
         """Return the photos that an additional observation affects; all if common."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.network import geometry
@@ -21,6 +22,7 @@ from photogram.plots.picture_data import (
     Curves,
     Deviations,
     Images,
+    Moved,
     Pictured,
     Plan,
     VectorField,
@@ -89,6 +91,25 @@ class PicturedNetwork(Pictured):
         """Components that are outliers of the verdict."""
         return self._tests.outliers
 
+    def moved(self, error: int | None) -> Moved | None:
+        summary, plan = self.result.reliability_summary, self.plan
+        found = None if summary is None else summary.hypotheses
+        row = error if error is not None or found is None else found.worst
+        if found is None or row is None or row not in found.effects:
+            return None
+        points, group = found.drawn, int(found.group[row])
+        changes = found.effects[row].changes * self.lengths(points)
+        sd = standard_deviations(self.covariances(points)) / self.unit_weight
+        ratios = np.divide(np.abs(changes), sd, out=np.zeros_like(sd), where=sd > 0)
+        own, photos = found.suspects.touched(group) if group >= 0 else ([], [])
+        suspects = np.concatenate([plan.points[own], plan.photos[photos]])
+        sentence = str(found.sentence(row))
+        return Moved(sentence, points, changes, ratios.max(axis=1), found.limit, suspects, found.points)
+
+    def lengths(self, points: Indices) -> Floats:
+        """Return (k, 3) lengths of the units of coordinates of points."""
+        return np.ones((len(points), 3))
+
     @property
     def unit_weight(self) -> float:
         return float(np.sqrt(self.result.covariance_scale))
@@ -109,8 +130,6 @@ class PicturedBlock(PicturedNetwork):
     @cached_property
     def plan(self) -> Plan:
         result, block = self.result, self.result.block
-        # Differences as lengths: differences of angles are too small to be computed from positions.
-        lengths = geometry.lengths_of_units(result.point_positions, block.spheroid)
         return Plan(
             axes=("E", "N", "h") if block.geographic else ("X", "Y", "Z"),
             unit=block.linear_unit,
@@ -120,8 +139,12 @@ class PicturedBlock(PicturedNetwork):
             points=np.where(result.used_points[:, np.newaxis], self._metric(result.point_positions), np.nan),
             rays=result.point_rays,
             kinds=result.point_kinds,
-            differences=result.point_differences * lengths,
+            # Differences of angles are too small to be computed from positions.
+            differences=result.point_differences * self.lengths(np.arange(len(block.point_ids))),
         )
+
+    def lengths(self, points: Indices) -> Floats:
+        return geometry.lengths_of_units(self.result.point_positions[points], self.result.block.spheroid)
 
     def _metric(self, positions: Floats) -> Floats:
         return self._axes.positions(positions) if self.result.block.geographic else positions

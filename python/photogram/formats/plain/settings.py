@@ -56,7 +56,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
     "film": ("model", "interior", "certificate", "flown"),
-    "adjust": ("datum", "loss", "unit_variance", "iterations"),
+    "adjust": ("datum", "loss", "unit_variance", "iterations", "max_bias_ratio"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
     "features": None,
@@ -145,6 +145,7 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
             # Earlier versions wrote `free` for the default.
             cast("Any", "constrained" if basis == "free" else basis),
             adjust.count("iterations", low=1) if "iterations" in adjust else None,
+            adjust.positive("max_bias_ratio") if "max_bias_ratio" in adjust else None,
         ),
         **words,
         time_origin=_time_origin(file.optional("time")),

@@ -182,6 +182,7 @@ def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
             "loss": options.loss or "none",
             "unit_variance": options.unit_variance,
             "iterations": options.max_iterations,
+            "max_bias_ratio": options.max_bias_ratio,
         },
         "features": {quoted_text(name): {kind: points} for name, (kind, points) in project.features.items()},
     }
