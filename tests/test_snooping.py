@@ -483,7 +483,7 @@ def test_loose_weights_of_photos_cost_no_good_image(unit_weight):
 def test_what_cannot_be_tested_says_so_with_any_unit_variance():
     block = photogram.simulate(points_per_photo=40, seed=1).block
     xy = np.random.default_rng(2).uniform(-100, 100, block.image_xy.shape)
-    with pytest.raises(photogram.AdjustmentError, match="cannot be tested"):
+    with pytest.raises(photogram.AdjustmentError, match="tests require a block that can be adjusted"):
         photogram.snoop(block.replace(image_xy=xy), unit_variance="redundancy")
 
 

@@ -188,6 +188,10 @@ def _snoop_block(
         trial.restart(core_trial(start, None, core, threads))
         return aside
 
+    has_held = any(
+        (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
+    )
+
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
         own = standing.weighted_sum_of_squares, standing.degrees_of_freedom
@@ -196,7 +200,8 @@ def _snoop_block(
 
     try:
         trial = block_trial(block, None, core, threads, parts=parts)
-        outcome = snooped(trial, settings, afresh, common)
+        # Errors of fixed values resemble common errors.
+        outcome = snooped(trial, settings, afresh, None if has_held else common)
     except (LostSupportError, _photocore.BlockError):
         # This adjustment names undetermined unknowns, or continues without some points.
         covariance = unit_variance == "redundancy"
@@ -212,9 +217,6 @@ def _snoop_block(
         poses = {"photo_positions": block.photo_positions, "photo_attitudes": block.photo_attitudes}
         again = adjusted(cleaned.replace(**poses), datum=datum)
         result = again if again.converged else result.in_datum(datum)
-    has_held = any(
-        (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
-    )
     return finished(
         result,
         trial,

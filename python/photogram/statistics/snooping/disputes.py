@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.statistics.snooping.choosing import beyond
+from photogram.statistics.snooping.conditioning import Chosen
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.suspects import LostSupportError, Tests
 from photogram.statistics.snooping.taking_out import NEEDED, TakingOut
@@ -17,28 +18,42 @@ from photogram.words import Phrase, phrase
 ODDS = 20.0  # Largest likelihood ratio of alternatives
 
 
-def without_disputed(work: TakingOut, removed: list[int], before: Tests) -> list[int]:
+def without_disputed(
+    work: TakingOut, removed: list[int], choices: Sequence[Chosen], before: Tests
+) -> list[int]:
     """Reinstate removed groups that have alternatives, and return the others.
 
-    Images are excepted: only their own point depends on the choice. An alternative of another observation was
-    significant before the removal with a test value that is nearly as large, and is not significant after it.
-    `before` are the tests before the removals.
+    Images are excepted: only their own point depends on the choice. `choices` are those of the round, and
+    `before` the tests before it.
     """
     single = [place for place in removed if _is_alone(work, place)]
-    if not single:
-        return removed
+    rivals_of = {choice.group: choice.rivals for choice in choices}
+    disputed = {}
+    for place in single:
+        group = work.log[place].group
+        if work.trial.whole:
+            rivals = [rival for rival in rivals_of.get(group, ()) if rival[3] < ODDS]
+        else:
+            # Only one removal: others would change the test values as well.
+            rivals = _fallen(work, group, before) if len(single) == 1 else []
+        rivals = [rival for rival in rivals if rival[0] not in work.images]
+        if rivals:
+            disputed[place] = rivals
+    return _reinstated(work, removed, disputed) if disputed else removed
+
+
+def _fallen(work: TakingOut, group: int, before: Tests) -> list[tuple[int, float, int, float]]:
+    """Return groups with the test value of a removed one that are not significant without it."""
     suspects, limit = work.suspects, work.level.limit(0)
     was, remains = (beyond(tests, work.unit(), work.scales, limit) for tests in (before, work.tests))
     candidates = (suspects.kinds != 0) & suspects.removable & was & ~remains & work.tests.active
     candidates[[entry.group for entry in work.log if entry.is_out]] = False
-    statistics = before.statistic / work.scales
-    disputed = {}
-    for place in single:
-        group = work.log[place].group
-        least = statistics[group] - 2 * math.log(ODDS)
-        if rivals := np.flatnonzero(candidates & (statistics > least)).tolist():
-            disputed[place] = rivals
-    return _reinstated(work, removed, before, disputed) if disputed else removed
+    change = (before.statistic[group] - before.statistic) / work.scales[group] / 2
+    near = np.flatnonzero(candidates & (np.abs(change) < math.log(ODDS)))
+    return [
+        (other, float(before.statistic[other]), int(before.rank[other]), math.exp(change[other]))
+        for other in near.tolist()
+    ]
 
 
 def _is_alone(work: TakingOut, place: int) -> bool:
@@ -47,7 +62,7 @@ def _is_alone(work: TakingOut, place: int) -> bool:
 
 
 def _reinstated(
-    work: TakingOut, removed: list[int], before: Tests, disputed: dict[int, list[int]]
+    work: TakingOut, removed: list[int], disputed: dict[int, list[tuple[int, float, int, float]]]
 ) -> list[int]:
     out = work.out.copy()
     for place in disputed:
@@ -56,19 +71,11 @@ def _reinstated(
         work.adjust(out)
     except LostSupportError:
         return removed
-    for place, groups in disputed.items():
+    for place, rivals in disputed.items():
         entry = work.log[place]
-        rivals = [
-            Rival(
-                str(work.suspects.name(group)),
-                float(before.statistic[group]),
-                int(before.rank[group]),
-                math.exp(min(entry.first_statistic - before.statistic[group], 1e3) / 2),
-            )
-            for group in groups
-        ]
-        work.kept.update([entry.group, *groups])
-        work.log[place] = replace(entry, rivals=tuple(rivals), kept=DISPUTED)
+        named = [Rival(str(work.suspects.name(group)), t, rank, odds) for group, t, rank, odds in rivals]
+        work.kept.update([entry.group, *(rival[0] for rival in rivals)])
+        work.log[place] = replace(entry, rivals=tuple(named), kept=DISPUTED)
     return [place for place in removed if place not in disputed]
 
 

@@ -113,7 +113,7 @@ def _round(work: TakingOut, number: int) -> tuple[list[int], list[int]]:
     returned = [] if work.trial.whole else agreeing(work)
     removed = work.apply(work.entries(choices, number), returned)
     note_return(work, returned, number)
-    removed = without_disputed(work, removed, before)
+    removed = without_disputed(work, removed, choices, before)
     if work.trial.whole:
         returned = take_back(work, number)
     removed += take_photos_out(work, number)
