@@ -54,8 +54,17 @@ def written_sections(
     return [section for section in whole if section.parts]
 
 
+def formatted(document: Document) -> Document:
+    """Return a document with formatted tables, for several renderers of the same document."""
+    sections, details = (
+        [replace(each, parts=_written(each.parts, document.numeral, lambda drawing: drawing)) for each in own]
+        for own in (document.sections, document.details)
+    )
+    return replace(document, sections=sections, details=details)
+
+
 def _written(
-    parts: Sequence[Part], numeral: Callable[[str], str], draw: Callable[[Drawing], Picture | None]
+    parts: Sequence[Part], numeral: Callable[[str], str], draw: Callable[[Drawing], Drawing | Picture | None]
 ) -> list[Any]:
     found: list[Any] = []
     for part in parts:
@@ -88,7 +97,7 @@ def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
 
 
 def _localized(cell: Cell, numeral: Callable[[str], str]) -> Cell:
-    return cell if cell.number is None else replace(cell, text=numeral(cell.text))
+    return cell if cell.number is None else cell._replace(text=numeral(cell.text))
 
 
 def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, list[Cell]]]:
@@ -176,4 +185,4 @@ def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cel
 def _marked(cells: list[Cell], marked: Bools | None) -> list[Cell]:
     if marked is None:
         return cells
-    return [replace(cell, tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]
+    return [cell._replace(tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]

@@ -76,11 +76,10 @@ def _judged(document: Document) -> list[TitledLines]:
 def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
     """Return lines of key figures and non-empty sections with titles."""
     figures = fact_lines([*document.head, *document.highlights])
-    whole = replace(document, sections=[*document.sections, *document.details])
+    every = [each for each in (*document.sections, *document.details) if each.key in keys or not keys]
     titled = [("Key figures", figures)] + [
         (section.title, _section_lines(section, "" if keys else section.intro))
-        for section in written_sections(whole)
-        if section.key in keys or not keys
+        for section in written_sections(replace(document, sections=every))
     ]
     return [(title, "\n".join(lines).split("\n")) for title, lines in titled if lines]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ MOST_DECIMALS = 12  # Maximum number of decimals of a fixed-point column
 LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """A formatted cell."""
 
     text: str
