@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.refraction import Refraction
 from photogram.results.statement.asprs import wording
 from photogram.results.statement.budget import budget_line
-from photogram.results.statement.figures import Figures
-from photogram.results.statement.grounds import Grounds, Said, assumptions
+from photogram.results.statement.figures import Figures, root_mean
 from photogram.results.statement.honest import LEVEL, PointTests, Prediction, Surface
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
@@ -22,9 +23,14 @@ from photogram.statistics.distributions import critical_normal
 from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
+if TYPE_CHECKING:
+    from photogram import Result, Statement
+
 NOT_USABLE = 4  # Exit code
 HEIGHT_KINDS = 10.0  # Mean difference between two height systems (sd)
 NAMED = 10
+MAX_FIXED_VALUES = 20  # Number of fixed values in a sentence
+Said = list[tuple[str, str]]  # Codes and texts
 _CASES = {
     "missed": "missed",
     "met with confidence": "tested",
@@ -49,8 +55,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class _Evidence:
-    found: Grounds
-    strict: bool
+    found: Statement
     control: Sequence[LeftOut]  # Control points that disagree with the rest of the block
     classes: Sequence[str]  # Verdicts on accuracy classes
     # Names of true facts: differences at check points are `high` or `low`, the required accuracy of lengths
@@ -69,7 +74,7 @@ def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> 
         }
         return Phrase(f"headline.{name}", fields)
 
-    return Rule(name, message, exit_code, (), grave=lambda e: e.strict or name != "low")
+    return Rule(name, message, exit_code, (), grave=lambda e: e.found.strict or name != "low")
 
 
 RULES = (
@@ -77,9 +82,9 @@ RULES = (
     _rule("missed", lambda e: "missed" in (*e.classes, *e.facts), NOT_USABLE),
     _rule("high", lambda e: "high" in e.facts, NOT_USABLE),
     _rule("unchecked", lambda e: e.found.result.verdict.code == "accepted-not-checked", NOT_USABLE),
-    _rule("warning", lambda e: e.strict and "warning" in e.facts, NOT_USABLE),
-    _rule("control", lambda e: e.strict and bool(e.control), NOT_USABLE),
-    _rule("lengths", lambda e: e.strict and "lengths" in e.facts, NOT_USABLE),
+    _rule("warning", lambda e: e.found.strict and "warning" in e.facts, NOT_USABLE),
+    _rule("control", lambda e: e.found.strict and bool(e.control), NOT_USABLE),
+    _rule("lengths", lambda e: e.found.strict and "lengths" in e.facts, NOT_USABLE),
     _rule("low", lambda e: "low" in e.facts, NOT_USABLE),
     _rule("none", lambda e: e.found.of_all is None and ("met" not in e.facts or "not tested" in e.classes)),
     _rule("found", lambda e: not {"not decided", "not tested"}.isdisjoint(e.classes)),
@@ -90,7 +95,7 @@ RULES = (
 """The rules of a statement; the first true one gives the headline and the exit code."""
 
 
-def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool = False) -> Judged:
+def judged(found: Statement) -> Judged:
     """Return the verdict of all findings."""
     texts, asprs, lengths = found.texts, found.standards.asprs, found.standards.lengths
     test = None if lengths is None else lengths.test
@@ -107,7 +112,7 @@ def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool
     facts = frozenset(name for name, fact in holds.items() if fact)
     control = [each for each in found.left_out if each.p < limit_of(found.left_out)]
     classes = [] if asprs is None else [*asprs.verdicts.values()]
-    _, headline, exit_code = fitting_rules(RULES, _Evidence(found, strict, control, classes, facts))[0]
+    _, headline, exit_code = fitting_rules(RULES, _Evidence(found, control, classes, facts))[0]
     remarks = _remarks(found)
     remarks += [texts("control.wrong", point=each.point, p=each.p) for each in control[:NAMED]]
     doubtful = bool(control) or not facts.isdisjoint({"warning", "low", "lengths"}) or _doubtful(found.of_all)
@@ -122,7 +127,7 @@ def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool
             *_honest(found),
             *(("budget.line", budget_line(texts, each)) for each in found.taken_apart),
         ],
-        assumptions=assumptions(found, assumed),
+        assumptions=_assumptions(found),
         remarks=remarks,
     )
 
@@ -151,7 +156,7 @@ def _doubtful(of_all: Figures | None) -> bool:
     )
 
 
-def _asprs(of: Grounds) -> Said:
+def _asprs(of: Statement) -> Said:
     texts, found = of.texts, of.standards.asprs
     if found is None:
         return []
@@ -175,7 +180,7 @@ def _asprs(of: Grounds) -> Said:
     return said
 
 
-def _nssda(of: Grounds) -> Said:
+def _nssda(of: Statement) -> Said:
     texts, found = of.texts, of.standards.nssda
     if found is None:
         return []
@@ -189,7 +194,7 @@ def _nssda(of: Grounds) -> Said:
     return said if found.enough else [*said, texts.said("nssda.few", n=found.count)]
 
 
-def _lengths(of: Grounds) -> Said:
+def _lengths(of: Statement) -> Said:
     texts, found = of.texts, of.standards.lengths
     if found is None:
         return []
@@ -211,7 +216,7 @@ def _lengths(of: Grounds) -> Said:
     return said
 
 
-def _honest(found: Grounds) -> Said:
+def _honest(found: Statement) -> Said:
     texts, of_all = found.texts, found.of_all
     if of_all is None:
         return [texts.said("honest.none")]
@@ -254,7 +259,7 @@ def _factor(factor: float, interval: tuple[float, float]) -> dict[str, float]:
     return {"factor": factor, "low": interval[0], "high": interval[1]}
 
 
-def _points(found: Grounds, tests: PointTests) -> Said:
+def _points(found: Statement, tests: PointTests) -> Said:
     texts, names, without = found.texts, found.compared.names, found.asked.without
     said = [
         texts.said("point.wrong", point=names[row], p=tests.least[row])
@@ -266,7 +271,7 @@ def _points(found: Grounds, tests: PointTests) -> Said:
     return said
 
 
-def _remarks(found: Grounds) -> list[str]:
+def _remarks(found: Statement) -> list[str]:
     texts, of_all, standards = found.texts, found.of_all, found.standards
     said = [
         texts("unusable", point=name, reason=texts.word("reason", reason))
@@ -307,7 +312,7 @@ def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
     return said
 
 
-def _asprs_remarks(found: Grounds, own: Asprs) -> list[str]:
+def _asprs_remarks(found: Statement, own: Asprs) -> list[str]:
     asked, texts, of_all, of_vegetated = found.asked, found.texts, found.of_all, found.of_vegetated
     said = []
     counts = [0 if of_all is None else of_all.n] if asked.classes else []
@@ -340,3 +345,92 @@ def _layout(texts: Texts, found: Layout) -> list[str]:
         (found.beyond_control > 0, "outside", {"n": found.beyond_control}),
     ]
     return [texts(f"layout.{name}", **fields) for holds, name, fields in remarks if holds]
+
+
+def _assumptions(found: Statement) -> Said:
+    """Return the assumptions in reading files, and on removed observations."""
+    asked, texts, layout, lengths = found.asked, found.texts, found.layout, found.standards.lengths
+    said = [*_weights(found)]
+    said += [texts.said("assume.read", said=each) for each in found.assumed]
+    said += [*_adjustment(found)]
+    if len(found.compared):
+        said += _survey(found)
+        if found.compared.step > 1:
+            said.append(texts.said("assume.taken", all=found.compared.known, step=found.compared.step))
+        said.append(texts.said("assume.heights"))
+        if "asprs-2023" in asked.standards:
+            said.append(texts.said("assume.slopes"))
+    if layout is not None:
+        quadrants, diagonal = map(texts.percent, layout.quadrants), texts.length(layout.diagonal, 3)
+        fields = {"quadrants": " / ".join(quadrants), "spacing": layout.least_spacing, "diagonal": diagonal}
+        said.append(texts.said("assume.layout", n=layout.count, **fields))
+    if lengths is not None and lengths.expansion is not None:
+        said.append(texts.said("lengths.reference", expansion=texts.significant(lengths.expansion, 3)))
+    return [*said, texts.said("assume.not_covered")]
+
+
+def _weights(found: Statement) -> Said:
+    result, texts, said = found.result, found.texts, Said()
+    test, components = result.global_test, found.asked.components
+    if components is not None:
+        parts = [
+            f"{texts.kind(each.name)} x {texts.number(each.factor_of_sd, 2)}"
+            f" ({texts.number(each.interval[0] ** 0.5, 2)} – {texts.number(each.interval[1] ** 0.5, 2)})"
+            for each in components.components
+            if not each.held
+        ]
+        said.append(texts.said("weights.components", components=", ".join(parts)))
+    elif test is not None:
+        key = f"weights.{'high' if test.rejected_high else 'low' if test.rejected_low else 'given'}"
+        low, high = (texts.number(each, 3) for each in test.limits)
+        said.append(texts.said(key, s2=texts.number(test.variance, 3), low=low, high=high))
+    if math.isinf(result.freedom_of_scale):
+        return [*said, texts.said("weights.known")]
+    s2, f = texts.number(result.covariance_scale, 3), texts.number(result.degrees_of_freedom, 0)
+    return [*said, texts.said("weights.posterior", s2=s2, f=f), texts.said("honest.approximate")]
+
+
+def _adjustment(found: Statement) -> Said:
+    result, texts = found.result, found.texts
+    total, out = int(result.used_images.sum()), len(found.removed)
+    block = result.block
+    held = fixed_values(texts, result)
+    refraction = (block.refraction or Refraction()).phrase(block.linear_unit)
+    frame = f"{texts.text(block.frame.phrase)}, {block.linear_unit}"
+    return [
+        texts.said("assume.removed", n=out, all=total + out, percent=out / (total + out))
+        if out
+        else texts.said("assume.none_removed"),
+        texts.said("assume.held", held=held) if held else texts.said("assume.none_held"),
+        texts.said("assume.datum", datum=result.datum.phrase, frame=frame),
+        texts.said("assume.refraction", refraction=refraction),
+    ]
+
+
+def _survey(found: Statement) -> Said:
+    asked, texts, sd = found.asked, found.texts, found.compared.survey_sd
+    if not sd[np.isfinite(sd)].any():
+        said = [texts.said("assume.survey_exact")]
+    else:
+        east, north, height = (root_mean(column**2) for column in sd.T)
+        said = [texts.said("assume.survey", east=east, north=north, height=height)]
+    if any(asked.survey_common_sd):
+        size = " / ".join(texts.length(each) for each in asked.survey_common_sd)
+        key = "assume.common_cancels" if asked.survey_common_in_control else "assume.common"
+        said.append(texts.said(key, size=size))
+    said.append(texts.said(f"assume.independent.{asked.independent or 'undeclared'}"))
+    return said
+
+
+def fixed_values(texts: Texts, result: Result) -> str:
+    """Return the names of fixed points, photos and parameters; empty without any."""
+    block = result.block
+    points = (block.point_sd == 0).any(axis=1)
+    photos = (block.photo_position_sd == 0).any(axis=1) | (block.photo_attitude_sd == 0).any(axis=1)
+    names = [texts("held.point", name=block.point_ids[row]) for row in np.flatnonzero(points)]
+    names += [texts("held.photo", name=block.photo_ids[row]) for row in np.flatnonzero(photos)]
+    for camera in result.cameras:
+        fixed = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if not sd > 0]
+        if fixed:
+            names.append(texts("held.camera", parameters=", ".join(fixed), name=camera.name))
+    return texts.listed(names, MAX_FIXED_VALUES) if names else ""

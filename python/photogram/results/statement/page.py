@@ -19,7 +19,7 @@ from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import differences, overlap
 from photogram.results.statement.drawings import lengths as drawn_lengths
 from photogram.results.statement.figures import Figures
-from photogram.results.statement.grounds import fixed_values
+from photogram.results.statement.judgement import fixed_values
 from photogram.results.statement.tables import (
     Columns,
     annex,
