@@ -79,23 +79,13 @@ class Facts:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A plot that is not yet drawn."""
+    """A plot; renderers draw it, and omit it if there are no data."""
 
     name: str  # Unique on the page; prefix of the identifiers of its parts
     title: str  # Short name and subject
     caption: str
-    sketch: Callable[[], Plot | None]  # Creates the plot; returns None if there are no data
-    kind: str = field(default="drawing", init=False)
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A plot as markup of the page."""
-
-    name: str
-    title: str
-    caption: str
-    markup: str
+    sketch: Callable[[], Plot | None]
+    markup: str = ""  # The drawn plot
     kind: str = field(default="figure", init=False)
 
 
@@ -104,7 +94,7 @@ class Layers:
     """Alternatives shown one at a time; all on paper and without scripts."""
 
     name: str
-    parts: Sequence[Drawing | Picture | Table | quantity.Table]
+    parts: Sequence[Drawing | Table | quantity.Table]
     kind: str = field(default="layers", init=False)
 
 
@@ -125,7 +115,7 @@ class Remarks:
     kind: str = field(default="remarks", init=False)
 
 
-Part = Table | quantity.Table | Facts | Drawing | Picture | Layers | Text | Remarks
+Part = Table | quantity.Table | Facts | Drawing | Layers | Text | Remarks
 
 
 @dataclass(frozen=True)
