@@ -26,7 +26,8 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     """Return the section of adjusted and fixed cameras."""
     found = calibrations(result)
     shown, note = found[:LISTED], "the table of cameras has all"
-    tables = [parameters_table(each, law_of(result)) for each in shown]
+    law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
+    tables = [parameters_table(each, law) for each in shown]
     parts: list[Part] = [*layered_tables("camera", tables)]
     if groups := [(each.camera.name, group) for each in shown for group in each.groups]:
         parts.append(_terms_together(groups))
@@ -64,10 +65,6 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     if len(found) > LISTED:
         parts.append(Facts("More cameras", [Fact("Not shown here", f"{len(found) - LISTED}", note=note)]))
     return Section("cameras", "Cameras", parts, about("cameras") if found else "")
-
-
-def law_of(result: Result) -> str:
-    return "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
 
 
 def parameters_table(found: Calibration, law: str = "") -> Table:

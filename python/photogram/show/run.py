@@ -11,7 +11,7 @@ from pathlib import Path
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import printable
-from photogram.show.page import Fact, Facts, Part, Section
+from photogram.show.page import Fact, Facts, Part, Section, about
 from photogram.show.quantity import Axis, Quantity, Table
 
 LISTED = 200  # Maximum number of listed input files
@@ -71,19 +71,15 @@ def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
         ]
         parts.append(Table("", "Input files", columns, note))
     if run is not None and run.options:
-        note = "Those that were not given have their defaults."
         columns = [
             Quantity([*run.options], kind="name", head="Option"),
             Quantity([*map(printable, run.options.values())], kind="name", head="Value"),
         ]
-        parts.append(Table("", "Options", columns, note))
+        parts.append(Table("", "Options", columns, about("run.options")))
     if phases:
         columns = [
             Quantity([*phases], kind="name", head="Phase"),
             Quantity([*phases.values()], SECONDS, "deviation", head="Time", decimals=3),
         ]
         parts.append(Table("", "Time spent in the adjustment", columns))
-    intro = (
-        "What is needed to make this page again. Everything above is the same in every run; times are not."
-    )
-    return Section("reproducibility", "Reproducibility", parts, intro)
+    return Section("reproducibility", "Reproducibility", parts, about("reproducibility"))
