@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
 from photogram.results.statement.asprs import wording
-from photogram.results.statement.budget import budget_line
+from photogram.results.statement.budget import budget_fields
 from photogram.results.statement.figures import Figures, root_mean
-from photogram.results.statement.honest import LEVEL, PointTests, Prediction, Surface
-from photogram.results.statement.layout import Layout
+from photogram.results.statement.honest import LEVEL, Prediction, Surface
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Asprs, Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
+from photogram.show.quantity import members
 from photogram.statistics.distributions import critical_normal
 from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
@@ -31,6 +31,7 @@ HEIGHT_KINDS = 10.0  # Mean difference between two height systems (sd)
 NAMED = 10
 MAX_FIXED_VALUES = 20  # Number of fixed values in a sentence
 Said = list[tuple[str, str]]  # Codes and texts
+Sentence = tuple[str, dict[str, Any]]  # A code with its fields
 _CASES = {
     "missed": "missed",
     "met with confidence": "tested",
@@ -113,7 +114,7 @@ def judged(found: Statement) -> Judged:
     control = [each for each in found.left_out if each.p < limit_of(found.left_out)]
     classes = [] if asprs is None else [*asprs.verdicts.values()]
     _, headline, exit_code = fitting_rules(RULES, _Evidence(found, control, classes, facts))[0]
-    remarks = _remarks(found)
+    remarks = [texts(code, **fields) for code, fields in _remarks(found)]
     remarks += [texts("control.wrong", point=each.point, p=each.p) for each in control[:NAMED]]
     doubtful = bool(control) or not facts.isdisjoint({"warning", "low", "lengths"}) or _doubtful(found.of_all)
     return Judged(
@@ -121,15 +122,18 @@ def judged(found: Statement) -> Judged:
         tone="bad" if exit_code else "look" if remarks or doubtful else "good",
         headline=texts(headline.code, **headline.fields),
         sentences=[
-            *_asprs(found),
-            *(_nssda(found) if "nssda" in found.asked.standards else []),
-            *_lengths(found),
-            *_honest(found),
-            *(("budget.line", budget_line(texts, each)) for each in found.taken_apart),
+            (code, texts(code, **fields))
+            for part in (_asprs, _nssda, _lengths, _honest, _budgets)
+            for code, fields in part(found)
         ],
-        assumptions=_assumptions(found),
+        assumptions=[(code, texts(code, **fields)) for code, fields in _assumptions(found)],
         remarks=remarks,
     )
+
+
+def _budgets(found: Statement) -> Iterator[Sentence]:
+    for each in found.taken_apart:
+        yield "budget.line", budget_fields(found.texts, each)
 
 
 def _whole(of_all: Figures) -> Prediction | None:
@@ -156,136 +160,126 @@ def _doubtful(of_all: Figures | None) -> bool:
     )
 
 
-def _asprs(of: Statement) -> Said:
-    texts, found = of.texts, of.standards.asprs
+def _asprs(of: Statement) -> Iterator[Sentence]:
+    found = of.standards.asprs
     if found is None:
-        return []
-    said: Said = []
+        return
     for name in ("h", "v", "3d"):
         figure, size = found.figures[name], of.asked.classes.get(name)
-        own = {f"rmse_{name}": figure.rmse} if figure is not None else {}
+        own = {} if figure is None else {"n": figure.count, f"rmse_{name}": figure.rmse}
         if size is None:
             if figure is not None and name != "3d":
-                said.append(texts.said(f"asprs.found.{name}", n=figure.count, **own))
+                yield f"asprs.found.{name}", own
         elif figure is not None:
-            key = f"asprs.{_CASES[found.verdicts[name]]}.{name}"
-            said.append(texts.said(key, n=figure.count, **{"class": size}, **own))
+            yield f"asprs.{_CASES[found.verdicts[name]]}.{name}", {**own, "class": size}
         elif name != "3d":
-            left = {f"loo_{name}": found.left_out[name]}
-            said.append(texts.said(f"asprs.none.{name}", **{"class": size}, **left))
-    vegetated = found.figures["vva"]
-    if vegetated is not None:
-        key = f"asprs.{wording(vegetated.count)}.vva"
-        said.append(texts.said(key, n=vegetated.count, rmse_v=vegetated.rmse))
-    return said
+            yield f"asprs.none.{name}", {"class": size, f"loo_{name}": found.left_out[name]}
+    if (vegetated := found.figures["vva"]) is not None:
+        yield f"asprs.{wording(vegetated.count)}.vva", {"n": vegetated.count, "rmse_v": vegetated.rmse}
 
 
-def _nssda(of: Statement) -> Said:
-    texts, found = of.texts, of.standards.nssda
-    if found is None:
-        return []
-    said: Said = []
+def _nssda(of: Statement) -> Iterator[Sentence]:
+    found = of.standards.nssda
+    if found is None or "nssda" not in of.asked.standards:
+        return
     if found.accuracy_r is not None:
-        said.append(texts.said(f"nssda.{found.wording}.h", accuracy_r=found.accuracy_r, n=found.count))
+        yield f"nssda.{found.wording}.h", {"accuracy_r": found.accuracy_r, "n": found.count}
     elif found.ce95 is not None and found.ratio is not None:
-        said.append(texts.said("nssda.ce95", ratio=found.ratio, ce95=found.ce95))
+        yield "nssda.ce95", members(found, "ratio", "ce95")
     if found.accuracy_z is not None:
-        said.append(texts.said(f"nssda.{found.wording}.v", accuracy_z=found.accuracy_z, n=found.count))
-    return said if found.enough else [*said, texts.said("nssda.few", n=found.count)]
+        yield f"nssda.{found.wording}.v", {"accuracy_z": found.accuracy_z, "n": found.count}
+    if not found.enough:
+        yield "nssda.few", {"n": found.count}
 
 
-def _lengths(of: Statement) -> Said:
+def _lengths(of: Statement) -> Iterator[Sentence]:
     texts, found = of.texts, of.standards.lengths
     if found is None:
-        return []
+        return
     test = found.test
-    own = {"n": len(test.errors), "lines": test.lines, "largest": test.largest, "rms": test.rms}
+    own = {"n": len(test.errors), **members(test, "lines", "largest", "rms")}
     if found.limit is None or test.within is None:
-        said = [texts.said("lengths.found", **own)]
+        yield "lengths.found", own
     else:
         limit = f"{texts.length(found.limit.constant)} + {texts.significant(found.limit.slope, 2)} L"
         if math.isfinite(found.limit.most):
             limit += f" ≤ {texts.length(found.limit.most)}"
         beyond = int((~test.within).sum())
-        key, more = ("lengths.missed", {"beyond": beyond}) if beyond else ("lengths.met", {})
-        said = [texts.said(key, limit=limit, **own, **more)]
+        yield f"lengths.{'missed' if beyond else 'met'}", {**own, "limit": limit, "beyond": beyond}
     if test.together is not None:
         whole = test.together
-        key = f"lengths.{'high' if whole.rejected_high else 'low' if whole.rejected_low else 'agree'}"
-        said.append(texts.said(key, **_factor(whole.factor, whole.interval)))
-    return said
+        side = "high" if whole.rejected_high else "low" if whole.rejected_low else "agree"
+        yield f"lengths.{side}", _factor(whole.factor, whole.interval)
 
 
-def _honest(found: Statement) -> Said:
+def _honest(found: Statement) -> Iterator[Sentence]:
     texts, of_all = found.texts, found.of_all
     if of_all is None:
-        return [texts.said("honest.none")]
-    said: Said = []
+        yield "honest.none", {}
+        return
     whole = _whole(of_all)
     high, low = _rejected(of_all)
     if whole is not None:
-        key = f"honest.{'high' if high else 'low' if low else 'yes'}"
-        said.append(texts.said(key, n=whole.points, **_factor(whole.factor, whole.factor_interval)))
+        fields = {"n": whole.points, **_factor(whole.factor, whole.factor_interval)}
+        yield f"honest.{'high' if high else 'low' if low else 'yes'}", fields
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
         if own is not None and (own.rejected_high or own.rejected_low):
             fields = _factor(own.factor, own.factor_interval)
-            said.append(texts.said("honest.part", component=texts(f"component.{part}"), **fields))
+            yield "honest.part", {"component": texts(f"component.{part}"), **fields}
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
     for part, shift in shifts:
         if shift.rejected:
             sizes = {"mean": shift.mean, "expanded": shift.expanded, "k": shift.expanded / shift.sd_of_mean}
             component, p = texts(f"component.{part}"), texts.percent(found.asked.coverage)
-            said.append(texts.said("bias.found", component=component, **sizes, p=p))
+            yield "bias.found", {"component": component, **sizes, "p": p}
     if shifts and not any(shift.rejected for _, shift in shifts):
-        said.append(texts.said("bias.none"))
-    return [*said, *_surface(texts, of_all.surface), *_points(found, of_all.points)]
+        yield "bias.none", {}
+    yield from _surface(of_all.surface)
+    tests, without = of_all.points, found.asked.without
+    for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]:
+        yield "point.wrong", {"point": found.compared.names[row], "p": float(tests.least[row])}
+    if without:
+        reasons = "; ".join(f"{point}: {reason}" for point, reason in without.items())
+        yield "point.left", {"points": texts.listed(list(without)), "reasons": reasons}
 
 
-def _surface(texts: Texts, found: Surface | None) -> Said:
+def _surface(found: Surface | None) -> Iterator[Sentence]:
     if found is None:
-        return [texts.said("surface.few")]
-    if not found.rejected:
-        return [texts.said("surface.none", p=found.p)]
-    said = [texts.said("surface.found", p=found.p)]
+        yield "surface.few", {}
+        return
+    yield f"surface.{'found' if found.rejected else 'none'}", {"p": found.p}
     largest = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
     for name, field, k in (("shift", "shift", 0), ("tilt", "rise", largest), ("dome", "bend", 3)):
-        if abs(found.t[k]) > critical_normal(LEVEL):
-            said.append(texts.said(f"surface.{name}", **{field: found.estimate[k], "sd": found.sd[k]}))
-    return said
+        if found.rejected and abs(found.t[k]) > critical_normal(LEVEL):
+            yield f"surface.{name}", {field: float(found.estimate[k]), "sd": float(found.sd[k])}
 
 
-def _factor(factor: float, interval: tuple[float, float]) -> dict[str, float]:
+def _factor(factor: float, interval: tuple[float, float]) -> dict[str, Any]:
     return {"factor": factor, "low": interval[0], "high": interval[1]}
 
 
-def _points(found: Statement, tests: PointTests) -> Said:
-    texts, names, without = found.texts, found.compared.names, found.asked.without
-    said = [
-        texts.said("point.wrong", point=names[row], p=tests.least[row])
-        for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]
-    ]
-    if without:
-        reasons = "; ".join(f"{point}: {reason}" for point, reason in without.items())
-        said.append(texts.said("point.left", points=texts.listed(list(without)), reasons=reasons))
-    return said
-
-
-def _remarks(found: Statement) -> list[str]:
+def _remarks(found: Statement) -> Iterator[Sentence]:
     texts, of_all, standards = found.texts, found.of_all, found.standards
-    said = [
-        texts("unusable", point=name, reason=texts.word("reason", reason))
-        for name, reason in found.compared.not_usable[:NAMED]
-    ]
-    said += [texts("language.missing", sentence=key) for key in texts.missing]
+    for name, reason in found.compared.not_usable[:NAMED]:
+        yield "unusable", {"point": name, "reason": texts.word("reason", reason)}
+    for key in texts.missing:
+        yield "language.missing", {"sentence": key}
     if not found.result.photo_given_sd.any():
-        said.append(texts("assume.fixed"))
+        yield "assume.fixed", {}
     if standards.asprs is not None:
-        said += _asprs_remarks(found, standards.asprs)
+        yield from _asprs_remarks(found, standards.asprs)
     if standards.lengths is not None:
-        said += _lengths_remarks(texts, standards.lengths)
-    if found.layout is not None:
-        said += _layout(texts, found.layout)
+        yield from _lengths_remarks(texts, standards.lengths)
+    if (layout := found.layout) is not None:
+        for holds, name, fields in (
+            (not layout.even, "quadrants", {}),
+            (not layout.apart, "spacing", {"spacing": layout.least_spacing}),
+            (layout.far > 0, "far", {"percent": layout.far}),
+            (layout.beyond_control > 0, "outside", {"n": layout.beyond_control}),
+        ):
+            if holds:
+                yield f"layout.{name}", fields
     shift = None if of_all is None else of_all.bias["h"]
     heights = None if of_all is None else of_all.parts["h"]
     if shift is not None and heights is not None and heights.n > 2:
@@ -293,84 +287,72 @@ def _remarks(found: Statement) -> list[str]:
         signs = np.sign(found.compared.differences[found.compared.counted[:, 2], 2])
         alike = heights.sd < abs(shift.mean) / 3
         if abs(signs.sum()) == len(signs) and abs(shift.z) > HEIGHT_KINDS and alike:
-            said.append(texts("bias.heights", mean=shift.mean, sd=heights.sd))
-    return said
+            yield "bias.heights", {"mean": shift.mean, "sd": heights.sd}
 
 
-def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
-    test, said = found.test, list[str]()
+def _lengths_remarks(texts: Texts, found: Lengths) -> Iterator[Sentence]:
+    test = found.test
     if not test.enough:
-        said.append(texts("lengths.few", lines=test.lines, least=test.least))
+        yield "lengths.few", members(test, "lines", "least")
     if not math.isfinite(test.longest):
-        said.append(texts("lengths.diagonal"))
+        yield "lengths.diagonal", {}
     elif not test.long_enough:
-        said.append(texts("lengths.short", share=test.longest))
+        yield "lengths.short", {"share": test.longest}
     if not test.along_diagonal:
-        said.append(texts("lengths.direction", angle=texts.number(math.degrees(test.off_diagonal), 0)))
+        yield "lengths.direction", {"angle": texts.number(math.degrees(test.off_diagonal), 0)}
     if found.expansion is None:
-        said.append(texts("lengths.warm"))
-    return said
+        yield "lengths.warm", {}
 
 
-def _asprs_remarks(found: Statement, own: Asprs) -> list[str]:
+def _asprs_remarks(found: Statement, own: Asprs) -> Iterator[Sentence]:
     asked, texts, of_all, of_vegetated = found.asked, found.texts, found.of_all, found.of_vegetated
-    said = []
     counts = [0 if of_all is None else of_all.n] if asked.classes else []
-    counts += [of_vegetated.n] if of_vegetated is not None else []
-    said += [texts("asprs.points", asked=own.points_asked, n=n) for n in counts if n < own.points_asked]
+    for n in [*counts, *([] if of_vegetated is None else [of_vegetated.n])]:
+        if n < own.points_asked:
+            yield "asprs.points", {"asked": own.points_asked, "n": n}
     for name, good in own.survey.items():
         figure = own.figures[name]
         if not good and figure is not None:
-            said.append(texts("asprs.survey", survey=figure.survey, **{"class": asked.classes[name]}))
+            yield "asprs.survey", {"survey": figure.survey, "class": asked.classes[name]}
     for name, good in own.control.items():
         rmse = own.control_rmse["hv".index(name)]
         if not good and math.isfinite(rmse):
             # The limit is half a class; without vertical class, the full horizontal one.
             limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
-            said.append(texts(f"asprs.control.{name}", sd=rmse, limit=texts.size(limit)))
+            yield f"asprs.control.{name}", {"sd": rmse, "limit": texts.size(limit)}
     for each in own.remarks[:NAMED]:
-        fields = {"component": texts(f"component.{each.component}"), "value": each.value, "limit": each.limit}
+        fields = {"component": texts(f"component.{each.component}"), **members(each, "value", "limit")}
         if each.point is None:
-            said.append(texts("asprs.mean", **fields))
+            yield "asprs.mean", fields
         else:
-            said.append(texts("asprs.difference", point=found.compared.names[each.point], **fields))
-    return said
+            yield "asprs.difference", {"point": found.compared.names[each.point], **fields}
 
 
-def _layout(texts: Texts, found: Layout) -> list[str]:
-    remarks: list[tuple[bool, str, dict[str, float]]] = [
-        (not found.even, "quadrants", {}),
-        (not found.apart, "spacing", {"spacing": found.least_spacing}),
-        (found.far > 0, "far", {"percent": found.far}),
-        (found.beyond_control > 0, "outside", {"n": found.beyond_control}),
-    ]
-    return [texts(f"layout.{name}", **fields) for holds, name, fields in remarks if holds]
-
-
-def _assumptions(found: Statement) -> Said:
-    """Return the assumptions in reading files, and on removed observations."""
+def _assumptions(found: Statement) -> Iterator[Sentence]:
+    """Yield the assumptions in reading files, and on removed observations."""
     asked, texts, layout, lengths = found.asked, found.texts, found.layout, found.standards.lengths
-    said = [*_weights(found)]
-    said += [texts.said("assume.read", said=each) for each in found.assumed]
-    said += [*_adjustment(found)]
+    yield from _weights(found)
+    for each in found.assumed:
+        yield "assume.read", {"said": each}
+    yield from _adjustment(found)
     if len(found.compared):
-        said += _survey(found)
+        yield from _survey(found)
         if found.compared.step > 1:
-            said.append(texts.said("assume.taken", all=found.compared.known, step=found.compared.step))
-        said.append(texts.said("assume.heights"))
+            yield "assume.taken", {"all": found.compared.known, "step": found.compared.step}
+        yield "assume.heights", {}
         if "asprs-2023" in asked.standards:
-            said.append(texts.said("assume.slopes"))
+            yield "assume.slopes", {}
     if layout is not None:
-        quadrants, diagonal = map(texts.percent, layout.quadrants), texts.length(layout.diagonal, 3)
-        fields = {"quadrants": " / ".join(quadrants), "spacing": layout.least_spacing, "diagonal": diagonal}
-        said.append(texts.said("assume.layout", n=layout.count, **fields))
+        quadrants = " / ".join(map(texts.percent, layout.quadrants))
+        fields = {"spacing": layout.least_spacing, "diagonal": texts.length(layout.diagonal, 3)}
+        yield "assume.layout", {"n": layout.count, "quadrants": quadrants, **fields}
     if lengths is not None and lengths.expansion is not None:
-        said.append(texts.said("lengths.reference", expansion=texts.significant(lengths.expansion, 3)))
-    return [*said, texts.said("assume.not_covered")]
+        yield "lengths.reference", {"expansion": texts.significant(lengths.expansion, 3)}
+    yield "assume.not_covered", {}
 
 
-def _weights(found: Statement) -> Said:
-    result, texts, said = found.result, found.texts, Said()
+def _weights(found: Statement) -> Iterator[Sentence]:
+    result, texts = found.result, found.texts
     test, components = result.global_test, found.asked.components
     if components is not None:
         parts = [
@@ -379,47 +361,42 @@ def _weights(found: Statement) -> Said:
             for each in components.components
             if not each.held
         ]
-        said.append(texts.said("weights.components", components=", ".join(parts)))
+        yield "weights.components", {"components": ", ".join(parts)}
     elif test is not None:
-        key = f"weights.{'high' if test.rejected_high else 'low' if test.rejected_low else 'given'}"
         low, high = (texts.number(each, 3) for each in test.limits)
-        said.append(texts.said(key, s2=texts.number(test.variance, 3), low=low, high=high))
+        side = "high" if test.rejected_high else "low" if test.rejected_low else "given"
+        yield f"weights.{side}", {"s2": texts.number(test.variance, 3), "low": low, "high": high}
     if math.isinf(result.freedom_of_scale):
-        return [*said, texts.said("weights.known")]
+        yield "weights.known", {}
+        return
     s2, f = texts.number(result.covariance_scale, 3), texts.number(result.degrees_of_freedom, 0)
-    return [*said, texts.said("weights.posterior", s2=s2, f=f), texts.said("honest.approximate")]
+    yield "weights.posterior", {"s2": s2, "f": f}
+    yield "honest.approximate", {}
 
 
-def _adjustment(found: Statement) -> Said:
-    result, texts = found.result, found.texts
+def _adjustment(found: Statement) -> Iterator[Sentence]:
+    result, texts, block = found.result, found.texts, found.result.block
     total, out = int(result.used_images.sum()), len(found.removed)
-    block = result.block
+    removed = {"n": out, "all": total + out, "percent": out / (total + out)} if out else {}
+    yield f"assume.{'removed' if out else 'none_removed'}", removed
     held = fixed_values(texts, result)
-    refraction = (block.refraction or Refraction()).phrase(block.linear_unit)
+    yield f"assume.{'held' if held else 'none_held'}", {"held": held}
     frame = f"{texts.text(block.frame.phrase)}, {block.linear_unit}"
-    return [
-        texts.said("assume.removed", n=out, all=total + out, percent=out / (total + out))
-        if out
-        else texts.said("assume.none_removed"),
-        texts.said("assume.held", held=held) if held else texts.said("assume.none_held"),
-        texts.said("assume.datum", datum=result.datum.phrase, frame=frame),
-        texts.said("assume.refraction", refraction=refraction),
-    ]
+    yield "assume.datum", {"datum": result.datum.phrase, "frame": frame}
+    yield "assume.refraction", {"refraction": (block.refraction or Refraction()).phrase(block.linear_unit)}
 
 
-def _survey(found: Statement) -> Said:
+def _survey(found: Statement) -> Iterator[Sentence]:
     asked, texts, sd = found.asked, found.texts, found.compared.survey_sd
     if not sd[np.isfinite(sd)].any():
-        said = [texts.said("assume.survey_exact")]
+        yield "assume.survey_exact", {}
     else:
-        east, north, height = (root_mean(column**2) for column in sd.T)
-        said = [texts.said("assume.survey", east=east, north=north, height=height)]
+        roots = (root_mean(column**2) for column in sd.T)
+        yield "assume.survey", dict(zip(("east", "north", "height"), roots, strict=True))
     if any(asked.survey_common_sd):
         size = " / ".join(texts.length(each) for each in asked.survey_common_sd)
-        key = "assume.common_cancels" if asked.survey_common_in_control else "assume.common"
-        said.append(texts.said(key, size=size))
-    said.append(texts.said(f"assume.independent.{asked.independent or 'undeclared'}"))
-    return said
+        yield f"assume.common{'_cancels' if asked.survey_common_in_control else ''}", {"size": size}
+    yield f"assume.independent.{asked.independent or 'undeclared'}", {}
 
 
 def fixed_values(texts: Texts, result: Result) -> str:

@@ -13,7 +13,7 @@ from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
 from photogram.results.network_sections import fit_of_images
-from photogram.results.statement.budget import Budget, budget_line
+from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import control_places, in_order
 from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import differences, overlap
@@ -115,7 +115,7 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
             ),
         ],
     ]
-    titles = budget_line(texts, own), texts("table.single", quantity=own.subject)
+    titles = texts("budget.line", **budget_fields(texts, own)), texts("table.single", quantity=own.subject)
     return [Table("budget", title, quantities) for title, quantities in zip(titles, tables, strict=True)]
 
 
