@@ -17,10 +17,13 @@ from photogram.show.page import (
     Column,
     Document,
     Drawing,
+    Facts,
     Layers,
     Part,
+    Remarks,
     Section,
     Table,
+    Text,
     decimals_of,
     number_text,
     probability_written,
@@ -65,9 +68,18 @@ def _written(parts: Sequence[Part], numeral: Callable[[str], str], draw: Draw) -
             found += layers if len(layers) < 2 else [replace(part, parts=layers)]
         elif isinstance(part, Drawing):
             found += [drawing] if (drawing := draw(part)) else []
-        elif not isinstance(part, quantity.Table) or part.visible:
+        elif not _is_empty(part):
             found.append(written(part, numeral))
     return found
+
+
+def _is_empty(part: Part) -> bool:
+    match part:
+        case quantity.Table():
+            return not part.visible
+        case Facts(facts=content) | Remarks(sentences=content) | Text(text=content):
+            return not content
+    return False
 
 
 def written(part: Any, numeral: Callable[[str], str] = str) -> Any:

@@ -120,7 +120,7 @@ Part = Table | quantity.Table | Facts | Drawing | Layers | Text | Remarks
 
 @dataclass(frozen=True)
 class Section:
-    """A section, omitted if empty. An annex starts on a new sheet."""
+    """A section; renderers omit empty parts and sections. An annex starts on a new sheet."""
 
     key: str
     title: str

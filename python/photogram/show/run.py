@@ -61,25 +61,24 @@ def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
             Fact("Began", stamp, "UTC"),
             Fact("Time up to this report", f"{run.seconds:.2f}", "s"),
         ]
-    parts: list[Part] = [Facts("Made by", made)]
-    if run is not None and run.inputs:
-        note = f"and {run.others} more" if run.others else ""
-        columns = [
-            Quantity([printable(str(each.path)) for each in run.inputs], kind="name", head="File"),
-            Quantity([each.size for each in run.inputs], BYTES, "deviation", head="Size", decimals=0),
-            Quantity([each.sha256 for each in run.inputs], kind="name", head="SHA-256"),
-        ]
-        parts.append(Table("", "Input files", columns, note))
-    if run is not None and run.options:
-        columns = [
-            Quantity([*run.options], kind="name", head="Option"),
-            Quantity([*map(printable, run.options.values())], kind="name", head="Value"),
-        ]
-        parts.append(Table("", "Options", columns, about("run.options")))
-    if phases:
-        columns = [
-            Quantity([*phases], kind="name", head="Phase"),
-            Quantity([*phases.values()], SECONDS, "deviation", head="Time", decimals=3),
-        ]
-        parts.append(Table("", "Time spent in the adjustment", columns))
+    inputs, options = (run.inputs, run.options) if run else ((), dict[str, str]())
+    files = [
+        Quantity([printable(str(each.path)) for each in inputs], kind="name", head="File"),
+        Quantity([each.size for each in inputs], BYTES, "deviation", head="Size", decimals=0),
+        Quantity([each.sha256 for each in inputs], kind="name", head="SHA-256"),
+    ]
+    values = [
+        Quantity([*options], kind="name", head="Option"),
+        Quantity([*map(printable, options.values())], kind="name", head="Value"),
+    ]
+    times = [
+        Quantity([*phases], kind="name", head="Phase"),
+        Quantity([*phases.values()], SECONDS, "deviation", head="Time", decimals=3),
+    ]
+    parts: list[Part] = [
+        Facts("Made by", made),
+        Table("", "Input files", files, f"and {run.others} more" if run and run.others else ""),
+        Table("", "Options", values, about("run.options")),
+        Table("", "Time spent in the adjustment", times),
+    ]
     return Section("reproducibility", "Reproducibility", parts, about("reproducibility"))
