@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from golden_statement import BLOCK
 
-from photogram.results.statement.judgement import judged
 from photogram.statistics.verdict import as_phrase
 
 
@@ -19,7 +18,7 @@ def plain(result):
 
 def judge(found, left_out, *, strict):
     """Judge a statement anew, with other control points left out."""
-    return judged(replace(found, left_out=left_out, layout=None), strict=strict)
+    return replace(found, left_out=left_out, layout=None, strict=strict).judged
 
 
 def seen(found):
@@ -84,7 +83,8 @@ def test_lengths_alone_take_the_green_mark_away(result):
     enough = replace(found.standards.lengths.test, lines=7, least=5, longest=1.0, off_diagonal=0.0)
     for test, tone in ((enough, "look"), (replace(enough, together=None), "good")):
         lengths = replace(found.standards.lengths, test=test)
-        assert judged(replace(found, standards=replace(found.standards, lengths=lengths))).tone == tone
+        changed = replace(found, standards=replace(found.standards, lengths=lengths))
+        assert changed.judged.tone == tone
 
 
 def test_a_warning_of_the_adjustment_is_no_result_that_cannot_be_used(plain, monkeypatch):

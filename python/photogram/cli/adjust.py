@@ -122,11 +122,12 @@ def _finish(
 ) -> None:
     """Write the results, print a summary, and end by the verdict."""
     from photogram.formats.adjusted import excel_file
+    from photogram.show.cells import formatted
     from photogram.show.forms import text
 
     told = removed or result
     in_crs, more = _in_system(result, documents.crs, project.control_crs)
-    document = told.document().with_sections(*more)
+    document = formatted(told.document().with_sections(*more))
     files = _files(project, result, text(document), sections) | in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()

@@ -10,10 +10,7 @@ import numpy as np
 from photogram.errors import InputError, message_of
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Frame, Options, Project
-from photogram.giant import read_project
-from photogram.giant.assembly import job_refraction
 from photogram.giant.files import present_files, to_bytes
-from photogram.giant.project import Project as GiantProject
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
@@ -30,6 +27,9 @@ def _recognises(path: Path) -> bool:
 
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a project, with the refraction of its COMMON."""
+    from photogram.giant import read_project  # detection of formats does not need the cards
+    from photogram.giant.assembly import job_refraction
+
     del wishes
     found = read_project(path)
     block = found.to_block()
@@ -55,12 +55,16 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 def write(project: Project) -> Mapping[str, bytes]:
     """Return the five files."""
+    from photogram.giant import Project as GiantProject
+
     records = GiantProject.from_block(project.block).records()
     return {name: to_bytes(lines) for name, lines in records.items()}
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
     """Return parts of a project that the cards cannot contain."""
+    from photogram.giant import Project as GiantProject
+
     try:
         GiantProject.from_block(project.block)
     except InputError as error:

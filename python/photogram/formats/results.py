@@ -13,10 +13,8 @@ from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import DatumName, Options, Project
-from photogram.results.block_files import KIND as BLOCK
 from photogram.results.result import Result
 from photogram.results.result_files import SUMMARY, read_summary
-from photogram.results.saved_block import read_block_result
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -47,6 +45,8 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     """
     from photogram.collection.result_files import KIND as COLLECTION
     from photogram.collection.saved_result import read_collection_result
+    from photogram.results.block_files import KIND as BLOCK
+    from photogram.results.saved_block import read_block_result
 
     readers: Mapping[str, Callable[[Path, Mapping[str, Any]], Result | AdjustedCollection]] = {
         BLOCK: read_block_result,

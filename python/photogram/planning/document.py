@@ -14,7 +14,16 @@ from photogram.planning.pattern import Pattern
 from photogram.results.hypotheses import FEWEST
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
-from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
+from photogram.show.page import (
+    Document,
+    Drawing,
+    Fact,
+    Judgement,
+    Section,
+    about,
+    layered_tables,
+    significant,
+)
 from photogram.show.quantity import Axis, Quantity, Table, chosen, component, members, of_each, records
 from photogram.show.sketch.letters import NOWHERE
 from photogram.show.sketch.marks import Mark, Markers, Panel, Shades, around
@@ -42,22 +51,8 @@ _KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s")
 
 def plan_document(patterns: Sequence[Pattern]) -> Document:
     """Return the document of a plan."""
-    caption = (
-        "The patterns in plan, on one scale of colours: the expected standard deviation of points in height."
-        " Control points are marked by the components that they fix or weight."
-    )
     title = "Expected standard deviation in height"
-    drawing = Drawing("picture-plan", title, caption, partial(plan_sketch, patterns))
-    points = (
-        "Expected standard deviations, a priori: nothing has been measured. Detectable is the smallest error"
-        " of an image coordinate that the test detects (level 0.001, power 0.80). The effect is the largest"
-        " change of an unknown by an undetected error of this size, in standard deviations."
-    )
-    control = "An error of control that is smaller than the detectable one changes the result undetected."
-    errors = (
-        "The table contains errors of sets of observations and of single ones, the largest effects first."
-        " Without an MDB, an error of any size remains undetected, and the effect has a plausible size."
-    )
+    drawing = Drawing("picture-plan", title, about("plan.caption"), partial(plan_sketch, patterns))
     new = any(pattern.new_points.any() for pattern in patterns)
     return Document(
         what="Prediction of a network before it is flown",
@@ -69,11 +64,11 @@ def plan_document(patterns: Sequence[Pattern]) -> Document:
             Section("network", "Plan of the network", [drawing] if new else []),
             _comparison_section(patterns),
             Section("size", "How much", [_size(patterns)]),
-            _layers("points", "New points", patterns, _points, points),
+            _layers("points", "New points", patterns, _points, about("plan.points")),
             _layers("photos", "Photos", patterns, _photos),
             _layers("motion", "Motion", patterns, _motion),
-            _layers("control", "Control", patterns, _control, control),
-            _layers("undetected", "Undetected errors", patterns, _undetected, errors),
+            _layers("control", "Control", patterns, _control, about("plan.control")),
+            _layers("undetected", "Undetected errors", patterns, _undetected, about("plan.undetected")),
             remarks_section(_remarks(patterns)),
         ],
         details=[
@@ -287,26 +282,27 @@ def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
     """Return the next steps that would make the network check itself."""
     phrases = []
     for pattern in patterns:
-        about = partial(phrase, pattern=pattern.name)
+        of_pattern = partial(phrase, pattern=pattern.name)
         unchecked = pattern.points[-1].unchecked
         if pattern.new_points.any() and unchecked > MAX_UNCHECKED:
-            phrases.append(about("plan.unchecked", percent=100 * unchecked))
+            phrases.append(of_pattern("plan.unchecked", percent=100 * unchecked))
         weak = [each.component for each in pattern.control if each.held and each.redundancy < MIN_REDUNDANCY]
         if weak:
-            phrases.append(about("plan.control", components=weak))
+            phrases.append(of_pattern("plan.control", components=weak))
         if found := pattern.hypotheses:
             worst: dict[str, int] = {}
             for row in found.harmful:
                 worst.setdefault(REMEDIES.get(str(found.code[row]), "points"), row)
             phrases += [
-                about(f"plan.undetected.{remedy}", error=found.sentence(row)) for remedy, row in worst.items()
+                of_pattern(f"plan.undetected.{remedy}", error=found.sentence(row))
+                for remedy, row in worst.items()
             ]
             if assumed := found.assumed(FEWEST):
-                phrases.append(about("plan.assumed", errors=assumed))
+                phrases.append(of_pattern("plan.assumed", errors=assumed))
         readout = [quality for quality in pattern.motion if quality.unit == "s"]
         ratio = max(_improvements(pattern))
         if readout and ratio > MIN_IMPROVEMENT:
-            phrases.append(about("plan.readout", sd=1e3 * readout[0].rms_sd, ratio=ratio))
+            phrases.append(of_pattern("plan.readout", sd=1e3 * readout[0].rms_sd, ratio=ratio))
     return phrases
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from typing import Any
 
 import numpy as np
@@ -152,7 +153,7 @@ def thinned(what: str, rows: Indices, most: int) -> tuple[Indices, str]:
     """
     if len(rows) <= most:
         return rows, ""
-    chosen = np.sort(np.random.default_rng(0).choice(len(rows), most, replace=False))
+    chosen = sorted(random.Random(0).sample(range(len(rows)), most))
     return rows[chosen], f"{most:,} of {len(rows):,} {what} are drawn, taken at random"
 
 

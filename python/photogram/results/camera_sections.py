@@ -26,10 +26,10 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     """Return the section of adjusted and fixed cameras."""
     found = calibrations(result)
     shown, note = found[:LISTED], "the table of cameras has all"
-    tables = [parameters_table(each, law_of(result)) for each in shown]
-    parts: list[Part] = [*layered_tables("camera", tables)]
-    if groups := [(each.camera.name, group) for each in shown for group in each.groups]:
-        parts.append(_terms_together(groups))
+    law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
+    tables = [parameters_table(each, law) for each in shown]
+    groups = [(each.camera.name, group) for each in shown for group in each.groups]
+    parts: list[Part] = [*layered_tables("camera", tables), _terms_together(groups)]
     curves = [
         _curve_table(each.camera.name, curve, str(each.camera.camera.unit))
         for each in shown
@@ -46,7 +46,6 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
             *each.remarks(),
         )
     ]
-    parts += [Remarks(remarks)] if remarks else []
     held = [each for each in result.cameras if each.given.is_held]
     facts = [
         Fact(
@@ -59,15 +58,9 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     ]
     if len(held) > LISTED:
         facts.append(Fact("Not shown here", f"{len(held) - LISTED}", note=note))
-    if facts:
-        parts.append(Facts("Cameras that are held", facts))
-    if len(found) > LISTED:
-        parts.append(Facts("More cameras", [Fact("Not shown here", f"{len(found) - LISTED}", note=note)]))
+    more = [Fact("Not shown here", f"{len(found) - LISTED}", note=note)] if len(found) > LISTED else []
+    parts += [Remarks(remarks), Facts("Cameras that are held", facts), Facts("More cameras", more)]
     return Section("cameras", "Cameras", parts, about("cameras") if found else "")
-
-
-def law_of(result: Result) -> str:
-    return "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
 
 
 def parameters_table(found: Calibration, law: str = "") -> Table:

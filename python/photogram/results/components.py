@@ -152,9 +152,8 @@ def components_section(found: VarianceComponents) -> Section:
         Remarks([*map(str, statement(found))]),
         Drawing("picture-components", "Variance components", about("components.caption"), found.plot),
         components_table(found),
+        Remarks([*map(str, found.estimate.messages)]),
     ]
-    if found.estimate.messages:
-        parts.append(Remarks([*map(str, found.estimate.messages)]))
     return Section("components", "Variance components", parts, about("components"))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -101,11 +101,9 @@ class Adjusted:
         together = [np.concatenate(part) if part else np.empty(0) for part in (values, deviations)]
         return Selected(rows, labels, together[0], together[1], shapes)
 
-    def _places(self, kind: str) -> dict[str, int]:
-        known: dict[str, dict[str, int]] = self.__dict__.setdefault("_known_places", {})
-        if kind not in known:
-            known[kind] = {name: i for i, name in enumerate(self.things[kind].ids)}
-        return known[kind]
+    @cached_property
+    def _places(self) -> dict[str, dict[str, int]]:
+        return {kind: {name: i for i, name in enumerate(own.ids)} for kind, own in self.things.items()}
 
     def _is_one(self, wanted: Wanted) -> bool:
         return isinstance(wanted, str) or (
@@ -116,7 +114,7 @@ class Adjusted:
         if wanted is None:
             used = ~np.isnan([each[0] if len(each) else 0.0 for each in self.things[kind].values])
             return np.flatnonzero(used).tolist()
-        index = self._places(kind)
+        index = self._places[kind]
         several: Any = [wanted] if self._is_one(wanted) else wanted
         asked = names(f"names of the kind {kind}", several)
         if missing := [name for name in asked if name not in index]:

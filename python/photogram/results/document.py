@@ -70,7 +70,7 @@ def block_document(result: Result) -> Document:
         photos=len(result.block.photo_ids),
         title=result.block.title,
         more=_accuracy(result),
-        redundancy=[redundancy] if redundancy.visible else [],
+        redundancy=[redundancy],
         beside=[features_section(result.features, pictures["features"])],
         datum=about(f"datum.{'chosen' if datum.is_chosen else 'given'}", datum=datum.phrase),
         poses=about("poses") if result.block.timed else "",
@@ -122,13 +122,9 @@ def _size_section(result: Result) -> Section:
 
 
 def _unknowns_section(result: Result) -> Section:
-    if not result.unknowns:
-        return Section("unknowns", "Common unknowns", [])
     shown, note = notable(result.unknowns)
     tables = [Table("unknowns", "Common unknowns", unknowns(shown), note), trajectories_table(result)]
-    return Section(
-        "unknowns", "Common unknowns", [table for table in tables if table.visible], about("unknowns")
-    )
+    return Section("unknowns", "Common unknowns", tables, about("unknowns"))
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:

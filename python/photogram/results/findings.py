@@ -13,10 +13,10 @@ from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined
 from photogram.results.axes import point_axes
 from photogram.results.duplicates import duplicates
-from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
+from photogram.results.fixed_tests import held_tested, how_to_calibrate
 from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.patterns import CameraImages, patterns
+from photogram.results.patterns import block_patterns
 from photogram.results.tests import Tests
 from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text, TypeFactor
 from photogram.statistics.limits import GlobalTest, global_test
@@ -49,6 +49,8 @@ def network_findings(
     lost = None if summary is None else summary.downweighted
     test = _robust_test(result) if result.loss else result.global_test
     rejected = test is not None and (test.rejected_high or test.rejected_low)
+    assumed = [] if summary is None else summary.hypotheses.assumptions
+    assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
     return Findings(
         status=result.status,
         observations=[
@@ -64,7 +66,7 @@ def network_findings(
         snooped=result.snooped if lost is None else lost.removed,
         robust=result.loss is not None,
         unsupported=[] if lost is None else lost.unsupported,
-        remarks=[*unseen(result), *_assumptions(result)],
+        remarks=[*unseen(result), *assumptions],
         unchecked=[] if summary is None else summary.hypotheses.unchecked(),
         common=[] if summary is None else summary.hypotheses.common_errors(largest_odds(fixed)),
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
@@ -103,15 +105,20 @@ def block_findings(result: Result) -> Findings:
     intersected = not result.photo_given_sd.any()
     # Data snooping requires the complete block and adjusted photos.
     tests_more = result.WHOLE and not intersected
-    fixed, systematic = ([], []) if intersected else (held_tested(result), _patterns(result))
+    fixed, systematic = ([], []) if intersected else (held_tested(result), block_patterns(result))
     found = network_findings(result, fixed, systematic)
+    left_out = [
+        Phrase("line.point-left-out", {"point": str(point), "reason": HARMFUL[reason]})
+        for point, reason in result.dropped.items()
+        if reason in HARMFUL
+    ]
     return replace(
         found,
         undetermined=left_open(result),
         checks=result.check_points.agreement,
         intersected=intersected,
         scaled=result.unit_variance != "unity",
-        remarks=[*found.remarks, *_left_out(result), *_on_checks(result)],
+        remarks=[*found.remarks, *left_out, *_on_checks(result)],
         duplicates=duplicates(result.block),
         hints=result.hints,
         exchanged=result.exchanged,
@@ -167,15 +174,6 @@ def _set_aside(result: Result) -> Removed | None:
     return Removed([{"name": name} for name in result.set_aside], counts)
 
 
-def _left_out(result: Result) -> list[Phrase]:
-    """Return the points that were excluded because one of their images must be wrong."""
-    return [
-        Phrase("line.point-left-out", {"point": str(point), "reason": HARMFUL[reason]})
-        for point, reason in result.dropped.items()
-        if reason in HARMFUL
-    ]
-
-
 def _on_checks(result: Result) -> list[Phrase]:
     """Return check points with assumed sd, and reasons for missing tests."""
     checks, axes = result.check_points, point_axes(result.block)
@@ -189,25 +187,6 @@ def _on_checks(result: Result) -> list[Phrase]:
     sd = list(dict.fromkeys(f"{value * axis.factor:.2g} {axis.small}" for value, axis in own))
     fields = {"assumed": int(checks.assumed.sum()), "n": len(checks.rows), "sd": sd}
     return [Phrase("line.checks-assumed", {**fields, "how": Phrase("how.checks")})]
-
-
-def _patterns(result: Result) -> list[Systematic]:
-    block, photos = result.block, len(result.block.photo_ids)
-    cameras = [CameraImages("the camera", np.ones(photos, dtype=bool), 0)]
-    if block.photo_cameras is not None:
-        cameras = [
-            CameraImages(each.name, block.photo_cameras == row, int(np.count_nonzero(each.information)))
-            for row, each in enumerate(result.cameras)
-        ]
-    axes = [axis.name for axis in point_axes(block)]
-    return patterns(result, cameras, axes, lambda own: fall_by_lens(result, own))
-
-
-def _assumptions(result: AdjustedNetwork) -> list[Phrase]:
-    """Return the errors of the datum that independent observations do not check."""
-    summary = result.reliability_summary
-    names = [] if summary is None else summary.hypotheses.assumptions
-    return [Phrase("line.datum-assumed", {"errors": names})] if names else []
 
 
 def unseen(result: AdjustedNetwork) -> list[Phrase]:

@@ -95,11 +95,11 @@ def network_document(
             Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], about("redundancy")),
             Section("reliability", "Reliability", reliability),
             Section("tests", "Tests", [pictures["tests"], verdict_table(result.verdict)], about("tests")),
-            Section("worst", "Worst observations", _worst_table(tests, worst), about("worst")),
+            Section("worst", "Worst observations", [_worst_table(tests, worst)], about("worst")),
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
-            Section("weakest", "Weakest points and photos", [table for table in weakest if table.visible]),
+            Section("weakest", "Weakest points and photos", weakest),
             Section("iterations", "Iterations", [course_table, Facts("Course", course)]),
         ],
         details=[
@@ -161,7 +161,7 @@ def size_section(
     parts: list[Part] = [
         Facts("How much", [*facts, *more]),
         Facts("How good", [*good, *_images_facts(result)]),
-        *_precision_table(result),
+        _precision_table(result),
     ]
     return Section("size", "How much, how good", parts)
 
@@ -215,8 +215,8 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     return facts
 
 
-def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
-    """Return the distribution of standard deviations of values; empty without any."""
+def _precision_table(result: AdjustedNetwork) -> quantity.Table:
+    """Return the distribution of standard deviations of values."""
     terms, rows = result._terms(), list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
@@ -226,9 +226,7 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
             known = column[np.isfinite(column)] * axis.factor
             if known.size:
                 rows.append((what, axis.name, *np.quantile(known, (0.5, 0.9, 1.0)), unit_written(axis.small)))
-    if not rows:
-        return []
-    things, components, median, most, largest, units = zip(*rows, strict=True)
+    things, components, median, most, largest, units = zip(*rows, strict=True) if rows else ((),) * 6
     columns = [
         Quantity(things, kind="name", head="Standard deviations of"),
         Quantity(components, kind="name", head="Component"),
@@ -237,7 +235,7 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
         Quantity(largest, head="Largest"),
         Quantity(units, kind="name", head="Unit"),
     ]
-    return [quantity.Table("precision", "Precision", columns, about("precision"))]
+    return quantity.Table("precision", "Precision", columns, about("precision"))
 
 
 def _work(result: AdjustedNetwork) -> list[Fact]:
@@ -257,10 +255,8 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
     ]
 
 
-def _worst_table(tests: Tests, places: Indices) -> list[quantity.Table]:
-    """Return the table of the largest test values by indices; empty without any."""
-    if not len(places):
-        return []
+def _worst_table(tests: Tests, places: Indices) -> quantity.Table:
+    """Return the table of the largest test values by indices."""
     names = []
     for kind, row, part in places.tolist():
         each = tests.components[kind]
@@ -270,7 +266,7 @@ def _worst_table(tests: Tests, places: Indices) -> list[quantity.Table]:
     note = about("worst-observations", n=len(places), count=count, limit=NOTABLE)
     columns = [Quantity(names, kind="name", head="Observation")]
     columns += [each for each in tests.columns(places) if each.name != "component"]
-    return [quantity.Table("worst", "Worst observations", columns, note)]
+    return quantity.Table("worst", "Worst observations", columns, note)
 
 
 PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")

@@ -125,19 +125,17 @@ def component_table(
     there: Bools,
     tests: Floats,
     deviations: Floats | None = None,
-) -> list[Table]:
-    """Return a table of the components with the largest test values, if any.
+) -> Table:
+    """Return a table of the components with the largest test values.
 
     `there` are the (n, k) existing components, `tests` their test values, NaN if missing.
     """
     places = np.argwhere(there)
-    if not len(places):
-        return []
     sizes = np.abs(tests[there])
     rows = np.sort(np.argsort(np.where(np.isnan(sizes), 1.0, -sizes), kind="stable")[:COMPONENTS])
     note = "" if len(rows) == len(places) else about("components.largest", n=len(rows), all=len(places))
     by = None if deviations is None else np.where(there, deviations, np.nan)
-    return [Table(key, title, columns, note, deviations=by, shown=places[rows])]
+    return Table(key, title, columns, note, deviations=by, shown=places[rows])
 
 
 def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> Section:
@@ -148,10 +146,9 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
     columns, own = control(result), result.control
     held = (own.sd == 0).all(axis=1)
     there, sd = np.isfinite(own.sd) & ~held[:, np.newaxis], result.point_sd[own.rows]
-    tables = component_table("control", "Control points", columns, there, own.standardized, sd)
+    parts: list[Part] = [component_table("control", "Control points", columns, there, own.standardized, sd)]
     if free:
-        tables += _compared("unheld", "Components of control that are not held", free)
-    parts: list[Part] = [*tables]
+        parts.append(_compared("unheld", "Components of control that are not held", free))
     if held.any():
         fixed = [str(name) for name in np.asarray(columns[0].values)[held]]
         parts.append(Text(about("control.fixed", n=len(fixed), names=fixed)))
@@ -160,8 +157,8 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
 
 def check_section(result: Result) -> Section:
     columns = check_points(result)
-    tables = _compared("check_points", "Check points one by one", columns)
-    parts = [_check_summary(result), *tables, _check_tests(result, columns)] if tables else []
+    table = _compared("check_points", "Check points one by one", columns)
+    parts = [_check_summary(result), table, _check_tests(result, columns)] if table.visible else []
     intro = about("check-points")
     checks = result.check_points
     if checks.assumed.any():
@@ -205,7 +202,7 @@ def _check_tests(result: Result, columns: Sequence[Quantity]) -> Table:
     return Table("check-tests", "Tests of all components of a point together", tests, shown=rows)
 
 
-def _compared(key: str, title: str, columns: Sequence[Quantity]) -> list[Table]:
+def _compared(key: str, title: str, columns: Sequence[Quantity]) -> Table:
     tests = next(column.values for column in columns if column.head == "Test value")
     there = np.isfinite(named(columns, "d").values)
     return component_table(key, title, columns, there, tests, named(columns, "sd").values)
@@ -218,7 +215,7 @@ def stations_section(result: AdjustedNetwork) -> Section:
     for caption, of in layers.items():
         columns = [part(column, of) if column.axes else column for column in stations(result)]
         key, title = f"stations-{caption.lower()}", f"{caption} of photos"
-        tables += component_table(key, title, columns, there[:, of], own.standardized[:, of], sd[:, of])
+        tables.append(component_table(key, title, columns, there[:, of], own.standardized[:, of], sd[:, of]))
     *others, last = [caption.lower() for caption in layers]
     intro = f"{', '.join(others).capitalize()} and {last} that were given with standard deviations."
     return Section("stations", "Observed photos", layered_tables("stations", tables), intro)
@@ -230,7 +227,7 @@ def beside_section(result: Result) -> Section:
         if observed.used:
             key, title = f"observations-{kind}", kind[:1].upper() + kind[1:]
             there, columns = np.isfinite(observed.residuals), observations(observed)
-            tables += component_table(key, title, columns, there, observed.standardized)
+            tables.append(component_table(key, title, columns, there, observed.standardized))
     return Section(
         "observations", "Other observations", layered_tables("beside", tables), about("observations")
     )
@@ -250,7 +247,7 @@ def images_section(result: AdjustedNetwork) -> Section:
         replace(tests, head="w {}"),
     ]
     table = Table("images", "Image observations", columns, note, shown=rows)
-    return Section("images", "Image observations", [table] if len(rows) else [], about("images"))
+    return Section("images", "Image observations", [table], about("images"))
 
 
 def _chosen_rows(
@@ -324,8 +321,6 @@ def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
 def points_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
     """Return points with their standard deviations, first `others`."""
     terms, used = result._terms(), np.flatnonzero(result.used_points)
-    if not len(used):
-        return Section("points", "Points", [])
     # An approximate number of metres per radian is sufficient for sorting.
     lengths = np.array([6.4e6 if axis.angle else 1.0 for axis in terms.point_axes])
     size = np.where(result.used_points, np.linalg.norm(result.point_sd * lengths, axis=1), np.nan)

@@ -26,6 +26,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
+from photogram.results.axes import point_axes
+from photogram.results.fixed_tests import fall_by_lens
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.distributions import LEVEL, bonferroni
@@ -108,6 +110,23 @@ def patterns(
         ]
         found.append(_of_heights(result))
     return [each for each in found if each is not None]
+
+
+def _cameras(result: Result) -> list[CameraImages]:
+    """Return the cameras of a block; one if it has principal distances."""
+    block = result.block
+    if block.photo_cameras is None:
+        return [CameraImages("the camera", np.ones(len(block.photo_ids), dtype=bool), 0)]
+    return [
+        CameraImages(each.name, block.photo_cameras == row, int(np.count_nonzero(each.information)))
+        for row, each in enumerate(result.cameras)
+    ]
+
+
+def block_patterns(result: Result) -> list[Systematic]:
+    """Return the tests of patterns of a block; see :func:`patterns`."""
+    axes = [axis.name for axis in point_axes(result.block)]
+    return patterns(result, _cameras(result), axes, lambda own: fall_by_lens(result, own))
 
 
 def _clipped(w: Floats, redundancy: Floats, factor: float) -> Floats:
@@ -298,14 +317,10 @@ def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[D
 
 def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
     block = result.block
-    photos: Indices = np.arange(len(block.photo_ids))
-    cameras = [("the camera", photos >= 0)]
-    if block.photo_cameras is not None:
-        cameras = [(each.name, block.photo_cameras == row) for row, each in enumerate(result.cameras)]
     tested = (redundancy > 0).any(axis=1)
     found: list[_Pattern] = []
-    for name, own_photos in cameras:
-        own = np.flatnonzero(own_photos[block.image_photos] & tested)
+    for camera in _cameras(result):
+        own = np.flatnonzero(camera.photos[block.image_photos] & tested)
         xy, on, r = focal_images(block)[own], block.image_photos[own], redundancy[own]
 
         def bins(v: Floats, own: Indices = own, xy: Floats = xy, r: Floats = r) -> float:
@@ -316,11 +331,11 @@ def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
             return moran(xy, on, v[own])
 
         found += [
-            (f"pattern over the frame of {name}", "B", bins),
-            (f"neighbours in the frame of {name}", "I", alike),
+            (f"pattern over the frame of {camera.name}", "B", bins),
+            (f"neighbours in the frame of {camera.name}", "I", alike),
         ]
 
     def along(v: Floats) -> float:
-        return durbin_watson(block.image_photos, len(photos), v, redundancy)
+        return durbin_watson(block.image_photos, len(block.photo_ids), v, redundancy)
 
     return [*found, ("one photo and the next", "d", along)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -91,10 +91,10 @@ def observations(kind: ObservedKind) -> list[Quantity]:
     ]
 
 
-def observed_components(kinds: Iterable[ObservedKind]) -> list[Quantity]:
+def observed_components(result: Result) -> list[Quantity]:
     """Return the observed and used components of observations as rows."""
-    every = [long(observations(each), np.argwhere(~np.isnan(each.residuals))) for each in kinds]
-    return joined(every or [long(observations(_NOTHING), np.argwhere(_EMPTY))])
+    kinds = result.kinds.values() or [_NOTHING]
+    return joined([long(observations(each), np.argwhere(~np.isnan(each.residuals))) for each in kinds])
 
 
 _EMPTY, _NONE = np.zeros((0, 1)), np.zeros(0)
@@ -192,7 +192,7 @@ def _each(every: Sequence[Any], what: str) -> Any:
 TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
     **tests.TABLES,
     "check": check_points,
-    "observation": lambda result: observed_components(result.kinds.values()),
+    "observation": observed_components,
     "camera": lambda result: camera_parameters(result.cameras),
     "unknown": lambda result: unknowns(result.unknowns),
     "feature": lambda result: quantity_columns(result.features or Features(())),

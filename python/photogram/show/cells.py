@@ -17,11 +17,13 @@ from photogram.show.page import (
     Column,
     Document,
     Drawing,
+    Facts,
     Layers,
     Part,
-    Picture,
+    Remarks,
     Section,
     Table,
+    Text,
     decimals_of,
     number_text,
     probability_written,
@@ -40,33 +42,44 @@ _SIGNS = {
 }
 _MOST_OF_DEGREES = 9
 
+Draw = Callable[[Drawing], Drawing | None]  # Draws a plot; returns None without data
+
 
 def unit_written(unit: str) -> str:
     """Return a unit with the symbols of pages."""
     return _SIGNS.get(unit, unit)
 
 
-def written_sections(
-    document: Document, draw: Callable[[Drawing], Picture | None] = lambda _: None
-) -> list[Section]:
-    """Return the visible sections: tables of cells, drawn plots, without empty parts."""
-    whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in document.sections]
-    return [section for section in whole if section.parts]
+def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Document:
+    """Return the visible parts of a document with formatted tables and drawn plots."""
+
+    def visible(sections: Sequence[Section]) -> list[Section]:
+        whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in sections]
+        return [section for section in whole if section.parts]
+
+    return replace(document, sections=visible(document.sections), details=visible(document.details))
 
 
-def _written(
-    parts: Sequence[Part], numeral: Callable[[str], str], draw: Callable[[Drawing], Picture | None]
-) -> list[Any]:
+def _written(parts: Sequence[Part], numeral: Callable[[str], str], draw: Draw) -> list[Any]:
     found: list[Any] = []
     for part in parts:
         if isinstance(part, Layers):
             layers = _written(part.parts, numeral, draw)
             found += layers if len(layers) < 2 else [replace(part, parts=layers)]
         elif isinstance(part, Drawing):
-            found += [picture] if (picture := draw(part)) else []
-        elif not isinstance(part, quantity.Table) or part.visible:
+            found += [drawing] if (drawing := draw(part)) else []
+        elif not _is_empty(part):
             found.append(written(part, numeral))
     return found
+
+
+def _is_empty(part: Part) -> bool:
+    match part:
+        case quantity.Table():
+            return not part.visible
+        case Facts(facts=content) | Remarks(sentences=content) | Text(text=content):
+            return not content
+    return False
 
 
 def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
@@ -83,12 +96,11 @@ def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
     pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations)]
     rows = [*zip(*(cells for _, cells in pairs), strict=True)]
     if numeral is not str:
-        rows = [tuple(_localized(cell, numeral) for cell in row) for row in rows]
+        rows = [
+            tuple(cell if cell.number is None else cell._replace(text=numeral(cell.text)) for cell in row)
+            for row in rows
+        ]
     return Table(part.title, [column for column, _ in pairs], rows, part.note)
-
-
-def _localized(cell: Cell, numeral: Callable[[str], str]) -> Cell:
-    return cell if cell.number is None else replace(cell, text=numeral(cell.text))
 
 
 def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, list[Cell]]]:
@@ -176,4 +188,4 @@ def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cel
 def _marked(cells: list[Cell], marked: Bools | None) -> list[Cell]:
     if marked is None:
         return cells
-    return [replace(cell, tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]
+    return [cell._replace(tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]

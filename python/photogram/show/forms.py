@@ -9,8 +9,8 @@ from typing import Any
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import replace
-from photogram.show.cells import written, written_sections
-from photogram.show.page import Document, Fact, Facts, Layers, Part, Remarks, Section, Table, Text
+from photogram.show.cells import formatted, written
+from photogram.show.page import Document, Fact, Facts, Layers, Part, Remarks, Table, Text
 
 WIDTH = 100  # characters of a line of prose
 MAX_ROWS = 40  # maximum number of rows of a table in a summary
@@ -70,29 +70,22 @@ def _judged(document: Document) -> list[TitledLines]:
         for judgement in document.judgements
     ]
     titled.append(("What to do next", [*document.advice]))
-    return [(title, [_sentence(line) for line in lines]) for title, lines in titled if lines]
+    return [
+        (title, [f"{text[:1].upper()}{text[1:]}".removesuffix(".") + "." for text in map(str, lines)])
+        for title, lines in titled
+        if lines
+    ]
 
 
 def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
     """Return lines of key figures and non-empty sections with titles."""
-    figures = fact_lines([*document.head, *document.highlights])
-    whole = replace(document, sections=[*document.sections, *document.details])
-    titled = [("Key figures", figures)] + [
-        (section.title, _section_lines(section, "" if keys else section.intro))
-        for section in written_sections(whole)
-        if section.key in keys or not keys
-    ]
+    every = [each for each in (*document.sections, *document.details) if each.key in keys or not keys]
+    titled = [("Key figures", fact_lines([*document.head, *document.highlights]))]
+    for section in formatted(replace(document, sections=every, details=())).sections:
+        parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
+        intro = textwrap.wrap("" if keys else section.intro, WIDTH)
+        titled.append((section.title, _spaced([intro, *parts]) if parts else []))
     return [(title, "\n".join(lines).split("\n")) for title, lines in titled if lines]
-
-
-def _sentence(message: object) -> str:
-    line = str(message)
-    return f"{line[:1].upper()}{line[1:]}".removesuffix(".") + "."
-
-
-def _section_lines(section: Section, intro: str) -> list[str]:
-    parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
-    return _spaced([textwrap.wrap(intro, WIDTH), *parts]) if parts else []
 
 
 def _spaced(parts: Iterable[list[str]]) -> list[str]:

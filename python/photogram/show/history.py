@@ -12,6 +12,7 @@ from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Document, Drawing, Section, layered
+from photogram.show.page import about as explanation
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each
 from photogram.show.sketch.marks import Level, Line, Mark, Markers, Panel, error_bars, spread
 from photogram.show.sketch.plot import Plot
@@ -59,10 +60,7 @@ def series(history: History, about: str = "") -> Table:
         Quantity([text or "constant" for text in found], kind="name", head="Found", marked=marked),
         Quantity(changes, member="changes"),
     ]
-    note = (
-        f"Of {history.tests} single tests together one rejects by chance with probability {history.level:g}:"
-        f" |t| beyond {history.limit:.3g} is accepted. Drift and steps as if nothing else changed."
-    )
+    note = explanation("series", **quantity.members(history, "tests", "level", "limit"))
     return Table("series", "What changed", columns, note, about, _deviations(history))
 
 
@@ -120,7 +118,7 @@ def history_document(
         judgements=[judged(verdict)],
         advice=verdict.next,
         sections=[
-            Section("charts", "Control charts", charts, _CHARTS),
+            Section("charts", "Control charts", charts, explanation("charts")),
             *changes[:1],
             Section.of(calibrations),
             *more,
@@ -129,12 +127,6 @@ def history_document(
         ],
         **fields,
     )
-
-
-_CHARTS = (
-    "Each value with its standard deviation; the line is the mean of all. Dashed: beyond, a value differs"
-    " from all others, whose common errors are taken into account. Coloured: what was accepted as a change."
-)
 
 
 def control_charts(history: History, title: str) -> Plot:

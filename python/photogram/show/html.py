@@ -10,8 +10,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
-from photogram.show.cells import written_sections
-from photogram.show.page import Cell, Column, Document, Drawing, Picture, Table
+from photogram.show.cells import formatted
+from photogram.show.page import Cell, Column, Document, Drawing, Table
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -26,16 +26,17 @@ def page_html(page: Document) -> bytes:
 
     It requires jinja2 (`pip install 'photogram[report]'`).
     """
-    environment, sections = _environment(), written_sections(page, inlined)
-    tables = (
-        part for part in Document("", "", sections=sections).parts(layers=True) if isinstance(part, Table)
-    )
-    text = environment.get_template("report.html").render(
-        page=replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title)),
-        sections=sections,
-        known={cell.id for table in tables for row in table.rows for cell in row if cell.id},
-        version=_photocore.__version__,
-        attributes=_attributes,
+    page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title), details=()), inlined)
+    tables = (part for part in page.parts(layers=True) if isinstance(part, Table))
+    text = (
+        _environment()
+        .get_template("report.html")
+        .render(
+            page=page,
+            known={cell.id for table in tables for row in table.rows for cell in row if cell.id},
+            version=_photocore.__version__,
+            attributes=_attributes,
+        )
     )
     return text.encode("utf-8", errors="replace")
 
@@ -77,10 +78,10 @@ def _attributes(column: Column, cell: Cell) -> dict[str, str]:
     }
 
 
-def inlined(drawing: Drawing) -> Picture | None:
-    """Draw a plot; None if it is empty."""
+def inlined(drawing: Drawing) -> Drawing | None:
+    """Draw a plot; return None if it is empty."""
     from photogram.show.sketch.svg import svg_of
 
     sketch = drawing.sketch()
     markup = svg_of(sketch, drawing.name, drawing.title) if sketch is not None else ""
-    return Picture(drawing.name, drawing.title, drawing.caption, markup) if markup else None
+    return replace(drawing, markup=markup) if markup else None

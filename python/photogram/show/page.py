@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ MOST_DECIMALS = 12  # Maximum number of decimals of a fixed-point column
 LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """A formatted cell."""
 
     text: str
@@ -80,23 +79,13 @@ class Facts:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A plot that is not yet drawn."""
+    """A plot; renderers draw it, and omit it if there are no data."""
 
     name: str  # Unique on the page; prefix of the identifiers of its parts
     title: str  # Short name and subject
     caption: str
-    sketch: Callable[[], Plot | None]  # Creates the plot; returns None if there are no data
-    kind: str = field(default="drawing", init=False)
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A plot as markup of the page."""
-
-    name: str
-    title: str
-    caption: str
-    markup: str
+    sketch: Callable[[], Plot | None]
+    markup: str = ""  # The drawn plot
     kind: str = field(default="figure", init=False)
 
 
@@ -105,7 +94,7 @@ class Layers:
     """Alternatives shown one at a time; all on paper and without scripts."""
 
     name: str
-    parts: Sequence[Drawing | Picture | Table | quantity.Table]
+    parts: Sequence[Drawing | Table | quantity.Table]
     kind: str = field(default="layers", init=False)
 
 
@@ -126,12 +115,12 @@ class Remarks:
     kind: str = field(default="remarks", init=False)
 
 
-Part = Table | quantity.Table | Facts | Drawing | Picture | Layers | Text | Remarks
+Part = Table | quantity.Table | Facts | Drawing | Layers | Text | Remarks
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section, omitted if empty. An annex starts on a new sheet."""
+    """A section; renderers omit empty parts and sections. An annex starts on a new sheet."""
 
     key: str
     title: str

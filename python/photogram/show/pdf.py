@@ -14,9 +14,9 @@ from typing import Any
 import typst
 
 from photogram.lazy_dataclasses import fields, replace
-from photogram.show.cells import written_sections
+from photogram.show.cells import formatted
 from photogram.show.html import inlined
-from photogram.show.page import Column, Document, Picture, Table
+from photogram.show.page import Column, Document, Drawing, Table
 from photogram.show.sketch.letters import width
 from photogram.show.sketch.svg import LETTERS
 from photogram.words import Phrase
@@ -24,6 +24,7 @@ from photogram.words import Phrase
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts included in the library; for other letters it uses fonts of the machine."""
 
+OMITTED = ("members", "phases", "numeral", "sketch")  # Fields that pages do not show
 LONGEST = 30  # Longest word that is not broken, characters
 
 
@@ -32,8 +33,7 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
 
     `author` is a property of the file.
     """
-    sections = written_sections(page, inlined)
-    titled = replace(page, title=page.title or page.what, sections=sections, details=())
+    titled = formatted(replace(page, title=page.title or page.what, details=()), inlined)
     footer = f"{page.what} – {page.title}" if page.title else page.what
     record = _record(titled) | {"author": author or [], "footer": footer, "fonts": FONTS, "longest": LONGEST}
     data = json.dumps(record, default=_record, ensure_ascii=False)
@@ -47,9 +47,9 @@ def _record(part: Any) -> Any:
     """Return the fields of a part of a document."""
     if isinstance(part, Phrase):
         return str(part)
-    names = (each.name for each in fields(part) if each.name not in ("members", "phases", "numeral"))
+    names = (each.name for each in fields(part) if each.name not in OMITTED)
     record: dict[str, Any] = {name: getattr(part, name) for name in names}
-    if isinstance(part, Picture):
+    if isinstance(part, Drawing):
         # Width and height follow from the view box.
         record["markup"] = re.sub('^(<svg[^>]*) width="[^"]*"', r"\1", part.markup).replace(LETTERS, FONTS[0])
     elif isinstance(part, Table):

@@ -11,7 +11,7 @@ from pathlib import Path
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import printable
-from photogram.show.page import Fact, Facts, Part, Section
+from photogram.show.page import Fact, Facts, Part, Section, about
 from photogram.show.quantity import Axis, Quantity, Table
 
 LISTED = 200  # Maximum number of listed input files
@@ -61,29 +61,24 @@ def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
             Fact("Began", stamp, "UTC"),
             Fact("Time up to this report", f"{run.seconds:.2f}", "s"),
         ]
-    parts: list[Part] = [Facts("Made by", made)]
-    if run is not None and run.inputs:
-        note = f"and {run.others} more" if run.others else ""
-        columns = [
-            Quantity([printable(str(each.path)) for each in run.inputs], kind="name", head="File"),
-            Quantity([each.size for each in run.inputs], BYTES, "deviation", head="Size", decimals=0),
-            Quantity([each.sha256 for each in run.inputs], kind="name", head="SHA-256"),
-        ]
-        parts.append(Table("", "Input files", columns, note))
-    if run is not None and run.options:
-        note = "Those that were not given have their defaults."
-        columns = [
-            Quantity([*run.options], kind="name", head="Option"),
-            Quantity([*map(printable, run.options.values())], kind="name", head="Value"),
-        ]
-        parts.append(Table("", "Options", columns, note))
-    if phases:
-        columns = [
-            Quantity([*phases], kind="name", head="Phase"),
-            Quantity([*phases.values()], SECONDS, "deviation", head="Time", decimals=3),
-        ]
-        parts.append(Table("", "Time spent in the adjustment", columns))
-    intro = (
-        "What is needed to make this page again. Everything above is the same in every run; times are not."
-    )
-    return Section("reproducibility", "Reproducibility", parts, intro)
+    inputs, options = (run.inputs, run.options) if run else ((), dict[str, str]())
+    files = [
+        Quantity([printable(str(each.path)) for each in inputs], kind="name", head="File"),
+        Quantity([each.size for each in inputs], BYTES, "deviation", head="Size", decimals=0),
+        Quantity([each.sha256 for each in inputs], kind="name", head="SHA-256"),
+    ]
+    values = [
+        Quantity([*options], kind="name", head="Option"),
+        Quantity([*map(printable, options.values())], kind="name", head="Value"),
+    ]
+    times = [
+        Quantity([*phases], kind="name", head="Phase"),
+        Quantity([*phases.values()], SECONDS, "deviation", head="Time", decimals=3),
+    ]
+    parts: list[Part] = [
+        Facts("Made by", made),
+        Table("", "Input files", files, f"and {run.others} more" if run and run.others else ""),
+        Table("", "Options", values, about("run.options")),
+        Table("", "Time spent in the adjustment", times),
+    ]
+    return Section("reproducibility", "Reproducibility", parts, about("reproducibility"))

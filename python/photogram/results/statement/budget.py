@@ -169,15 +169,17 @@ def _largest(rows: Rows, squares: Floats, t: Floats, share: float) -> Iterable[S
             yield Single(rows.named(row), float(rows.sd[row]), float(t[row] / rows.sd[row]), own, own * share)
 
 
-def budget_line(texts: Texts, found: Budget) -> str:
-    """Return a sentence with value, sd (two digits) and expanded uncertainty."""
+def budget_fields(texts: Texts, found: Budget) -> dict[str, Any]:
+    """Return the fields of the sentence of a budget: value, sd (two digits), expanded uncertainty."""
     factor, unit = (1.0, found.unit) if found.unit != "rad" else (math.degrees(1.0), "°")
     sd = found.sd * factor
     decimals = decimals_of(np.array([sd]), unknown=6)
     numbers = (texts.number(each * factor, decimals) for each in (found.value, found.sd, found.expanded))
-    value, u, expanded = (f"{each} {unit}".rstrip() for each in numbers)
+    fields = dict(
+        zip(("value", "u", "expanded"), (f"{each} {unit}".rstrip() for each in numbers), strict=True)
+    )
     k, p = texts.number(found.k, 2), texts.percent(found.coverage)
-    return texts("budget.line", quantity=found.subject, value=value, u=u, expanded=expanded, k=k, p=p)
+    return {"quantity": found.subject, **fields, "k": k, "p": p}
 
 
 class _Freedoms:

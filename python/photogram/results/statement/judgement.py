@@ -3,28 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.refraction import Refraction
 from photogram.results.statement.asprs import wording
-from photogram.results.statement.budget import budget_line
-from photogram.results.statement.figures import Figures
-from photogram.results.statement.grounds import Grounds, Said, assumptions
-from photogram.results.statement.honest import LEVEL, PointTests, Prediction, Surface
-from photogram.results.statement.layout import Layout
+from photogram.results.statement.budget import budget_fields
+from photogram.results.statement.figures import Figures, root_mean
+from photogram.results.statement.honest import LEVEL, Prediction, Surface
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Asprs, Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
+from photogram.show.quantity import members
 from photogram.statistics.distributions import critical_normal
 from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
+if TYPE_CHECKING:
+    from photogram import Result, Statement
+
 NOT_USABLE = 4  # Exit code
 HEIGHT_KINDS = 10.0  # Mean difference between two height systems (sd)
 NAMED = 10
+MAX_FIXED_VALUES = 20  # Number of fixed values in a sentence
+Said = list[tuple[str, str]]  # Codes and texts
+Sentence = tuple[str, dict[str, Any]]  # A code with its fields
 _CASES = {
     "missed": "missed",
     "met with confidence": "tested",
@@ -49,8 +56,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class _Evidence:
-    found: Grounds
-    strict: bool
+    found: Statement
     control: Sequence[LeftOut]  # Control points that disagree with the rest of the block
     classes: Sequence[str]  # Verdicts on accuracy classes
     # Names of true facts: differences at check points are `high` or `low`, the required accuracy of lengths
@@ -69,7 +75,7 @@ def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> 
         }
         return Phrase(f"headline.{name}", fields)
 
-    return Rule(name, message, exit_code, (), grave=lambda e: e.strict or name != "low")
+    return Rule(name, message, exit_code, (), grave=lambda e: e.found.strict or name != "low")
 
 
 RULES = (
@@ -77,9 +83,9 @@ RULES = (
     _rule("missed", lambda e: "missed" in (*e.classes, *e.facts), NOT_USABLE),
     _rule("high", lambda e: "high" in e.facts, NOT_USABLE),
     _rule("unchecked", lambda e: e.found.result.verdict.code == "accepted-not-checked", NOT_USABLE),
-    _rule("warning", lambda e: e.strict and "warning" in e.facts, NOT_USABLE),
-    _rule("control", lambda e: e.strict and bool(e.control), NOT_USABLE),
-    _rule("lengths", lambda e: e.strict and "lengths" in e.facts, NOT_USABLE),
+    _rule("warning", lambda e: e.found.strict and "warning" in e.facts, NOT_USABLE),
+    _rule("control", lambda e: e.found.strict and bool(e.control), NOT_USABLE),
+    _rule("lengths", lambda e: e.found.strict and "lengths" in e.facts, NOT_USABLE),
     _rule("low", lambda e: "low" in e.facts, NOT_USABLE),
     _rule("none", lambda e: e.found.of_all is None and ("met" not in e.facts or "not tested" in e.classes)),
     _rule("found", lambda e: not {"not decided", "not tested"}.isdisjoint(e.classes)),
@@ -90,7 +96,7 @@ RULES = (
 """The rules of a statement; the first true one gives the headline and the exit code."""
 
 
-def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool = False) -> Judged:
+def judged(found: Statement) -> Judged:
     """Return the verdict of all findings."""
     texts, asprs, lengths = found.texts, found.standards.asprs, found.standards.lengths
     test = None if lengths is None else lengths.test
@@ -107,8 +113,8 @@ def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool
     facts = frozenset(name for name, fact in holds.items() if fact)
     control = [each for each in found.left_out if each.p < limit_of(found.left_out)]
     classes = [] if asprs is None else [*asprs.verdicts.values()]
-    _, headline, exit_code = fitting_rules(RULES, _Evidence(found, strict, control, classes, facts))[0]
-    remarks = _remarks(found)
+    _, headline, exit_code = fitting_rules(RULES, _Evidence(found, control, classes, facts))[0]
+    remarks = [texts(code, **fields) for code, fields in _remarks(found)]
     remarks += [texts("control.wrong", point=each.point, p=each.p) for each in control[:NAMED]]
     doubtful = bool(control) or not facts.isdisjoint({"warning", "low", "lengths"}) or _doubtful(found.of_all)
     return Judged(
@@ -116,15 +122,18 @@ def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool
         tone="bad" if exit_code else "look" if remarks or doubtful else "good",
         headline=texts(headline.code, **headline.fields),
         sentences=[
-            *_asprs(found),
-            *(_nssda(found) if "nssda" in found.asked.standards else []),
-            *_lengths(found),
-            *_honest(found),
-            *(("budget.line", budget_line(texts, each)) for each in found.taken_apart),
+            (code, texts(code, **fields))
+            for part in (_asprs, _nssda, _lengths, _honest, _budgets)
+            for code, fields in part(found)
         ],
-        assumptions=assumptions(found, assumed),
+        assumptions=[(code, texts(code, **fields)) for code, fields in _assumptions(found)],
         remarks=remarks,
     )
+
+
+def _budgets(found: Statement) -> Iterator[Sentence]:
+    for each in found.taken_apart:
+        yield "budget.line", budget_fields(found.texts, each)
 
 
 def _whole(of_all: Figures) -> Prediction | None:
@@ -151,136 +160,126 @@ def _doubtful(of_all: Figures | None) -> bool:
     )
 
 
-def _asprs(of: Grounds) -> Said:
-    texts, found = of.texts, of.standards.asprs
+def _asprs(of: Statement) -> Iterator[Sentence]:
+    found = of.standards.asprs
     if found is None:
-        return []
-    said: Said = []
+        return
     for name in ("h", "v", "3d"):
         figure, size = found.figures[name], of.asked.classes.get(name)
-        own = {f"rmse_{name}": figure.rmse} if figure is not None else {}
+        own = {} if figure is None else {"n": figure.count, f"rmse_{name}": figure.rmse}
         if size is None:
             if figure is not None and name != "3d":
-                said.append(texts.said(f"asprs.found.{name}", n=figure.count, **own))
+                yield f"asprs.found.{name}", own
         elif figure is not None:
-            key = f"asprs.{_CASES[found.verdicts[name]]}.{name}"
-            said.append(texts.said(key, n=figure.count, **{"class": size}, **own))
+            yield f"asprs.{_CASES[found.verdicts[name]]}.{name}", {**own, "class": size}
         elif name != "3d":
-            left = {f"loo_{name}": found.left_out[name]}
-            said.append(texts.said(f"asprs.none.{name}", **{"class": size}, **left))
-    vegetated = found.figures["vva"]
-    if vegetated is not None:
-        key = f"asprs.{wording(vegetated.count)}.vva"
-        said.append(texts.said(key, n=vegetated.count, rmse_v=vegetated.rmse))
-    return said
+            yield f"asprs.none.{name}", {"class": size, f"loo_{name}": found.left_out[name]}
+    if (vegetated := found.figures["vva"]) is not None:
+        yield f"asprs.{wording(vegetated.count)}.vva", {"n": vegetated.count, "rmse_v": vegetated.rmse}
 
 
-def _nssda(of: Grounds) -> Said:
-    texts, found = of.texts, of.standards.nssda
-    if found is None:
-        return []
-    said: Said = []
+def _nssda(of: Statement) -> Iterator[Sentence]:
+    found = of.standards.nssda
+    if found is None or "nssda" not in of.asked.standards:
+        return
     if found.accuracy_r is not None:
-        said.append(texts.said(f"nssda.{found.wording}.h", accuracy_r=found.accuracy_r, n=found.count))
+        yield f"nssda.{found.wording}.h", {"accuracy_r": found.accuracy_r, "n": found.count}
     elif found.ce95 is not None and found.ratio is not None:
-        said.append(texts.said("nssda.ce95", ratio=found.ratio, ce95=found.ce95))
+        yield "nssda.ce95", members(found, "ratio", "ce95")
     if found.accuracy_z is not None:
-        said.append(texts.said(f"nssda.{found.wording}.v", accuracy_z=found.accuracy_z, n=found.count))
-    return said if found.enough else [*said, texts.said("nssda.few", n=found.count)]
+        yield f"nssda.{found.wording}.v", {"accuracy_z": found.accuracy_z, "n": found.count}
+    if not found.enough:
+        yield "nssda.few", {"n": found.count}
 
 
-def _lengths(of: Grounds) -> Said:
+def _lengths(of: Statement) -> Iterator[Sentence]:
     texts, found = of.texts, of.standards.lengths
     if found is None:
-        return []
+        return
     test = found.test
-    own = {"n": len(test.errors), "lines": test.lines, "largest": test.largest, "rms": test.rms}
+    own = {"n": len(test.errors), **members(test, "lines", "largest", "rms")}
     if found.limit is None or test.within is None:
-        said = [texts.said("lengths.found", **own)]
+        yield "lengths.found", own
     else:
         limit = f"{texts.length(found.limit.constant)} + {texts.significant(found.limit.slope, 2)} L"
         if math.isfinite(found.limit.most):
             limit += f" ≤ {texts.length(found.limit.most)}"
         beyond = int((~test.within).sum())
-        key, more = ("lengths.missed", {"beyond": beyond}) if beyond else ("lengths.met", {})
-        said = [texts.said(key, limit=limit, **own, **more)]
+        yield f"lengths.{'missed' if beyond else 'met'}", {**own, "limit": limit, "beyond": beyond}
     if test.together is not None:
         whole = test.together
-        key = f"lengths.{'high' if whole.rejected_high else 'low' if whole.rejected_low else 'agree'}"
-        said.append(texts.said(key, **_factor(whole.factor, whole.interval)))
-    return said
+        side = "high" if whole.rejected_high else "low" if whole.rejected_low else "agree"
+        yield f"lengths.{side}", _factor(whole.factor, whole.interval)
 
 
-def _honest(found: Grounds) -> Said:
+def _honest(found: Statement) -> Iterator[Sentence]:
     texts, of_all = found.texts, found.of_all
     if of_all is None:
-        return [texts.said("honest.none")]
-    said: Said = []
+        yield "honest.none", {}
+        return
     whole = _whole(of_all)
     high, low = _rejected(of_all)
     if whole is not None:
-        key = f"honest.{'high' if high else 'low' if low else 'yes'}"
-        said.append(texts.said(key, n=whole.points, **_factor(whole.factor, whole.factor_interval)))
+        fields = {"n": whole.points, **_factor(whole.factor, whole.factor_interval)}
+        yield f"honest.{'high' if high else 'low' if low else 'yes'}", fields
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
         if own is not None and (own.rejected_high or own.rejected_low):
             fields = _factor(own.factor, own.factor_interval)
-            said.append(texts.said("honest.part", component=texts(f"component.{part}"), **fields))
+            yield "honest.part", {"component": texts(f"component.{part}"), **fields}
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
     for part, shift in shifts:
         if shift.rejected:
             sizes = {"mean": shift.mean, "expanded": shift.expanded, "k": shift.expanded / shift.sd_of_mean}
             component, p = texts(f"component.{part}"), texts.percent(found.asked.coverage)
-            said.append(texts.said("bias.found", component=component, **sizes, p=p))
+            yield "bias.found", {"component": component, **sizes, "p": p}
     if shifts and not any(shift.rejected for _, shift in shifts):
-        said.append(texts.said("bias.none"))
-    return [*said, *_surface(texts, of_all.surface), *_points(found, of_all.points)]
+        yield "bias.none", {}
+    yield from _surface(of_all.surface)
+    tests, without = of_all.points, found.asked.without
+    for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]:
+        yield "point.wrong", {"point": found.compared.names[row], "p": float(tests.least[row])}
+    if without:
+        reasons = "; ".join(f"{point}: {reason}" for point, reason in without.items())
+        yield "point.left", {"points": texts.listed(list(without)), "reasons": reasons}
 
 
-def _surface(texts: Texts, found: Surface | None) -> Said:
+def _surface(found: Surface | None) -> Iterator[Sentence]:
     if found is None:
-        return [texts.said("surface.few")]
-    if not found.rejected:
-        return [texts.said("surface.none", p=found.p)]
-    said = [texts.said("surface.found", p=found.p)]
+        yield "surface.few", {}
+        return
+    yield f"surface.{'found' if found.rejected else 'none'}", {"p": found.p}
     largest = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
     for name, field, k in (("shift", "shift", 0), ("tilt", "rise", largest), ("dome", "bend", 3)):
-        if abs(found.t[k]) > critical_normal(LEVEL):
-            said.append(texts.said(f"surface.{name}", **{field: found.estimate[k], "sd": found.sd[k]}))
-    return said
+        if found.rejected and abs(found.t[k]) > critical_normal(LEVEL):
+            yield f"surface.{name}", {field: float(found.estimate[k]), "sd": float(found.sd[k])}
 
 
-def _factor(factor: float, interval: tuple[float, float]) -> dict[str, float]:
+def _factor(factor: float, interval: tuple[float, float]) -> dict[str, Any]:
     return {"factor": factor, "low": interval[0], "high": interval[1]}
 
 
-def _points(found: Grounds, tests: PointTests) -> Said:
-    texts, names, without = found.texts, found.compared.names, found.asked.without
-    said = [
-        texts.said("point.wrong", point=names[row], p=tests.least[row])
-        for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]
-    ]
-    if without:
-        reasons = "; ".join(f"{point}: {reason}" for point, reason in without.items())
-        said.append(texts.said("point.left", points=texts.listed(list(without)), reasons=reasons))
-    return said
-
-
-def _remarks(found: Grounds) -> list[str]:
+def _remarks(found: Statement) -> Iterator[Sentence]:
     texts, of_all, standards = found.texts, found.of_all, found.standards
-    said = [
-        texts("unusable", point=name, reason=texts.word("reason", reason))
-        for name, reason in found.compared.not_usable[:NAMED]
-    ]
-    said += [texts("language.missing", sentence=key) for key in texts.missing]
+    for name, reason in found.compared.not_usable[:NAMED]:
+        yield "unusable", {"point": name, "reason": texts.word("reason", reason)}
+    for key in texts.missing:
+        yield "language.missing", {"sentence": key}
     if not found.result.photo_given_sd.any():
-        said.append(texts("assume.fixed"))
+        yield "assume.fixed", {}
     if standards.asprs is not None:
-        said += _asprs_remarks(found, standards.asprs)
+        yield from _asprs_remarks(found, standards.asprs)
     if standards.lengths is not None:
-        said += _lengths_remarks(texts, standards.lengths)
-    if found.layout is not None:
-        said += _layout(texts, found.layout)
+        yield from _lengths_remarks(texts, standards.lengths)
+    if (layout := found.layout) is not None:
+        for holds, name, fields in (
+            (not layout.even, "quadrants", {}),
+            (not layout.apart, "spacing", {"spacing": layout.least_spacing}),
+            (layout.far > 0, "far", {"percent": layout.far}),
+            (layout.beyond_control > 0, "outside", {"n": layout.beyond_control}),
+        ):
+            if holds:
+                yield f"layout.{name}", fields
     shift = None if of_all is None else of_all.bias["h"]
     heights = None if of_all is None else of_all.parts["h"]
     if shift is not None and heights is not None and heights.n > 2:
@@ -288,55 +287,127 @@ def _remarks(found: Grounds) -> list[str]:
         signs = np.sign(found.compared.differences[found.compared.counted[:, 2], 2])
         alike = heights.sd < abs(shift.mean) / 3
         if abs(signs.sum()) == len(signs) and abs(shift.z) > HEIGHT_KINDS and alike:
-            said.append(texts("bias.heights", mean=shift.mean, sd=heights.sd))
-    return said
+            yield "bias.heights", {"mean": shift.mean, "sd": heights.sd}
 
 
-def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
-    test, said = found.test, list[str]()
+def _lengths_remarks(texts: Texts, found: Lengths) -> Iterator[Sentence]:
+    test = found.test
     if not test.enough:
-        said.append(texts("lengths.few", lines=test.lines, least=test.least))
+        yield "lengths.few", members(test, "lines", "least")
     if not math.isfinite(test.longest):
-        said.append(texts("lengths.diagonal"))
+        yield "lengths.diagonal", {}
     elif not test.long_enough:
-        said.append(texts("lengths.short", share=test.longest))
+        yield "lengths.short", {"share": test.longest}
     if not test.along_diagonal:
-        said.append(texts("lengths.direction", angle=texts.number(math.degrees(test.off_diagonal), 0)))
+        yield "lengths.direction", {"angle": texts.number(math.degrees(test.off_diagonal), 0)}
     if found.expansion is None:
-        said.append(texts("lengths.warm"))
-    return said
+        yield "lengths.warm", {}
 
 
-def _asprs_remarks(found: Grounds, own: Asprs) -> list[str]:
+def _asprs_remarks(found: Statement, own: Asprs) -> Iterator[Sentence]:
     asked, texts, of_all, of_vegetated = found.asked, found.texts, found.of_all, found.of_vegetated
-    said = []
     counts = [0 if of_all is None else of_all.n] if asked.classes else []
-    counts += [of_vegetated.n] if of_vegetated is not None else []
-    said += [texts("asprs.points", asked=own.points_asked, n=n) for n in counts if n < own.points_asked]
+    for n in [*counts, *([] if of_vegetated is None else [of_vegetated.n])]:
+        if n < own.points_asked:
+            yield "asprs.points", {"asked": own.points_asked, "n": n}
     for name, good in own.survey.items():
         figure = own.figures[name]
         if not good and figure is not None:
-            said.append(texts("asprs.survey", survey=figure.survey, **{"class": asked.classes[name]}))
+            yield "asprs.survey", {"survey": figure.survey, "class": asked.classes[name]}
     for name, good in own.control.items():
         rmse = own.control_rmse["hv".index(name)]
         if not good and math.isfinite(rmse):
             # The limit is half a class; without vertical class, the full horizontal one.
             limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
-            said.append(texts(f"asprs.control.{name}", sd=rmse, limit=texts.size(limit)))
+            yield f"asprs.control.{name}", {"sd": rmse, "limit": texts.size(limit)}
     for each in own.remarks[:NAMED]:
-        fields = {"component": texts(f"component.{each.component}"), "value": each.value, "limit": each.limit}
+        fields = {"component": texts(f"component.{each.component}"), **members(each, "value", "limit")}
         if each.point is None:
-            said.append(texts("asprs.mean", **fields))
+            yield "asprs.mean", fields
         else:
-            said.append(texts("asprs.difference", point=found.compared.names[each.point], **fields))
-    return said
+            yield "asprs.difference", {"point": found.compared.names[each.point], **fields}
 
 
-def _layout(texts: Texts, found: Layout) -> list[str]:
-    remarks: list[tuple[bool, str, dict[str, float]]] = [
-        (not found.even, "quadrants", {}),
-        (not found.apart, "spacing", {"spacing": found.least_spacing}),
-        (found.far > 0, "far", {"percent": found.far}),
-        (found.beyond_control > 0, "outside", {"n": found.beyond_control}),
-    ]
-    return [texts(f"layout.{name}", **fields) for holds, name, fields in remarks if holds]
+def _assumptions(found: Statement) -> Iterator[Sentence]:
+    """Yield the assumptions in reading files, and on removed observations."""
+    asked, texts, layout, lengths = found.asked, found.texts, found.layout, found.standards.lengths
+    yield from _weights(found)
+    for each in found.assumed:
+        yield "assume.read", {"said": each}
+    yield from _adjustment(found)
+    if len(found.compared):
+        yield from _survey(found)
+        if found.compared.step > 1:
+            yield "assume.taken", {"all": found.compared.known, "step": found.compared.step}
+        yield "assume.heights", {}
+        if "asprs-2023" in asked.standards:
+            yield "assume.slopes", {}
+    if layout is not None:
+        quadrants = " / ".join(map(texts.percent, layout.quadrants))
+        fields = {"spacing": layout.least_spacing, "diagonal": texts.length(layout.diagonal, 3)}
+        yield "assume.layout", {"n": layout.count, "quadrants": quadrants, **fields}
+    if lengths is not None and lengths.expansion is not None:
+        yield "lengths.reference", {"expansion": texts.significant(lengths.expansion, 3)}
+    yield "assume.not_covered", {}
+
+
+def _weights(found: Statement) -> Iterator[Sentence]:
+    result, texts = found.result, found.texts
+    test, components = result.global_test, found.asked.components
+    if components is not None:
+        parts = [
+            f"{texts.kind(each.name)} x {texts.number(each.factor_of_sd, 2)}"
+            f" ({texts.number(each.interval[0] ** 0.5, 2)} – {texts.number(each.interval[1] ** 0.5, 2)})"
+            for each in components.components
+            if not each.held
+        ]
+        yield "weights.components", {"components": ", ".join(parts)}
+    elif test is not None:
+        low, high = (texts.number(each, 3) for each in test.limits)
+        side = "high" if test.rejected_high else "low" if test.rejected_low else "given"
+        yield f"weights.{side}", {"s2": texts.number(test.variance, 3), "low": low, "high": high}
+    if math.isinf(result.freedom_of_scale):
+        yield "weights.known", {}
+        return
+    s2, f = texts.number(result.covariance_scale, 3), texts.number(result.degrees_of_freedom, 0)
+    yield "weights.posterior", {"s2": s2, "f": f}
+    yield "honest.approximate", {}
+
+
+def _adjustment(found: Statement) -> Iterator[Sentence]:
+    result, texts, block = found.result, found.texts, found.result.block
+    total, out = int(result.used_images.sum()), len(found.removed)
+    removed = {"n": out, "all": total + out, "percent": out / (total + out)} if out else {}
+    yield f"assume.{'removed' if out else 'none_removed'}", removed
+    held = fixed_values(texts, result)
+    yield f"assume.{'held' if held else 'none_held'}", {"held": held}
+    frame = f"{texts.text(block.frame.phrase)}, {block.linear_unit}"
+    yield "assume.datum", {"datum": result.datum.phrase, "frame": frame}
+    yield "assume.refraction", {"refraction": (block.refraction or Refraction()).phrase(block.linear_unit)}
+
+
+def _survey(found: Statement) -> Iterator[Sentence]:
+    asked, texts, sd = found.asked, found.texts, found.compared.survey_sd
+    if not sd[np.isfinite(sd)].any():
+        yield "assume.survey_exact", {}
+    else:
+        roots = (root_mean(column**2) for column in sd.T)
+        yield "assume.survey", dict(zip(("east", "north", "height"), roots, strict=True))
+    if any(asked.survey_common_sd):
+        size = " / ".join(texts.length(each) for each in asked.survey_common_sd)
+        yield f"assume.common{'_cancels' if asked.survey_common_in_control else ''}", {"size": size}
+    yield f"assume.independent.{asked.independent or 'undeclared'}", {}
+
+
+def fixed_values(texts: Texts, result: Result) -> str:
+    """Return the names of fixed points, photos and parameters; empty without any."""
+    block = result.block
+    points = (block.point_sd == 0).any(axis=1)
+    photos = (block.photo_position_sd == 0).any(axis=1) | (block.photo_attitude_sd == 0).any(axis=1)
+    names = [texts("held.point", name=block.point_ids[row]) for row in np.flatnonzero(points)]
+    names += [texts("held.photo", name=block.photo_ids[row]) for row in np.flatnonzero(photos)]
+    for camera in result.cameras:
+        fixed = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if not sd > 0]
+        if fixed:
+            names.append(texts("held.camera", parameters=", ".join(fixed), name=camera.name))
+    return texts.listed(names, MAX_FIXED_VALUES) if names else ""

@@ -13,13 +13,13 @@ from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
 from photogram.results.network_sections import fit_of_images
-from photogram.results.statement.budget import Budget, budget_line
+from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import control_places, in_order
 from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import differences, overlap
 from photogram.results.statement.drawings import lengths as drawn_lengths
 from photogram.results.statement.figures import Figures
-from photogram.results.statement.grounds import fixed_values
+from photogram.results.statement.judgement import fixed_values
 from photogram.results.statement.tables import (
     Columns,
     annex,
@@ -51,7 +51,6 @@ def annexes(statement: Statement) -> list[Section]:
     held = fixed_values(texts, result) or texts("annex.c.nothing")
     budgets = [part for each in statement.taken_apart for part in _budget(texts, each)]
     left_out = left_out_points(texts, statement.left_out)
-    metrology = _metrology(statement)
     return [
         annex(texts, "a", checks),
         annex(texts, "b", [left_out], texts("annex.b.note")),
@@ -59,7 +58,7 @@ def annexes(statement: Statement) -> list[Section]:
         annex(texts, "d", [part for each in result.cameras for part in _camera(statement, each)]),
         annex(texts, "e", _adjustment(statement), texts.text(result.verdict.message)),
         annex(texts, "f", _survey(statement)),
-        *([annex(texts, "h", metrology)] if metrology else []),
+        annex(texts, "h", _metrology(statement)),
         annex(texts, "g", _files(statement)),
     ]
 
@@ -115,7 +114,7 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
             ),
         ],
     ]
-    titles = budget_line(texts, own), texts("table.single", quantity=own.subject)
+    titles = texts("budget.line", **budget_fields(texts, own)), texts("table.single", quantity=own.subject)
     return [Table("budget", title, quantities) for title, quantities in zip(titles, tables, strict=True)]
 
 
@@ -244,15 +243,13 @@ def _metrology(statement: Statement) -> list[Part]:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
         parts += [test_lengths(texts, lengths), drawing]
-    if measures:
-        quantities = [
-            columns.text("measure", [each["measure"] for each in measures]),
-            columns.number("id", [each["measure_id"] for each in measures]),
-            columns.text("value", [_measured(texts, each["value"]) for each in measures]),
-            columns.text(BLANK, [each["unit"] for each in measures]),
-        ]
-        parts.append(Table("iso", texts("table.iso"), quantities))
-    return parts
+    quantities = [
+        columns.text("measure", [each["measure"] for each in measures]),
+        columns.number("id", [each["measure_id"] for each in measures]),
+        columns.text("value", [_measured(texts, each["value"]) for each in measures]),
+        columns.text(BLANK, [each["unit"] for each in measures]),
+    ]
+    return [*parts, Table("iso", texts("table.iso"), quantities)]
 
 
 def _measured(texts: Texts, value: Any) -> str:
@@ -295,7 +292,6 @@ def statement_document(statement: Statement) -> Document:
     tone = judged.tone
     mark = texts(f"mark.{tone or 'good'}")
     assumed = Remarks([text for _, text in judged.assumptions], 40)
-    remarks = [Remarks(judged.remarks, 40)] if judged.remarks else []
     sketch = partial(differences, statement.compared, control_places(statement.result.block), texts)
     drawing = Drawing("map-differences", texts("page.map"), texts("page.map.caption"), sketch)
     return Document(
@@ -305,7 +301,7 @@ def statement_document(statement: Statement) -> Document:
         sections=[
             Section("figures", texts("page.figures"), [*_figures(statement), *_notes(statement)]),
             Section("assumptions", texts("page.assumptions"), [assumed, drawing]),
-            Section("remarks", texts("page.remarks"), remarks),
+            Section("remarks", texts("page.remarks"), [Remarks(judged.remarks, 40)]),
             Section("signature", "", [Text(texts("page.signature"))]),
             *annexes(statement),
         ],

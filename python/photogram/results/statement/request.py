@@ -26,6 +26,95 @@ _UNPAIRED = re.compile("[\ud800-\udfff]")
 _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
 
+def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> InputError:
+    """Return the error for an invalid value."""
+    return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
+
+
+def _positive(name: str, value: float) -> None:
+    if not 0 < value < math.inf:
+        raise invalid(name, "error.positive", value)
+
+
+def _text(name: str, value: object) -> str:
+    if not isinstance(value, str) or "\0" in value or (not value.isascii() and _UNPAIRED.search(value)):
+        raise invalid(name, "error.text", value)
+    return value
+
+
+def _several(name: str, value: Any) -> tuple[str, ...]:
+    return tuple(names(name, [value] if isinstance(value, str) else value))
+
+
+def _mapping(name: str, value: object) -> Mapping[Any, Any]:
+    if not isinstance(value, Mapping):
+        raise invalid(name, "error.table", value)
+    return value
+
+
+def _by_name(check: Callable[[str, Any], Any]) -> Callable[[str, Any], dict[str, Any]]:
+    """Return the check of a mapping from the check of its values."""
+    return lambda name, value: {
+        _text(name, key): check(f"{name} {key}", own) for key, own in _mapping(name, value).items()
+    }
+
+
+def _sequence(name: str, value: Any) -> Sequence[Any]:
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise invalid(name, "error.list", value)
+    return value
+
+
+def _quantities(name: str, value: Any) -> tuple[Any, ...]:
+    return (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
+
+
+def _three(name: str, value: Any) -> tuple[float, ...]:
+    """Return one number, or three, for east, north and up."""
+    values = tuple(np.atleast_1d(numbers(name, value)).ravel().tolist())
+    values = values * 3 if len(values) == 1 else values
+    if len(values) != 3 or not all(each >= 0 and math.isfinite(each * each) for each in values):
+        raise invalid(name, "request.deviations", value)
+    return values
+
+
+def _limit(name: str, value: Any) -> tuple[float, float, float]:
+    values = np.atleast_1d(numbers(name, value)).ravel().tolist()
+    if len(values) != 3 or not all(each >= 0 for each in values) or not math.isfinite(values[0] + values[1]):
+        raise invalid(name, "request.limit", value)
+    return values[0], values[1], values[2]
+
+
+def _lengths(name: str, value: Any) -> tuple[Mapping[str, Any], ...]:
+    return tuple(_length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value)))
+
+
+def _length(name: str, value: Any) -> dict[str, Any]:
+    row = _mapping(name, value)
+    for key in ("line", "from", "to", "length", "sd"):
+        if key not in row:
+            raise invalid(name, "error.missing", name=key)
+    line, first, last = names(name, [row[key] for key in ("line", "from", "to")])
+    figures = {key: number(f"{name} {key}", row[key]) for key in ("length", "sd")}
+    for key, value in figures.items():
+        if not 0 <= value < math.inf:
+            raise invalid(f"{name} {key}", "error.not-negative", value)
+    if row.get("temperature") is not None:
+        figures["temperature"] = number(f"{name} temperature", row["temperature"])
+    return {"line": line, "from": first, "to": last, **figures}
+
+
+def _components(name: str, value: object) -> object:
+    if not isinstance(value, VarianceComponents):
+        raise invalid(name, "error.kind", value, kind="VarianceComponents")
+    return value
+
+
+def _option(check: Callable[..., Any], **default: Any) -> Any:
+    """Return the field of an option with the check of its value; without default it is None."""
+    return field(metadata={"check": check}, **(default or {"default": None}))
+
+
 @dataclass(frozen=True)
 class Asked:
     """The options of a statement; lengths and areas in the block's linear unit.
@@ -71,23 +160,23 @@ class Asked:
         The entries at the top of the page.
     """
 
-    standards: tuple[str, ...] = ("asprs-2023", "plain")
-    classes: Mapping[str, float] = field(default_factory=dict)
-    area: float | None = None
-    sd: tuple[float, ...] | None = None
-    without: Mapping[str, str] = field(default_factory=dict)
+    standards: tuple[str, ...] = _option(_several, default=("asprs-2023", "plain"))
+    classes: Mapping[str, float] = _option(_by_name(number), default_factory=dict)
+    area: float | None = _option(number)
+    sd: tuple[float, ...] | None = _option(_three)
+    without: Mapping[str, str] = _option(_by_name(_text), default_factory=dict)
     independent: str | None = None
-    vegetated: frozenset[str] = frozenset()
-    survey_common_sd: tuple[float, ...] = (0.0, 0.0, 0.0)
-    survey_common_in_control: bool = False
+    vegetated: frozenset[str] = _option(lambda *named: frozenset(_several(*named)), default=frozenset())
+    survey_common_sd: tuple[float, ...] = _option(_three, default=(0.0, 0.0, 0.0))
+    survey_common_in_control: bool = _option(truth_value, default=False)
     language: str = "en"
-    text: Mapping[str, str] = field(default_factory=dict)
-    budgets: tuple[Any, ...] | None = None
-    coverage: float = 0.95
-    components: VarianceComponents | None = None
-    lengths: tuple[Mapping[str, Any], ...] = ()
-    limit: tuple[float, float, float] | None = None
-    expansion: float | None = None
+    text: Mapping[str, str] = _option(_by_name(_text), default_factory=dict)
+    budgets: tuple[Any, ...] | None = _option(_quantities)
+    coverage: float = _option(number, default=0.95)
+    components: VarianceComponents | None = _option(_components)
+    lengths: tuple[Mapping[str, Any], ...] = _option(_lengths, default=())
+    limit: tuple[float, float, float] | None = _option(_limit)
+    expansion: float | None = _option(number)
     title: str = ""
     project: str = ""
     client: str = ""
@@ -104,12 +193,13 @@ class Asked:
         InputError
             If an option is unknown, or a value is not allowed.
         """
-        known = [each.name for each in fields(cls)]
+        known = {each.name: each for each in fields(cls)}
         for name in options:
             if name not in known:
                 raise InputError(unknown_name("option of a statement", name, known))
         values = {name: value for name, value in options.items() if value is not None}
-        asked = cls(**{name: _CHECKS.get(name, _text)(name, value) for name, value in values.items()})
+        checks = {name: known[name].metadata.get("check", _text) for name in values}
+        asked = cls(**{name: checks[name](name, value) for name, value in values.items()})
         asked._check()
         return asked
 
@@ -133,105 +223,6 @@ class Asked:
         for point, reason in self.without.items():
             if not reason.strip():
                 raise InputError(phrase("request.reason", point=point))
-
-
-def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> InputError:
-    """Return the error for an invalid value."""
-    return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
-
-
-def _positive(name: str, value: float) -> None:
-    if not 0 < value < math.inf:
-        raise invalid(name, "error.positive", value)
-
-
-def _text(name: str, value: object) -> str:
-    if not isinstance(value, str) or "\0" in value or (not value.isascii() and _UNPAIRED.search(value)):
-        raise invalid(name, "error.text", value)
-    return value
-
-
-def _several(name: str, value: Any) -> tuple[str, ...]:
-    return tuple(names(name, [value] if isinstance(value, str) else value))
-
-
-def _mapping(name: str, value: object) -> Mapping[Any, Any]:
-    if not isinstance(value, Mapping):
-        raise invalid(name, "error.table", value)
-    return value
-
-
-def _by_name(check: Callable[[str, Any], Any]) -> Callable[[str, Any], dict[str, Any]]:
-    """Return the check of a mapping from the check of its values."""
-    return lambda name, value: {
-        _text(name, key): check(f"{name} {key}", own) for key, own in _mapping(name, value).items()
-    }
-
-
-def _sequence(name: str, value: Any) -> Sequence[Any]:
-    if isinstance(value, str) or not isinstance(value, Sequence):
-        raise invalid(name, "error.list", value)
-    return value
-
-
-def _three(name: str, value: Any) -> tuple[float, ...]:
-    """Return one number, or three, for east, north and up."""
-    values = tuple(np.atleast_1d(numbers(name, value)).ravel().tolist())
-    values = values * 3 if len(values) == 1 else values
-    if len(values) != 3 or not all(each >= 0 and math.isfinite(each * each) for each in values):
-        raise invalid(name, "request.deviations", value)
-    return values
-
-
-def _limit(name: str, value: Any) -> tuple[float, float, float]:
-    values = np.atleast_1d(numbers(name, value)).ravel().tolist()
-    if len(values) != 3 or not all(each >= 0 for each in values) or not math.isfinite(values[0] + values[1]):
-        raise invalid(name, "request.limit", value)
-    return values[0], values[1], values[2]
-
-
-def _length(name: str, value: Any) -> dict[str, Any]:
-    row = _mapping(name, value)
-    for key in ("line", "from", "to", "length", "sd"):
-        if key not in row:
-            raise invalid(name, "error.missing", name=key)
-    line, first, last = names(name, [row[key] for key in ("line", "from", "to")])
-    figures = {key: number(f"{name} {key}", row[key]) for key in ("length", "sd")}
-    for key, value in figures.items():
-        if not 0 <= value < math.inf:
-            raise invalid(f"{name} {key}", "error.not-negative", value)
-    if row.get("temperature") is not None:
-        figures["temperature"] = number(f"{name} temperature", row["temperature"])
-    return {"line": line, "from": first, "to": last, **figures}
-
-
-def _components(name: str, value: object) -> object:
-    if not isinstance(value, VarianceComponents):
-        raise invalid(name, "error.kind", value, kind="VarianceComponents")
-    return value
-
-
-_CHECKS: Mapping[str, Callable[[str, Any], Any]] = {
-    "standards": _several,
-    "classes": _by_name(number),
-    "area": number,
-    "sd": _three,
-    "without": _by_name(_text),
-    "vegetated": lambda name, value: frozenset(_several(name, value)),
-    "survey_common_sd": _three,
-    "survey_common_in_control": truth_value,
-    "text": _by_name(_text),
-    "budgets": lambda name, value: (
-        (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
-    ),
-    "coverage": number,
-    "components": _components,
-    "lengths": lambda name, value: tuple(
-        _length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value))
-    ),
-    "limit": _limit,
-    "expansion": number,
-}
 
 
 def lengths_in(unit: str) -> float:

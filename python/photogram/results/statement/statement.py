@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,10 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.results.result import Result
-from photogram.results.statement.budget import budgets
+from photogram.results.statement.budget import Budget, budgets
 from photogram.results.statement.comparison import (
     NOTHING,
+    Compared,
     Survey,
     System,
     compared,
@@ -25,11 +27,10 @@ from photogram.results.statement.comparison import (
     surveyed,
 )
 from photogram.results.statement.document import budget_member, figures_member, statement_members
-from photogram.results.statement.figures import figures
-from photogram.results.statement.grounds import Grounds, removed_observations
+from photogram.results.statement.figures import Figures, figures
 from photogram.results.statement.judgement import Judged, judged
-from photogram.results.statement.layout import layout
-from photogram.results.statement.leave_one_out import leave_one_out
+from photogram.results.statement.layout import Layout, layout
+from photogram.results.statement.leave_one_out import LeftOut, leave_one_out
 from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import (
@@ -48,27 +49,84 @@ from photogram.show.run import InputFile
 from photogram.words import Phrase, phrase
 
 
+@dataclass(frozen=True)
+class RemovedObservation:
+    """An observation that was not used in the adjustment."""
+
+    subject: Phrase | str  # Its name as a message, such as `image of point C04 on photo 301`
+    # `snooping`: data snooping removed it; `first values`: it does not fit the initial values; `earlier`: it
+    # was removed before
+    reason: str
+
+    @property
+    def name(self) -> str:
+        """Its name in English."""
+        return str(self.subject)
+
+
+def removed_observations(result: Result, earlier: Sequence[Phrase | str]) -> tuple[RemovedObservation, ...]:
+    """Return all removed observations, with those removed `earlier`."""
+    snooped = () if result.snooped is None else [each["subject"] for each in result.snooped.removed]
+    of_reason = {"snooping": snooped, "first values": result.set_aside, "earlier": earlier}
+    return tuple(RemovedObservation(name, reason) for reason, names in of_reason.items() for name in names)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Statement(Grounds, Brief):
+class Statement(Brief):
     """An accuracy statement for a client: figures, standards, methods, assumptions.
 
-    It includes its basis, :class:`photogram.results.statement.grounds.Grounds`. Lengths are in the linear
-    unit of the block, along east, north and up.
+    Lengths are in the linear unit of the block, along east, north and up.
 
     Attributes
     ----------
-    judged
-        Headline, sentences, assumptions, messages and exit code: one verdict for all outputs.
+    result, asked, texts
+        The adjusted block, the request, and its texts.
+    compared
+        Check points with their joint covariance.
+    of_all, of_rest, of_vegetated
+        Figures of all check points, without excluded ones, and of heights in vegetation; None without any.
+    left_out
+        Control points predicted by the others.
+    taken_apart
+        Budgets of uncertainty.
+    standards
+        Results by standards.
+    layout
+        The distribution of check points; None without any.
+    removed
+        Observations that were not used in the adjustment.
     survey
         Control and check points as given, in the displayed coordinate system.
     inputs, command
         Input files and command, if a command made the statement.
+    assumed
+        Assumptions in reading the files.
+    strict
+        Whether some messages also have the exit code 4.
     """
 
-    judged: Judged
+    result: Result
+    asked: Asked
+    texts: Texts
+    compared: Compared
+    of_all: Figures | None
+    of_rest: Figures | None
+    of_vegetated: Figures | None
+    left_out: tuple[LeftOut, ...]
+    taken_apart: tuple[Budget, ...]
+    standards: Standards
+    layout: Layout | None
+    removed: tuple[RemovedObservation, ...]
     survey: Survey = NOTHING
     inputs: tuple[InputFile, ...] = ()
     command: str = ""
+    assumed: Sequence[Phrase | str] = ()
+    strict: bool = False
+
+    @cached_property
+    def judged(self) -> Judged:
+        """Headline, sentences, assumptions, messages and exit code for all outputs."""
+        return judged(self)
 
     @property
     def exit(self) -> int:
@@ -262,7 +320,7 @@ def statement(
     # Given positions with both plan coordinates.
     checks = found.given_places[np.isfinite(found.given[:, :2]).all(axis=1)]
     control = control_places(result.block)
-    grounds = Grounds(
+    return Statement(
         result=result,
         asked=options,
         texts=texts,
@@ -284,13 +342,11 @@ def statement(
         ),
         layout=layout(checks, np.concatenate([checks, control]), control) if len(checks) else None,
         removed=removed_observations(result, removed),
-    )
-    return Statement(
-        **vars(grounds),
-        judged=judged(grounds, assumed=assumed, strict=strict),
         survey=surveyed(result, found, system),
         inputs=tuple(inputs),
         command=command,
+        assumed=assumed,
+        strict=strict,
     )
 
 

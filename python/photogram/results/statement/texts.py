@@ -63,9 +63,6 @@ class Texts(Words):
                 fields[name] = FORMS[name](self, value)
         return super().__call__(code, **fields)
 
-    def said(self, key: str, **values: Any) -> tuple[str, str]:
-        return key, self(key, **values)
-
     def _number(self, value: float, form: str) -> str:
         if form:
             return self.numeral(format(value, form))

@@ -82,8 +82,8 @@ def joined(places: Floats, end: str = "") -> str:
 
 def _each(places: Floats, sign: str) -> str:
     """Return the same symbol at each of (n, 2) points, without duplicates."""
-    found = dict.fromkeys((round(x, 1), round(y, 1)) for x, y in places.tolist())
-    return "".join(f"M{x} {y}{sign}" for x, y in found)
+    found = dict.fromkeys(map(tuple, places.round(1).tolist()))
+    return "".join([f"M{x} {y}{sign}" for x, y in found])
 
 
 def svg(mark: marks.Mark, placed: Placed) -> str:
