@@ -15,9 +15,8 @@ from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.groups import (
     SHARED,
     Group,
-    antenna_columns,
+    group_columns,
     grouped,
-    inertial_columns,
     named_groups,
     read_groups,
 )
@@ -206,8 +205,7 @@ def _group_tables(block: Block) -> _Columns:
                     found[kind.table]["group"] = names[start : start + len(own)]
             start += len(own)
         if groups:
-            columns = antenna_columns(groups) if name == "gnss_groups" else inertial_columns(groups, block)
-            found[name] = columns
+            found[name] = group_columns(name, groups, block)
     return found
 
 
