@@ -16,7 +16,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
@@ -139,7 +139,7 @@ def _check_of(hint: Any) -> Check:
     if origin in (Union, UnionType):
         return _check_of_union(kinds)
     if origin is Literal:
-        return lambda name, value: one_of(name, value, inner) or value
+        return partial(_one_of, inner)
     if origin is np.ndarray:
         return _numpy(get_args(inner[1])[0])
     if origin in (list, tuple, Sequence, Iterable):
@@ -149,6 +149,11 @@ def _check_of(hint: Any) -> Check:
     kind = origin or hint
     usable = inspect.isclass(kind) and kind not in (object, Any) and not getattr(kind, "_is_protocol", False)
     return _instance(kind) if usable else _anything
+
+
+def _one_of(words: tuple[str, ...], name: str, value: Any) -> Any:
+    one_of(name, value, words)
+    return value
 
 
 def _check_of_union(kinds: list[Any]) -> Check:
