@@ -14,13 +14,14 @@ from __future__ import annotations
 import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial, wraps
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
+import lazy_loader
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -255,3 +256,22 @@ _SIMPLE: dict[Any, Check] = {
     str: _text,
     Path: path,
 }
+
+
+def attach_checked(
+    package: str, file: str, given: Collection[str] = ()
+) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """Return `__getattr__`, `__dir__` and `__all__` of a lazily loaded package.
+
+    Functions check their arguments. Classes in `given`, which users instantiate, check them too.
+    """
+    load, listed, public = lazy_loader.attach_stub(package, file)
+
+    def load_checked(name: str) -> object:
+        loaded = load(name)
+        names = vars(sys.modules[package])
+        if name in given or (name.islower() and callable(loaded)):
+            check_arguments(names, [name])
+        return names[name]
+
+    return load_checked, listed, public

@@ -5,7 +5,7 @@ calibration = comparator.calibrate(session)
 calibration.correction.apply(xy_um)
 """
 
-from photogram.arguments.on_demand import attach_checked
+from photogram.arguments.annotations import attach_checked
 
 __getattr__, __dir__, __all__ = attach_checked(
     __name__, __file__, given={"Correction", "Frame", "Grid", "Options", "Polynomial"}

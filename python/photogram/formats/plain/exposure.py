@@ -11,8 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.images import from_tables, in_unit, to_tables
-from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, made
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.units import scaled

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import called, word_of
 from photogram.formats.plain.schema import AXES, OPK, SD_ROTATIONS, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
-from photogram.formats.plain.tables import Tables, angles_of, columns_of
+from photogram.formats.plain.tables import Tables, angles_of, called, columns_of, word_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.units import degrees_typed
 from photogram.lazy_dataclasses import dataclass

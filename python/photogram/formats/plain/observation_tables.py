@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, DIFFERENCE, TABLES, deviation_columns
 from photogram.formats.plain.subjects import Subjects, clocked, scalar_columns, scalars, subject_columns
 from photogram.formats.plain.tables import (
@@ -20,6 +19,7 @@ from photogram.formats.plain.tables import (
     covariances_of,
     different,
     indices_of,
+    made,
     places_written,
     vectors_of,
 )

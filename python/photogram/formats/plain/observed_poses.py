@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.groups import (
@@ -41,6 +40,7 @@ from photogram.formats.plain.tables import (
     correlations,
     covariances_of,
     indices_of,
+    made,
     places_written,
 )
 from photogram.formats.plain.trajectories import read_smoothness
