@@ -14,6 +14,7 @@ from photogram.formats.plain.subjects import Subjects, clocked, scalar_columns, 
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
+    Transform,
     columns_of,
     correlations,
     covariances_of,
@@ -23,7 +24,6 @@ from photogram.formats.plain.tables import (
     places_written,
     vectors_of,
 )
-from photogram.formats.plain.transform import Transform
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block

@@ -35,6 +35,7 @@ from photogram.formats.plain.subjects import Subjects, clocked, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
+    Transform,
     angles_of,
     columns_of,
     correlations,
@@ -44,7 +45,6 @@ from photogram.formats.plain.tables import (
     places_written,
 )
 from photogram.formats.plain.trajectories import read_smoothness
-from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
