@@ -29,7 +29,7 @@ from photogram.formats.plain.schema import TABLES
 from photogram.formats.supplements import self_calibrated
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
-from photogram.io.units import scaled
+from photogram.io.numbers import scaled
 from photogram.network import Attitude, Boresight, Control, Difference, Drift, Mount, Sensor, Shift
 from photogram.words import option_sd
 

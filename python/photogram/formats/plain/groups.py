@@ -14,7 +14,7 @@ from photogram.formats.plain.schema import AXES, OPK, SD_ROTATIONS, deviation_co
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, called, columns_of, word_of
 from photogram.io.column_table import ColumnTable
-from photogram.io.units import degrees_typed
+from photogram.io.numbers import degrees_typed
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Rate, Velocity

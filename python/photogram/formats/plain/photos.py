@@ -14,7 +14,7 @@ from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, SD_AXES, dev
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, Transform, indices_of, made
 from photogram.io.column_table import ColumnTable
-from photogram.io.units import scaled
+from photogram.io.numbers import scaled
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.observations import Attitude, Observation
 from photogram.words import phrase

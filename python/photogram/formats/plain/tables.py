@@ -28,8 +28,8 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Frame
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import read_columns, read_rows
+from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
 from photogram.io.places import Place, at_place
-from photogram.io.units import MATRIX_ROUNDING, degrees_typed
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, Representation

@@ -27,8 +27,8 @@ from photogram.formats.plain.trajectories_written import lost_smoothness, smooth
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.io.files import read_text
+from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
 from photogram.io.toml import quoted_text, toml_text, with_comments
-from photogram.io.units import MATRIX_ROUNDING, degrees_typed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
