@@ -27,7 +27,7 @@ import public_api
         ("from photogram.network import Film, Trajectory, project, with_gnss", "project"),
         ("import photogram", "photogram.formats.csm.read_support"),
         ("import photogram", "photogram.comparator.pictures.sketches"),
-        ("import photogram.io.writing.targets", "photogram.io.writing.targets.check_outputs"),
+        ("import photogram.io.writing", "photogram.io.writing.check_outputs"),
     ],
 )
 def test_every_way_to_import_works_in_a_new_process(statement, name):

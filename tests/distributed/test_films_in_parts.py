@@ -10,7 +10,7 @@ from test_datum_in_parts import in_both
 import photogram
 from photogram import Camera, _photocore, adjust, adjust_in_parts
 from photogram.distributed import Division
-from photogram.distributed.graph import photos_of_unknowns
+from photogram.distributed.cut import photos_of_unknowns
 from photogram.distributed.run import read_manifest, read_node
 from photogram.network import (
     Fiducial,

@@ -7,22 +7,10 @@ import os
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from photogram.io.writing import outputs, staging, targets
+from photogram.io import writing
 
-CALLS = (
-    "open",
-    "write",
-    "fsync",
-    "replace",
-    "mkdir",
-    "link",
-    "unlink",
-    "rmdir",
-    "close",
-    "listdir",
-    "scandir",
-)
-"""Everything that the writer asks of the system to change something, and what it looks for leftovers with."""
+CALLS = ("open", "write", "fsync", "replace", "mkdir", "link", "unlink", "rmdir")
+"""Calls of the system by which the writer changes something."""
 
 
 class Faulty:
@@ -53,9 +41,6 @@ class Faulty:
             if len(self.calls) == self.at:
                 self.failed = name
             if len(self.calls) == self.at or (self.lasting and name == self.failed):
-                if name == "close":
-                    # As of the system: the descriptor is closed, and yet there is an error.
-                    real(*arguments)
                 raise OSError(self.number, os.strerror(self.number))
             if name == "fsync":
                 # The disk has no part in what is asked here, and takes its time.
@@ -70,7 +55,5 @@ def faulty(monkeypatch, at, **options):
     """Let the writer run on a system of which a call fails."""
     system = Faulty(at, **options)
     with monkeypatch.context() as patch:
-        for module in (outputs, staging, targets):
-            if hasattr(module, "os"):
-                patch.setattr(module, "os", system)
+        patch.setattr(writing, "os", system)
         yield system

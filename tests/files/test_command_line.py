@@ -243,7 +243,7 @@ def test_there_is_one_writer():
         for path in SOURCES.rglob("*.py")
     }
     writers = {path for path, calls in found.items() if calls}
-    assert writers - IN_RUNS == {"io/writing/outputs.py", "io/writing/staging.py"}
+    assert writers - IN_RUNS == {"io/writing.py"}
     opens = {path for path in IN_RUNS if any(name != "mkdir" for name, _ in found[path])}
     assert opens == {"distributed/files.py", "distributed/executors.py"}
 

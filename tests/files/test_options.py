@@ -108,7 +108,7 @@ def test_nothing_is_told_of_results_that_could_not_be_written(run, tmp_path, mon
     def full(*_):
         raise OSError(28, "No space left on device", str(tmp_path / "locked" / "report.txt"))
 
-    monkeypatch.setattr("photogram.io.writing.outputs.OutputSet.write", full)
+    monkeypatch.setattr("photogram.io.writing.OutputSet.write", full)
     for command in (
         ["stellar-camera", "--example", "--out", "locked"],
         ["giant", "--example", "--out", "locked"],

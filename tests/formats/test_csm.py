@@ -11,8 +11,7 @@ from golden_data import SHARED, needs
 from message_codes import refused
 from photogram import Block, adjust
 from photogram.formats.csm import SupportedImage, read_support
-from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
-from photogram.formats.csm.isd import Positions
+from photogram.formats.csm.isd import Polynomials, Positions, fitted_angles, of_angles
 from photogram.formats.csm.photos import trajectory_of, with_polynomial_pointing
 from photogram.io.pvl import parsed
 from photogram.network import Table, Trajectory

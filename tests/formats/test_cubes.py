@@ -8,8 +8,8 @@ from support_data import START, written
 from message_codes import refused
 from photogram import InputError
 from photogram.formats.csm import SupportedImage, read_list, read_support
-from photogram.formats.csm.angles import Polynomials, of_angles
 from photogram.formats.csm.cubes import read_cube, read_label, read_positions, read_turns, serial_number
+from photogram.formats.csm.isd import Polynomials, of_angles
 from photogram.formats.csm.photos import trajectory_of
 
 SAMPLES, LINES = np.array([1.0, 150.0, 300.0]), np.array([400.0, 200.5, 1.0])

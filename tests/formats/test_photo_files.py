@@ -13,8 +13,8 @@ from message_codes import refused
 from photogram import Position, formats
 from photogram.formats import PhotoFiles, Wishes, read_metadata
 from photogram.formats.metadata.adding import located
+from photogram.formats.metadata.merged import Photos
 from photogram.formats.metadata.pictures import DOP_ALONE, RADIAL
-from photogram.formats.metadata.search import Photos
 from photogram.words import Phrase, option_sd
 
 MRK = "{}\t384233.385421\t[2264]\t -40,N\t 0,E\t 86,V\t{},Lat\t{},Lon\t{},Ellh\t0.021, 0.022, 0.043\t50,Q\n"

@@ -29,7 +29,7 @@ from photogram.formats.plain.schema import TABLES
 from photogram.formats.supplements import self_calibrated
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
-from photogram.io.units import scaled
+from photogram.io.numbers import scaled
 from photogram.network import Attitude, Boresight, Control, Difference, Drift, Mount, Sensor, Shift
 from photogram.words import option_sd
 
@@ -613,3 +613,15 @@ def test_the_page_describes_every_table_and_its_columns():
     for name, table in TABLES.items():
         for column in {*table.required, *table.texts} - {"strip", "frame"}:
             assert f"`{column}`" in sections[name], (name, column)
+
+
+def test_a_written_project_keeps_the_comments_of_its_settings(example, tmp_path):
+    pytest.importorskip("tomlkit")
+    project = formats.read(example)
+    again = formats.read(written(project, tmp_path / "again"))
+    text = (tmp_path / "again" / "project.toml").read_text()
+    head = (example / "project.toml").read_text().partition("[project]")[0]
+    assert head.startswith("#")
+    assert text.startswith(head)
+    assert re.search(r"format = 1 +# version of the schema", text)
+    assert again.frame == project.frame

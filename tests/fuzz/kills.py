@@ -20,7 +20,6 @@ from pathlib import Path
 
 TRIALS = 200
 SEED = 12
-MARK = "photogram-incomplete-*.txt"
 RESULTS = ("out/FRAMES", "out/GROUND", "out/RESTART", "out/report.txt", "result.json")
 COMMAND = ("-m", "photogram.cli", "giant", "block", "--out", "out", "--json", "result.json", "--quiet")
 WRITER = """\
@@ -61,7 +60,7 @@ class Trials:
         self.duration = time.monotonic() - start
 
     def killed(self) -> None:
-        """Kill the command at a random moment of its life; see that results are of one run, or marked."""
+        """Kill the command at a random moment of its life; see that each result is complete."""
         self._put_old()
         process = self._start(*self.command)
         time.sleep(self.random.uniform(0, self.duration))
@@ -89,7 +88,6 @@ class Trials:
     def writer_killed(self) -> None:
         """Kill a program that does nothing but write, where more moments are those of writing."""
         names = ("one/a", "one/b", "two/c", "d")
-        self._unmark()
         process = subprocess.Popen(
             [sys.executable, "-c", WRITER, *names], cwd=self.place, stdout=subprocess.PIPE, env=ENV
         )
@@ -104,20 +102,16 @@ class Trials:
             version = content[: len(content) // 2000]
             assert content == version * 2000, content[:20]
         same = len(set(found.values())) <= 1 and len(found) in (0, len(names))
-        marks = list(self.place.rglob(MARK))
-        if not same:
-            directories = {(self.place / name).parent for name in names}
-            assert {mark.parent for mark in marks} == directories, (found, marks)
-        state = "of one run" if same else "of two runs, marked"
-        state += " though marked" if same and marks else ""
+        state = "of one run" if same else "of two runs"
         self.counts[f"{state}; {'with' if leftovers(self.place) else 'no'} temporary files"] += 1
 
     def put_in_order(self) -> None:
-        """See that the next run removes whatever dead ones have left."""
+        """Remove temporary files of killed runs, and write all files again."""
+        for path in leftovers(self.place):
+            path.unlink()
         self._run(*self.command)
         self._run("-c", WRITER.replace("count(1)", "[0]"), "one/a", "one/b", "two/c", "d")
         assert not leftovers(self.place), leftovers(self.place)
-        assert not list(self.place.rglob(MARK))
 
     def _run(self, *command: str) -> None:
         done = subprocess.run(
@@ -140,22 +134,15 @@ class Trials:
         (self.place / "out").mkdir(exist_ok=True)
         for name in RESULTS:
             (self.place / name).write_bytes(b"old")
-        self._unmark()
-
-    def _unmark(self) -> None:
-        for mark in self.place.rglob(MARK):
-            mark.unlink()
 
     def _state(self) -> str:
-        """Look at the results: each is whole, and they are of one run or marked."""
+        """Return which results are old; each is complete."""
         old = [name for name in RESULTS if (self.place / name).read_bytes() == b"old"]
         for name in set(RESULTS) - set(old):
             assert (self.place / name).read_bytes().endswith((b"\n", b"}")), name
-        marks = {mark.parent for mark in self.place.rglob(MARK)}
         if old and len(old) < len(RESULTS):
-            assert marks == {self.place, self.place / "out"}, (old, marks)
-            return "of two runs, marked"
-        return ("all old" if old else "all new") + (" though marked" if marks else "")
+            return "of two runs"
+        return "all old" if old else "all new"
 
 
 def heed_signals() -> None:
@@ -165,8 +152,8 @@ def heed_signals() -> None:
 
 
 def leftovers(place: Path) -> list[Path]:
-    """Return the directories of temporary files."""
-    return [path for path in place.rglob(".photogram-*") if path.is_dir()]
+    """Return the temporary files."""
+    return list(place.rglob(".photogram-*"))
 
 
 def wait_until_caught(process: subprocess.Popen[str], number: int) -> None:

@@ -122,7 +122,7 @@ def test_a_file_of_opencv(tmp_path):
         ),
         ("       0. ]", "       0., 0.1, 0.2 ]", coded("stars.more-terms")),
         ("flags: 0", "distortion_model: fov", coded("error.choice", names=["plumb_bob", "equidistant"])),
-        ("flags: 0", "flags", coded("yaml.key")),
+        ("flags: 0", "flags", coded("error.parse")),
         ("flags: 0", "image_width: 3", coded("error.repeated", kind="key", name="image_width")),
         ("-2.8e-01", "nan", coded("error.at", what="/distortion_coefficients/data/0")),
     ],

@@ -14,16 +14,18 @@ from __future__ import annotations
 import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache, wraps
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
+from functools import cache, partial, wraps
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
+import lazy_loader
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import is_masked, number, one_of, shown, truth_value, whole_number
+from photogram.arguments.arrays import is_masked, number, one_of, refused, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.words import phrase
@@ -56,7 +58,7 @@ def check_members(kind: type, given: Mapping[str, Any]) -> None:
     for name, value in given.items():
         made = checks.get(name, _anything)(name, value)
         if isinstance(made, np.ndarray) and not isinstance(value, np.ndarray):
-            raise _refused(name, value, "an array of numbers")
+            raise refused(name, value, "an array of numbers")
 
 
 @cache
@@ -70,13 +72,13 @@ def path(name: str, value: object) -> Path:
     try:
         text = os.fspath(value)  # type: ignore[call-overload]
     except TypeError:
-        raise _refused(name, value, "a path") from None
+        raise refused(name, value, "a path") from None
     if not isinstance(text, str) or not text or "\0" in text:
-        raise _refused(name, value, "a path without NUL characters" if text else "a path")
+        raise refused(name, value, "a path without NUL characters" if text else "a path")
     try:
         os.fsencode(text)
     except UnicodeEncodeError:
-        raise _refused(name, value, "a path") from None
+        raise refused(name, value, "a path") from None
     return value if isinstance(value, Path) else Path(text)
 
 
@@ -114,104 +116,86 @@ class _Names(dict[str, Any]):
 
 
 def _checks(function: Callable[..., Any], names: dict[str, Any]) -> dict[str, Check]:
-    """Return a check for each parameter with a supported annotation."""
+    """Return a check for each parameter; annotations without a known type accept anything."""
     checks: dict[str, Check] = {"": _anything}
     known = _Names(names)
     for name, annotation in inspect.get_annotations(function).items():
         if name == "return":
             continue
-        try:
-            hint = eval(annotation, {}, known) if isinstance(annotation, str) else annotation
-        except NameError:
-            continue
-        if check := _check_of(hint):
-            checks[name] = check
+        with suppress(NameError):
+            checks[name] = _check_of(
+                eval(annotation, {}, known) if isinstance(annotation, str) else annotation
+            )
     return checks
 
 
-def _check_of(hint: Any) -> Check | None:
+def _check_of(hint: Any) -> Check:
+    origin, inner = get_origin(hint), get_args(hint)
+    kinds = [kind for kind in inner if kind is not type(None)]
     if hint is ArrayLike:
         return _array
-    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType) and len(kinds) < len(inner):
+        needed = _check_of_union(kinds)
+        return lambda name, value: None if value is None else needed(name, value)
     if origin in (Union, UnionType):
-        return _check_of_union(inner)
+        return _check_of_union(kinds)
     if origin is Literal:
-        return _one_of(inner)
+        return partial(_one_of, inner)
     if origin is np.ndarray:
         return _numpy(get_args(inner[1])[0])
     if origin in (list, tuple, Sequence, Iterable):
-        return _several(hint)
-    if inspect.isclass(origin):
-        return _instance(origin)
-    simple: dict[Any, Check] = {
-        int: whole_number,
-        float: number,
-        bool: truth_value,
-        str: _text,
-        Path: path,
-    }
-    if hint in simple:
-        return simple[hint]
-    usable = inspect.isclass(hint) and hint not in (object, Any) and not getattr(hint, "_is_protocol", False)
-    return _instance(hint) if usable else None
+        return _sequence(origin, inner)
+    if hint in _SIMPLE:
+        return _SIMPLE[hint]
+    kind = origin or hint
+    usable = inspect.isclass(kind) and kind not in (object, Any) and not getattr(kind, "_is_protocol", False)
+    return _instance(kind) if usable else _anything
 
 
-def _check_of_union(inner: tuple[Any, ...]) -> Check | None:
-    kinds = [kind for kind in inner if kind is not type(None)]
+def _one_of(words: tuple[str, ...], name: str, value: Any) -> Any:
+    one_of(name, value, words)
+    return value
+
+
+def _check_of_union(kinds: list[Any]) -> Check:
+    """Return a check of alternatives; None is no alternative."""
     arrays = set(get_args(ArrayLike))
-    if arrays <= set(inner):
-        check: Check | None = _array_or(*(kind for kind in kinds if kind not in arrays))
-    elif all(kind in (str, Path) or get_origin(kind) is os.PathLike for kind in kinds) and kinds != [str]:
-        check = path
-    elif len(kinds) == 1:
-        check = _check_of(kinds[0])
-    elif all(inspect.isclass(kind) for kind in kinds):
-        check = _instance(*kinds)
-    else:
-        check = None
-    if check is None or len(kinds) == len(inner):
-        return check
-    needed = check
-    return lambda name, value: None if value is None else needed(name, value)
+    if arrays <= set(kinds):
+        classes = tuple(kind for kind in kinds if kind not in arrays)
+        return lambda name, value: value if isinstance(value, classes) else _array(name, value)
+    if kinds != [str] and all(kind in (str, Path) or get_origin(kind) is os.PathLike for kind in kinds):
+        return path
+    if len(kinds) == 1:
+        return _check_of(kinds[0])
+    return _instance(*kinds) if all(map(inspect.isclass, kinds)) else _anything
 
 
-def _several(hint: Any) -> Check | None:
+def _sequence(origin: Any, inner: tuple[Any, ...]) -> Check:
     """Return a check of each element of a sequence, and of its defined length."""
-    origin, inner = get_origin(hint), get_args(hint)
-    fixed = origin is tuple and (len(inner) < 2 or inner[1] is not Ellipsis)
-    checks = [
-        _name if kind is object else _check_of(kind) or _anything for kind in inner if kind is not Ellipsis
-    ]
+    is_fixed = origin is tuple and Ellipsis not in inner
+    checks = [_name if kind is object else _check_of(kind) for kind in inner if kind is not Ellipsis]
+    made = tuple if origin is tuple else list
 
-    of_numbers = {*checks} == {number}
-
-    def several(name: str, value: Any) -> Any:
+    def sequence(name: str, value: Any) -> Any:
         if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-            raise _refused(name, value, "a sequence")
-        if isinstance(value, np.ndarray):
-            value = value.tolist() if value.ndim else [value.item()]
-        elements = list(value)
-        if fixed and len(elements) != len(checks):
-            raise _refused(name, value, f"a sequence of {len(checks)}")
-        if of_numbers and {*map(type, elements)} == {float}:  # Nearly all sequences: no conversion is needed
-            return tuple(elements) if origin is tuple else elements
-        all_checks = checks if fixed else checks * len(elements)
-        found = [
-            check(f"{name}[{k}]", each)
-            for k, (check, each) in enumerate(zip(all_checks, elements, strict=True))
-        ]
-        return tuple(found) if origin is tuple else found
+            raise refused(name, value, "a sequence")
+        elements = np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else list(value)
+        if is_fixed and len(elements) != len(checks):
+            raise refused(name, value, f"a sequence of {len(checks)}")
+        if {*checks} == {number} and {*map(type, elements)} == {float}:  # No conversion is needed
+            return made(elements)
+        rows = zip(checks if is_fixed else checks * len(elements), elements, strict=True)
+        return made(check(f"{name}[{row}]", each) for row, (check, each) in enumerate(rows))
 
-    return several
+    return sequence
 
 
 def _name(name: str, value: Any) -> Any:
     """Reject values that are neither text nor number, and invalid text."""
     if isinstance(value, str):
         return _text(name, value)
-    if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        return whole_number(name, value)
-    return number(name, value)
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    return (whole_number if is_whole else number)(name, value)
 
 
 def _anything(name: str, value: Any) -> Any:
@@ -219,78 +203,75 @@ def _anything(name: str, value: Any) -> Any:
 
 
 def _instance(*kinds: type) -> Check:
-    what = " or ".join(kind.__name__ for kind in kinds)
-
     def instance(name: str, value: Any) -> Any:
         if not isinstance(value, kinds):
-            raise _refused(name, value, f"a {what}")
+            raise refused(name, value, "a " + " or ".join(kind.__name__ for kind in kinds))
         return value
 
     return instance
 
 
-def _one_of(choices: tuple[Any, ...]) -> Check:
-    def one_of_them(name: str, value: Any) -> Any:
-        one_of(name, value, choices)
-        return value
-
-    return one_of_them
-
-
 def _text(name: str, value: Any) -> str:
-    if isinstance(value, str):
-        try:
+    with suppress(UnicodeEncodeError):
+        if isinstance(value, str):
             value.encode()
-        except UnicodeEncodeError:
-            pass
-        else:
             return value
-    raise _refused(name, value, "a text")
+    raise refused(name, value, "a text")
 
 
-def _array(name: str, value: Any) -> Any:
+def _array(name: str, value: Any, kinds: str = "biuf", what: str = "numbers") -> Any:
     """Reject other values than real numbers, and arrays with masked elements."""
-    if value is None:
-        raise _refused(name, value, "an array of numbers")
-    try:
+    numbers, array = value, np.array("")
+    with suppress(TypeError, ValueError, OverflowError, RecursionError):
         array = np.asarray(value)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        raise _refused(name, value, "an array of numbers") from None
-    if array.dtype.kind == "O":
-        try:
-            value = array = array.astype(float)
-        except (TypeError, ValueError, OverflowError):
-            raise _refused(name, value, "an array of numbers") from None
-    if array.dtype.kind not in "biuf":
-        raise _refused(name, value, "an array of numbers")
+        if array.dtype.kind == "O" and value is not None:
+            numbers = array = array.astype(float)
+    kind = array.dtype.kind
+    if kind not in "biuf" or (array.size and kind not in kinds):
+        raise refused(name, value, f"an array of {what}")
     if is_masked(value):
         raise InputError(phrase("argument.masked", name=name))
-    return value
-
-
-def _array_or(*kinds: type) -> Check:
-    """Return a check of an array or an instance of the given classes."""
-    return lambda name, value: value if isinstance(value, kinds) else _array(name, value)
+    return numbers
 
 
 def _numpy(kind: type[np.generic]) -> Check:
     """Return a check that converts to an array of floats, integers or truth values."""
-    needed, what = {
-        "f": ("biuf", "numbers"),
-        "i": ("iu", "whole numbers"),
-        "b": ("b", "truth values"),
-    }[np.dtype(kind).kind]
+    kinds, what = {"f": ("biuf", "numbers"), "i": ("iu", "whole numbers"), "b": ("b", "truth values")}[
+        np.dtype(kind).kind
+    ]
 
     def converted(name: str, value: Any) -> Any:
-        array = np.asarray(_array(name, value))
-        if array.size and array.dtype.kind not in needed:
-            raise _refused(name, value, f"an array of {what}")
+        array = np.asarray(_array(name, value, kinds, what))
         if kind is np.int64 and array.dtype.kind == "u" and array.size and array.max() >= 2**63:
-            raise _refused(name, value, "an array of whole numbers of 64 bits")
+            raise refused(name, value, "an array of whole numbers of 64 bits")
         return array.astype(kind, copy=False)
 
     return converted
 
 
-def _refused(name: str, value: object, what: str) -> InputError:
-    return InputError(phrase("argument.other", name=name, what=what, value=shown(value)))
+_SIMPLE: dict[Any, Check] = {
+    int: whole_number,
+    float: number,
+    bool: truth_value,
+    str: _text,
+    Path: path,
+}
+
+
+def attach_checked(
+    package: str, file: str, given: Collection[str] = ()
+) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """Return `__getattr__`, `__dir__` and `__all__` of a lazily loaded package.
+
+    Functions check their arguments. Classes in `given`, which users instantiate, check them too.
+    """
+    load, listed, public = lazy_loader.attach_stub(package, file)
+
+    def load_checked(name: str) -> object:
+        loaded = load(name)
+        names = vars(sys.modules[package])
+        if name in given or (name.islower() and callable(loaded)):
+            check_arguments(names, [name])
+        return names[name]
+
+    return load_checked, listed, public

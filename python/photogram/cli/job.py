@@ -21,8 +21,8 @@ import typer
 from typer.models import ArgumentInfo, OptionInfo
 
 from photogram.cli.command_classes import declared, misuse
-from photogram.cli.console import errors, failures, print_remark, print_report, print_written
-from photogram.messages import Message, printable
+from photogram.cli.console import errors, failures, print_report, print_written
+from photogram.messages import Message
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -62,9 +62,8 @@ OutputFolder = Annotated[Path | None, Writes.DIRECTORY]
 class Job:
     """Inputs and outputs of a run of a command; a context manager.
 
-    On entry it rejects outputs that would damage an input or another output, and prints remarks on inputs of
-    an interrupted run. Methods :meth:`reads` and :meth:`writes` add inputs and outputs later. Errors become
-    messages and exit codes.
+    On entry it rejects outputs that would damage an input or another output. Methods :meth:`reads` and
+    :meth:`writes` add inputs and outputs later. Errors become messages and exit codes.
     """
 
     def __init__(
@@ -91,7 +90,6 @@ class Job:
         self._failures.__enter__()
         try:
             self._check()
-            self._remark()
         except Exception as error:
             # The context is not entered when this raises: its exit would never see the error.
             self._failures.__exit__(type(error), error, error.__traceback__)
@@ -234,13 +232,6 @@ class Job:
         check_outputs(self._outputs, [*inputs, *self._spared], self._directories)
         for path in self._outputs:
             self._check_projects(path)
-
-    def _remark(self) -> None:
-        """Print a remark if an interrupted run may have left a set of inputs incomplete."""
-        from photogram.io.writing.staging import doubtful
-
-        for path, mark in doubtful(self._inputs()).items():
-            print_remark(printable(str(phrase("command.interrupted", file=path, mark=mark))))
 
     def _check_projects(self, path: Path) -> None:
         """Reject an output that would be a second file of one name in an input project."""

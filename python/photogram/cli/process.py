@@ -35,7 +35,7 @@ def ignore_signals() -> None:
 
 def _end(number: int, _frame: FrameType | None) -> None:
     # If the writer is not loaded yet, no output has been started.
-    abandon_all = getattr(sys.modules.get("photogram.io.writing.outputs"), "abandon_all", None)
+    abandon_all = getattr(sys.modules.get("photogram.io.writing"), "abandon_all", None)
     if abandon_all is not None:
         abandon_all()
     try:

@@ -4,7 +4,7 @@
 `correction.apply(xy_um)` corrects measurements.
 """
 
-from photogram.arguments.on_demand import attach_checked
+from photogram.arguments.annotations import attach_checked
 
 __getattr__, __dir__, __all__ = attach_checked(
     __name__, __file__, given={"Correction", "Frame", "Grid", "Options", "Polynomial"}

@@ -27,13 +27,12 @@ from photogram.adjustment.first_features import started
 from photogram.adjustment.remarks import check_cameras
 from photogram.adjustment.robust import Loss
 from photogram.arguments.annotations import check_arguments
-from photogram.distributed.cut import UNKNOWNS, Counts, counted_work
+from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
 from photogram.distributed.datum import Mover
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Driver, Outcome
 from photogram.distributed.executors import Executor, Serial, Workers, check_workers, connected
 from photogram.distributed.files import alone
-from photogram.distributed.graph import alone_of, incidence_of, vertices_of
 from photogram.distributed.merging import merged
 from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.parts import IN_TABLES

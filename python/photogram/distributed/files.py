@@ -6,10 +6,10 @@ import os
 import platform
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import orjson
@@ -17,10 +17,23 @@ import orjson
 from photogram.errors import AdjustmentError, InputError
 from photogram.io.files import reading
 from photogram.io.seals import SEAL, check_sealed, seal
-from photogram.io.writing.staging import try_lock
+from photogram.io.writing import Content, write_whole
 from photogram.words import phrase
 
 LOCK = "lock"
+
+
+def _try_lock(descriptor: int) -> bool | None:
+    """Lock a file; False if it is locked, None without support of locks."""
+    try:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except (ImportError, OSError):
+        return None
+    return True
 
 
 @contextmanager
@@ -35,7 +48,7 @@ def alone(folder: Path) -> Iterator[None]:
     with ExitStack() as stack:
         with reading(path):
             file = stack.enter_context(path.open("a+b", buffering=0))
-        if try_lock(file.fileno()) is False:
+        if _try_lock(file.fileno()) is False:
             file.seek(0)
             by = file.readline().decode("utf-8", "replace").strip()
             raise InputError(phrase("parts.busy", process=by), file=folder)
@@ -46,23 +59,14 @@ def alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def write_file(path: Path, content: Callable[[BinaryIO], Any]) -> None:
+def write_file(path: Path, content: Content) -> None:
     """Write a file atomically; AdjustmentError if the disk is full or not writable.
 
     Two workers may write the same file if a task was repeated. The bytes are equal and temporary names
     differ.
     """
-    under = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        try:
-            with open(under, "wb") as file:
-                content(file)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(under, path)
-        except BaseException:
-            under.unlink(missing_ok=True)
-            raise
+        write_whole({path: content})
     except OSError as error:
         raise AdjustmentError(
             phrase("parts.not-written", file=path, error=error.strerror or str(error))
@@ -73,7 +77,7 @@ def write_json(path: Path, document: Mapping[str, Any]) -> str:
     """Write a JSON file with a seal and return the seal; errors as in :func:`write_file`."""
     own = seal(document)
     sealed = {**document, SEAL: own}
-    write_file(path, lambda file: file.write(orjson.dumps(sealed, option=orjson.OPT_INDENT_2)))
+    write_file(path, orjson.dumps(sealed, option=orjson.OPT_INDENT_2))
     return own
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import messages_of
 from photogram.arguments.types import Floats, Indices
+from photogram.distributed.cut import shared_cameras
 from photogram.distributed.driver import Outcome
-from photogram.distributed.graph import shared_cameras
 from photogram.distributed.nodes import read_outcome
 from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError

@@ -127,11 +127,7 @@ class CoreEngine:
 
 def _write(folder: Path, result: Result) -> None:
     for name, content in block_files(result).items():
-        if isinstance(content, bytes):
-            plain = content
-            write_file(folder / name, lambda file, plain=plain: file.write(plain))  # type: ignore[misc]
-        else:
-            write_file(folder / name, content)
+        write_file(folder / name, content)
 
 
 def read_outcome(folder: Path) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.distributed.cut import Homes, alone_of, photos_of, vertices_of
 from photogram.distributed.files import read_json, write_file, write_json
-from photogram.distributed.graph import Homes, alone_of, photos_of, vertices_of
 from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
 from photogram.io.seals import Seals, check_seal, seal

@@ -12,16 +12,19 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Floats, Indices
-from photogram.distributed.cut import Tree, cut, homes, tree_of
-from photogram.distributed.files import read_json, write_json
-from photogram.distributed.graph import (
+from photogram.distributed.cut import (
     Homes,
+    Tree,
     alone_of,
+    cut,
+    homes,
     incidence_of,
     photos_of_unknowns,
     shared_cameras,
+    tree_of,
     vertices_of,
 )
+from photogram.distributed.files import read_json, write_json
 from photogram.distributed.parts import Names, Part, names_above, part_of, read_part, write_part
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import asdict, dataclass, field, replace

@@ -18,8 +18,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.format import Format, Wishes
-from photogram.formats.losses import losses
-from photogram.formats.models import complete_positions
+from photogram.formats.models import complete_positions, losses
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size, assembled
 from photogram.io.files import read_lines

@@ -26,8 +26,7 @@ from photogram.formats.column_words import (
 )
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import NAMELESS
-from photogram.io.numbers import finite_number
-from photogram.io.units import scaled
+from photogram.io.numbers import finite_number, scaled
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.words import Phrase, phrase, quoted

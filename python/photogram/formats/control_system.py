@@ -17,7 +17,7 @@ from photogram.errors import InputError
 from photogram.formats.columns import heading_of
 from photogram.formats.models import intersected
 from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.transform import Transform
+from photogram.formats.plain.tables import Transform
 from photogram.formats.project import Project
 from photogram.io.column_table import ColumnTable
 from photogram.messages import Message

@@ -13,8 +13,8 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
+from photogram.io.numbers import scaled
 from photogram.io.places import Failing
-from photogram.io.units import scaled
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.words import phrase

@@ -14,8 +14,7 @@ from photogram.errors import InputError, message_of
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.losses import losses
-from photogram.formats.models import complete_positions
+from photogram.formats.models import complete_positions, losses
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.io.files import read_lines

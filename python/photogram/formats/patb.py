@@ -34,7 +34,7 @@ from photogram.formats.reduced_coordinates import (
     with_fitting_rotations,
 )
 from photogram.io.csv_text import csv_text
-from photogram.io.units import scaled
+from photogram.io.numbers import scaled
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, phrase

@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, in_units
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import by_camera, from_corner, to_corner
-from photogram.formats.losses import losses
+from photogram.formats.models import losses
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings

@@ -23,7 +23,7 @@ from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed
-from photogram.network.observations import Observation
+from photogram.network.observations import Control, Observation
 from photogram.network.passages import Passage
 from photogram.network.rigs import Mount
 from photogram.results.features import Definition
@@ -307,3 +307,38 @@ def _names_at(place: Place, **names: Sequence[str]) -> Iterator[None]:
                 twice = next(name for name, count in Counter(own).items() if count > 1)
                 raise place.error(phrase("error.repeated", kind=kind, name=twice)) from None
         raise
+
+
+class PointTable:
+    """A table of points to which a reader adds positions, control and check points."""
+
+    def __init__(self, names: list[str]) -> None:
+        self.names = names
+        self.starts, self.positions, self.check_sd = np.full((3, len(names), 3), np.nan)
+        self.sd = np.full((len(names), 3), np.inf)
+        self.observations: list[Observation] = []
+
+    def control(self, row: int, xyz: Floats, covariance: Floats) -> None:
+        """Add control; with correlations it becomes an observation of the point."""
+        self.starts[row] = xyz
+        variances = np.diag(covariance)
+        if (covariance == np.diag(variances)).all():
+            self.positions[row], self.sd[row] = xyz, np.where(np.isnan(xyz), np.inf, np.sqrt(variances))
+        else:
+            symmetric = (covariance + covariance.T) / 2
+            self.observations.append(Control(self.names[row], xyz, covariance=symmetric))
+
+    def check(self, row: int, xyz: Floats, variances: Floats) -> None:
+        """Add a check point; variances that are not positive are unknown."""
+        self.starts[row] = self.positions[row] = xyz
+        self.check_sd[row] = np.sqrt(np.where(variances > 0, variances, np.nan))
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of `assembled` for points."""
+        return {
+            "point_ids": self.names,
+            "starts": self.starts,
+            "point_positions": self.positions,
+            "point_sd": self.sd,
+            "point_check_sd": self.check_sd,
+        }

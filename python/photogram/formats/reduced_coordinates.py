@@ -11,11 +11,9 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.format import Wishes
-from photogram.formats.losses import losses
-from photogram.formats.models import complete_positions
+from photogram.formats.models import complete_positions, losses
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
-from photogram.formats.point_table import PointTable
-from photogram.formats.project import Project, assembled
+from photogram.formats.project import PointTable, Project, assembled
 from photogram.formats.self_check import agreement
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field

@@ -17,7 +17,7 @@ from photogram.formats.format_coordinates import (
     nominal_pixels,
     topocentric_remarks,
 )
-from photogram.formats.losses import losses
+from photogram.formats.models import losses
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project

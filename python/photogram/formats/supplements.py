@@ -19,8 +19,7 @@ from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import WITH_SD, Settings
 from photogram.formats.plain.statement_tables import with_cover
-from photogram.formats.plain.tables import Tables, indices_of
-from photogram.formats.plain.transform import Transform
+from photogram.formats.plain.tables import Tables, Transform, indices_of
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
 from photogram.io.column_table import ColumnTable

@@ -1,6 +1,6 @@
 """Files of GIANT (Elassal and Malhotra, NOAA 1987)."""
 
-from photogram.arguments.on_demand import attach_checked
+from photogram.arguments.annotations import attach_checked
 
 __getattr__, __dir__, __all__ = attach_checked(
     __name__, __file__, given={"Camera", "Common", "Frame", "GroundPoint", "Limits"}

@@ -126,6 +126,26 @@ def toml_text(tables: Mapping[str, Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def with_comments(text: str, former: str) -> str:
+    """Return TOML text with the comments and the order of a former text (extra `toml`)."""
+    if "#" not in former:
+        return text
+    try:
+        import tomlkit
+    except ImportError:
+        return text
+    new, document = tomlkit.parse(text), tomlkit.parse(former)
+    for name in [name for name in document if name not in new]:
+        document.remove(name)
+    for name, table in new.items():
+        old: Any = document.setdefault(name, table)
+        for key in [key for key in old if key not in table]:
+            old.remove(key)
+        old.update({key: value for key, value in table.items() if old.get(key) != value})
+    found = tomlkit.dumps(document)
+    return found if tomllib.loads(found) == tomllib.loads(text) else text
+
+
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()

@@ -1,6 +1,6 @@
 """Stellar camera calibration with plates (NOAA Technical Report NOS 55, 1972) or digital exposures."""
 
-from photogram.arguments.on_demand import attach_checked
+from photogram.arguments.annotations import attach_checked
 
 __getattr__, __dir__, __all__ = attach_checked(
     __name__,

@@ -12,7 +12,7 @@ from photogram import adjust
 from photogram.comparator import Place
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
-from photogram.formats.csm.angles import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
+from photogram.formats.csm.isd import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
 from photogram.formats.isis import FORMAT, binary_network, read_network
 from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.formats.isis.points import full_matrices

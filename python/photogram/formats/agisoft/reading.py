@@ -14,8 +14,7 @@ from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
 from photogram.formats.images import Y_DOWN, checked_rotation
 from photogram.formats.plain.tables import covariances_of
-from photogram.formats.point_table import PointTable
-from photogram.formats.project import Frame, Project, Size, assembled
+from photogram.formats.project import Frame, PointTable, Project, Size, assembled
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass

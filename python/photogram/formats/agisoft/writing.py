@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.agisoft import FILE
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.images import Y_DOWN, known_size, lens_of, to_corner
-from photogram.formats.losses import losses
+from photogram.formats.models import losses
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size

@@ -13,7 +13,7 @@ from photogram.formats.block_contents import correlated_control
 from photogram.formats.blocks_exchange import FILE
 from photogram.formats.blocks_exchange.reading import CENTER
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.losses import losses
+from photogram.formats.models import losses
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera

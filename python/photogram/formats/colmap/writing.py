@@ -13,8 +13,7 @@ from photogram.formats.block_contents import posed
 from photogram.formats.colmap import content
 from photogram.formats.colmap.files import binary_files, text_files
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.losses import losses
-from photogram.formats.models import complete_positions
+from photogram.formats.models import complete_positions, losses
 from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size

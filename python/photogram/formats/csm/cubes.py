@@ -15,8 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
 from photogram.formats.cards import filled_lines
-from photogram.formats.csm.angles import Polynomials, of_angles, of_quaternions
-from photogram.formats.csm.isd import Detector, Isd, Positions, Turns
+from photogram.formats.csm.isd import Detector, Isd, Polynomials, Positions, Turns, of_angles, of_quaternions
 from photogram.formats.csm.reading import fitting, from_pixels, not_zero, read_drift, read_isd, transformed
 from photogram.io.files import reading
 from photogram.io.json import Tree

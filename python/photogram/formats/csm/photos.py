@@ -10,8 +10,16 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.csm.angles import fitted_angles, of_angles
-from photogram.formats.csm.isd import HALF, Framelets, Isd, Pixels, Turns, check_choice
+from photogram.formats.csm.isd import (
+    HALF,
+    Framelets,
+    Isd,
+    Pixels,
+    Turns,
+    check_choice,
+    fitted_angles,
+    of_angles,
+)
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import LineSensor, Timed

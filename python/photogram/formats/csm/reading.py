@@ -10,8 +10,17 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.csm.angles import of_quaternions
-from photogram.formats.csm.isd import Detector, Framelets, Isd, Jitter, Pixels, Plane, Positions, Turns
+from photogram.formats.csm.isd import (
+    Detector,
+    Framelets,
+    Isd,
+    Jitter,
+    Pixels,
+    Plane,
+    Positions,
+    Turns,
+    of_quaternions,
+)
 from photogram.io.json import Tree, read_json, unknown
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass

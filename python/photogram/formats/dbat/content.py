@@ -16,8 +16,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.images import by_camera
-from photogram.formats.point_table import PointTable
-from photogram.formats.project import Options, Project, Size, assembled
+from photogram.formats.project import Options, PointTable, Project, Size, assembled
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes

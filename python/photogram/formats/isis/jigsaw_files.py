@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.csm.angles import to_angles
-from photogram.formats.csm.isd import Isd
+from photogram.formats.csm.isd import Isd, to_angles
 from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.network import POINT_TYPES
 from photogram.formats.isis.outcome import Image, Outcome

@@ -9,8 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.csm.angles import Polynomials, fitted, fitted_angles, of_angles
-from photogram.formats.csm.isd import Isd, Positions, Turns
+from photogram.formats.csm.isd import Isd, Polynomials, Positions, Turns, fitted, fitted_angles, of_angles
 from photogram.formats.csm.photos import trajectory_of
 from photogram.formats.isis.settings import Settings
 from photogram.lazy_dataclasses import dataclass, replace

@@ -12,9 +12,17 @@ import orjson
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.csm.angles import Polynomials, angle_axes, of_angles, to_angles, to_quaternions
 from photogram.formats.csm.cubes import is_cube
-from photogram.formats.csm.isd import Isd, Positions, Turns
+from photogram.formats.csm.isd import (
+    Isd,
+    Polynomials,
+    Positions,
+    Turns,
+    angle_axes,
+    of_angles,
+    to_angles,
+    to_quaternions,
+)
 from photogram.formats.csm.photos import SupportedImage, to_camera, trajectory_of
 from photogram.formats.csm.reading import UNITS
 from photogram.formats.isis.jigsaw_files import jigsaw_files

@@ -16,6 +16,7 @@ from photogram.formats.metadata.merged import (
     WITHOUT,
     Metadata,
     PhotoRecord,
+    Photos,
     counts,
     read_gnss_file,
     read_metadata,
@@ -24,7 +25,6 @@ from photogram.formats.metadata.merged import (
 )
 from photogram.formats.metadata.record import ELLIPSOIDAL, SEA_LEVEL, Said
 from photogram.formats.metadata.record import SOURCE as EVENTS
-from photogram.formats.metadata.search import Photos
 from photogram.formats.models import carried, is_free
 from photogram.formats.plain.schema import AXES, deviation_columns
 from photogram.formats.plain.settings import Settings

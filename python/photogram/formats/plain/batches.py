@@ -29,8 +29,7 @@ from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.photos import image_coordinates, read_images, read_photos
 from photogram.formats.plain.reading import read_tables
 from photogram.formats.plain.settings import Settings, read_settings
-from photogram.formats.plain.tables import Tables
-from photogram.formats.plain.transform import Transform
+from photogram.formats.plain.tables import Tables, Transform
 from photogram.formats.project import ASSUMED_SD, Project
 from photogram.io.parquet import coded
 from photogram.messages import missing_columns, unknown_name

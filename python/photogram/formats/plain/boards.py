@@ -7,9 +7,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import BENDS, PITCHES, deviation_columns
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, made
 from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure

@@ -12,10 +12,9 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
-from photogram.formats.plain.tables import Tables, columns_of
+from photogram.formats.plain.tables import Tables, columns_of, made
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place

@@ -9,9 +9,8 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import made, word_of
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.tables import DEGREE, Tables
+from photogram.formats.plain.tables import DEGREE, Tables, made, word_of
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import unknown_name

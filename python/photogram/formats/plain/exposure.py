@@ -11,11 +11,10 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.images import from_tables, in_unit, to_tables
-from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, made
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
-from photogram.io.units import scaled
+from photogram.io.numbers import scaled
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import Direction, LineSensor, Shutter

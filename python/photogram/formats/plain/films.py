@@ -18,14 +18,13 @@ from photogram.film.interior import (
 )
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.certificates import read_fiducials
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.film_mistakes import beyond_message, mark_remarks, scale_message
 from photogram.formats.plain.film_readings import Lying, MarkReadings, ScannedPhoto, Seen
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, made
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.cameras import Camera

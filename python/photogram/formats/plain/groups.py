@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import called, word_of
-from photogram.formats.plain.schema import AXES, BIAS, OPK, SD_ROTATIONS, deviation_columns
+from photogram.formats.plain.schema import AXES, OPK, SD_ROTATIONS, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
-from photogram.formats.plain.tables import Tables, angles_of, columns_of
+from photogram.formats.plain.tables import Tables, angles_of, called, columns_of, word_of
 from photogram.io.column_table import ColumnTable
-from photogram.io.units import degrees_typed
+from photogram.io.numbers import degrees_typed
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Rate, Velocity
@@ -30,7 +29,37 @@ SHARED: Mapping[type, tuple[str, ...]] = {
     Rate: ("boresight", "bias"),
 }
 """Fields of a group that its observations share, besides the clock."""
-_ANTENNA = {kind: tuple(f"{kind}_{axis}" for axis in AXES) for kind in ("lever", "shift", "drift")}
+
+
+@dataclass(frozen=True)
+class _Member:
+    """A shared parameter of a group."""
+
+    field: str  # Field of groups and observations
+    made: type[Unknown]  # Its class
+    column: str  # Column of its name
+    values: tuple[str, ...]  # Columns of its values
+    sd: tuple[str, ...]  # Columns of its standard deviations
+    empty: str = ""  # Meaning of an empty name
+
+
+def _of_axes(name: str, made: type[Unknown], column: str) -> _Member:
+    columns = tuple(f"{column}_{axis}" for axis in AXES)
+    return _Member(name, made, column, columns, deviation_columns(columns))
+
+
+_MEMBERS: Mapping[str, tuple[_Member, ...]] = {
+    "gnss_groups": (
+        _of_axes("lever_arm", LeverArm, "lever"),
+        _of_axes("shift", Shift, "shift"),
+        _of_axes("drift", Drift, "drift"),
+    ),
+    "attitude_groups": (
+        _Member("boresight", Boresight, "boresight", OPK, SD_ROTATIONS, "true"),
+        _of_axes("bias", GyroBias, "bias"),
+    ),
+}
+"""Parameters of the groups of each table."""
 
 
 @dataclass(frozen=True)
@@ -78,85 +107,76 @@ def read_groups(tables: Tables, name: str) -> dict[str, Group]:
     names = table.texts("group")
     titles = [text or ("GNSS" if antenna else "IMU") for text in names]
     clocks = scalars(tables, table, Clock, titles)
-    members = (_antennas if antenna else _inertials)(tables, table, titles)
+    members = {each.field: _read_members(tables, table, each, titles) for each in _MEMBERS[name]}
     groups: dict[str, Group] = {}
-    for row, (text, own) in enumerate(zip(names, members, strict=True)):
+    for row, text in enumerate(names):
         if text in groups:
             raise table.error(row, phrase("error.repeated", kind="group", name=text))
-        groups[text] = Group(**own, clock=clocks[row])
+        groups[text] = Group(**{field: own[row] for field, own in members.items()}, clock=clocks[row])
     return groups
 
 
-def _antennas(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield lever arm, shift and drift of each row."""
-    values = {kind: tables.vectors(table, names, 0.0) for kind, names in _ANTENNA.items()}
-    sd = {
-        kind: table.vectors(deviation_columns(names), 0.0 if kind == "lever" else math.inf, infinite=True)
-        for kind, names in _ANTENNA.items()
-    }
-    words = {kind: table.texts(kind) for kind in _ANTENNA}
+def _read_members(tables: Tables, table: ColumnTable, member: _Member, titles: Sequence[str]) -> list[Any]:
+    """Return a parameter of each row: free, weighted or fixed; None without."""
+    is_arm, is_turn = member.made is LeverArm, member.made is Boresight
+    # Tables contain attitudes of the photo in the axes of its carrier.
+    values = tables.turns(table).transpose(0, 2, 1) if is_turn else tables.vectors(table, member.values, 0.0)
+    read = tables.angle if is_turn else None
+    sd = table.vectors(member.sd, 0.0 if is_arm else math.inf, infinite=True, read=read)
     epochs = table.numbers("drift_epoch").tolist()
-    for row, title in enumerate(titles):
-
-        def one(kind: type[Unknown], what: str, name: str, row: int = row, **more: Any) -> Any:
-            if not name:
-                return None
-            return tables.shared.one(table, row, what, kind, name, values[what][row], sd[what][row], **more)
-
-        arm: Any = tuple(values["lever"][row].tolist())
-        if sd["lever"][row].any():
-            arm = one(LeverArm, "lever", words["lever"][row] or title)
-        shift, drift = (called(words[kind][row], title) for kind in ("shift", "drift"))
-        epoch = None if math.isnan(epochs[row]) else epochs[row]
-        yield {
-            "lever_arm": arm,
-            "shift": one(Shift, "shift", shift),
-            "drift": one(Drift, "drift", drift, epoch=epoch),
-        }
+    found: list[Any] = []
+    for row, (word, title) in enumerate(zip(table.texts(member.column, member.empty), titles, strict=True)):
+        value = None if np.isnan(values[row]).any() else values[row]
+        name = called(word, title)
+        if is_arm:
+            name = (word or title) if sd[row].any() else ""
+        if not name:
+            found.append(tuple(values[row].tolist()) if is_arm else None)
+            continue
+        more = {"epoch": None if math.isnan(epochs[row]) else epochs[row]} if member.made is Drift else {}
+        one = tables.shared.one(table, row, member.column, member.made, name, value, sd[row], **more)
+        found.append(one)
+    return found
 
 
-def _inertials(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield boresight and bias of each row."""
-    # Photo and carrier have axes as in the settings.
-    matrices = tables.turns(table)
-    sd = table.vectors(SD_ROTATIONS, math.inf, infinite=True, read=tables.angle)
-    biases = tables.vectors(table, BIAS, 0.0)
-    bias_sd = table.vectors(deviation_columns(BIAS), math.inf, infinite=True)
-    words = table.texts("boresight", "true"), table.texts("bias", "false")
-    one = tables.shared.one
-    for row, title in enumerate(titles):
-        matrix = None if np.isnan(matrices[row]).any() else matrices[row].T
-        boresight, bias = (called(column[row], title) for column in words)
-        yield {
-            "boresight": one(table, row, "boresight", Boresight, boresight, matrix, sd[row])
-            if boresight
-            else None,
-            "bias": one(table, row, "bias", GyroBias, bias, biases[row], bias_sd[row]) if bias else None,
-        }
-
-
-def antenna_columns(groups: Mapping[str, Group]) -> dict[str, Any]:
-    """Return the table of groups of positions and velocities by name."""
+def group_columns(name: str, groups: Mapping[str, Group], block: Block) -> dict[str, Any]:
+    """Return the table `gnss_groups` or `attitude_groups` of groups by name."""
     own = list(groups.values())
-    arms = [each.lever_arm for each in own]
-    levers = [each if isinstance(each, LeverArm) else None for each in arms]
-    found: dict[str, Any] = {
-        "group": list(groups),
-        "lever": ["" if each is None else each.name for each in levers],
-        "shift": [word_of(each.shift) for each in own],
-        "drift": [word_of(each.drift) for each in own],
-    }
-    values = [each.position if isinstance(each, LeverArm) else each for each in arms]
-    found |= columns_of(_ANTENNA["lever"], np.array(values))
-    found |= columns_of(deviation_columns(_ANTENNA["lever"]), _of(levers, "deviations", 0.0))
-    for what in ("shift", "drift"):
-        unknowns = [getattr(each, what) for each in own]
-        found |= columns_of(_ANTENNA[what], _of(unknowns, "position", np.nan))
-        found |= columns_of(deviation_columns(_ANTENNA[what]), _of(unknowns, "deviations", np.nan))
+    found: dict[str, Any] = {"group": list(groups)}
+    for member in _MEMBERS[name]:
+        parameters = [getattr(each, member.field) for each in own]
+        unknowns = [each if isinstance(each, Unknown) else None for each in parameters]
+        if member.made is GyroBias and not any(unknowns):
+            continue
+        if member.made is Boresight:
+            words = [_boresight_word(group, each) for group, each in zip(groups, parameters, strict=True)]
+            found |= {member.column: words} if set(words) != {"true"} else {}
+            found |= columns_of(member.values, _boresight_angles(parameters, block))
+            found |= columns_of(member.sd, degrees_typed(_of(unknowns, "deviations", 0.0)))
+            continue
+        is_arm = member.made is LeverArm
+        values = parameters if is_arm else [(math.nan,) * 3 if each is None else each for each in parameters]
+        found[member.column] = [
+            each.name if is_arm and each else "" if is_arm else word_of(each) for each in unknowns
+        ]
+        positions = [each.position if isinstance(each, Unknown) else each for each in values]
+        found |= columns_of(member.values, np.array(positions))
+        found |= columns_of(member.sd, _of(unknowns, "deviations", 0.0 if is_arm else math.nan))
     epochs = [None if each.drift is None else each.drift.epoch for each in own]
     if any(each is not None for each in epochs):
         found["drift_epoch"] = np.array([np.nan if each is None else each for each in epochs])
     return found | scalar_columns(Clock, [each.clock for each in own])
+
+
+def _boresight_angles(boresights: Sequence[Any], block: Block) -> Floats:
+    """Return (n, 3) angles of the photo in the axes of its carrier; NaN if unknown."""
+    matrices = [
+        np.eye(3) if each is None else each.attitude if isinstance(each, Boresight) else each
+        for each in boresights
+    ]
+    angles = angles_of(np.array(matrices, dtype=float).transpose(0, 2, 1), block)
+    angles[[each is None or (isinstance(each, Boresight) and each.is_open) for each in boresights]] = np.nan
+    return angles
 
 
 def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats:
@@ -192,34 +212,6 @@ def _inertial_name(group: Group, groups: Mapping[str, Group]) -> str:
     else:
         name = f"IMU {number}" if group.boresight is None else f"known {number}"
     return f"{name} {number}" if name in groups else name
-
-
-def inertial_columns(groups: Mapping[str, Group], block: Block) -> dict[str, Any]:
-    """Return the table of groups of attitudes and rates by name."""
-    own = list(groups.values())
-    boresights = [each.boresight for each in own]
-    # The boresight is body to photo; tables contain attitudes of the photo in the axes of its carrier.
-    matrices = np.array([_matrix(each) for each in boresights]).transpose(0, 2, 1)
-    angles = angles_of(matrices, block)
-    angles[[each is None or (isinstance(each, Boresight) and each.is_open) for each in boresights]] = np.nan
-    sd = np.array([each.deviations if isinstance(each, Boresight) else np.zeros(3) for each in boresights])
-    found: dict[str, Any] = {"group": list(groups), **columns_of(OPK, angles)}
-    found |= columns_of(SD_ROTATIONS, degrees_typed(sd))
-    words = [_boresight_word(name, each) for name, each in zip(groups, boresights, strict=True)]
-    if set(words) != {"true"}:
-        found["boresight"] = words
-    biases = [each.bias for each in own]
-    if any(biases):
-        found["bias"] = [word_of(each) for each in biases]
-        found |= columns_of(BIAS, _of(biases, "position", np.nan))
-        found |= columns_of(deviation_columns(BIAS), _of(biases, "deviations", np.nan))
-    return found | scalar_columns(Clock, [each.clock for each in own])
-
-
-def _matrix(boresight: Any) -> Floats:
-    if boresight is None:
-        return np.eye(3)
-    return boresight.attitude if isinstance(boresight, Boresight) else np.asarray(boresight, dtype=float)
 
 
 def _boresight_word(group: str, boresight: Any) -> str:

@@ -10,12 +10,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.rigs import Rigs, sensor_of
 from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
-from photogram.formats.plain.tables import Tables, columns_of, indices_of, named_of
+from photogram.formats.plain.tables import Tables, columns_of, indices_of, made, named_of
 from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace

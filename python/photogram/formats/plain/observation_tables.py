@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, DIFFERENCE, TABLES, deviation_columns
 from photogram.formats.plain.subjects import Subjects, clocked, scalar_columns, scalars, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
+    Transform,
     columns_of,
     correlations,
     covariances_of,
     different,
     indices_of,
+    made,
     places_written,
     vectors_of,
 )
-from photogram.formats.plain.transform import Transform
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block

@@ -9,15 +9,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.groups import (
     SHARED,
     Group,
-    antenna_columns,
+    group_columns,
     grouped,
-    inertial_columns,
     named_groups,
     read_groups,
 )
@@ -37,15 +35,16 @@ from photogram.formats.plain.subjects import Subjects, clocked, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
+    Transform,
     angles_of,
     columns_of,
     correlations,
     covariances_of,
     indices_of,
+    made,
     places_written,
 )
 from photogram.formats.plain.trajectories import read_smoothness
-from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
@@ -206,8 +205,7 @@ def _group_tables(block: Block) -> _Columns:
                     found[kind.table]["group"] = names[start : start + len(own)]
             start += len(own)
         if groups:
-            columns = antenna_columns(groups) if name == "gnss_groups" else inertial_columns(groups, block)
-            found[name] = columns
+            found[name] = group_columns(name, groups, block)
     return found
 
 

@@ -10,13 +10,11 @@ from photogram.arguments.arrays import repeated_pairs
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.images import from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, SD_AXES, deviation_columns
 from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.tables import Tables, indices_of
-from photogram.formats.plain.transform import Transform
+from photogram.formats.plain.tables import Tables, Transform, indices_of, made
 from photogram.io.column_table import ColumnTable
-from photogram.io.units import scaled
+from photogram.io.numbers import scaled
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.observations import Attitude, Observation
 from photogram.words import phrase

@@ -42,9 +42,8 @@ from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.subjects import Subjects
-from photogram.formats.plain.tables import Tables, covariances_of
+from photogram.formats.plain.tables import Tables, Transform, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
-from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, Unused, assembled
 from photogram.formats.rigging import Stand, mounted
 from photogram.io.column_table import ColumnTable

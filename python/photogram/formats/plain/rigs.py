@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, OPK, POSE, ROTATIONS, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
-from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of
+from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of, made
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.column_table import ColumnTable
-from photogram.io.units import degrees_typed
+from photogram.io.numbers import degrees_typed
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
 from photogram.network.rigs import Mount

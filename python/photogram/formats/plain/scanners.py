@@ -9,10 +9,9 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, made
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message

@@ -11,10 +11,10 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError, message_of
 from photogram.formats.column_words import is_angular
-from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, nameless, settled
+from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, is_geographic, nameless, settled
 from photogram.formats.images import Y_DOWN, is_rotation
-from photogram.formats.plain.common_unknowns import Shared
 from photogram.formats.plain.schema import (
     ALL_ANGLES,
     ANGLES,
@@ -25,16 +25,70 @@ from photogram.formats.plain.schema import (
     covariance_columns,
 )
 from photogram.formats.plain.settings import Settings
-from photogram.io.column_table import ColumnTable
+from photogram.formats.project import Frame
+from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import read_columns, read_rows
-from photogram.io.places import Place
-from photogram.io.units import MATRIX_ROUNDING, degrees_typed
+from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
+
+_Made = TypeVar("_Made")
+_Kind = TypeVar("_Kind", bound=Unknown)
+
+
+def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any, **more: Any) -> _Made:
+    """Create an object from a row; its errors name the row."""
+    with at_place(table.place(row)):
+        return make(*values, **more)
+
+
+def called(cell: str, title: str) -> str:
+    """Return the name in a cell: title for `true`, empty for `false`, else the cell."""
+    word = cell.lower()
+    return title if word in TRUE else "" if word in FALSE else cell
+
+
+def word_of(unknown: Unknown | None) -> str:
+    """Return the cell of an unknown: its name, unless it is a word for true or false."""
+    if unknown is None:
+        return "false"
+    return unknown.title if unknown.name.lower() in TRUE | FALSE else unknown.name
+
+
+@dataclass(frozen=True)
+class Shared:
+    """The named unknowns of a project, by type and name."""
+
+    _known: dict[tuple[type[Unknown], str], Unknown] = field(default_factory=dict)
+
+    def one(
+        self,
+        table: ColumnTable,
+        row: int,
+        column: str,
+        kind: type[_Kind],
+        name: str,
+        *given: Any,
+        **more: Any,
+    ) -> _Kind:
+        """Return the object of a name, shared by all rows with this name."""
+        new = made(table, row, kind, name, *given, **more)
+        own = self._known.setdefault((kind, name), new)
+        same = own is new or (
+            own.row()[1:] == new.row()[1:]
+            and own.is_open == new.is_open
+            and all(np.array_equal(getattr(own, each), value) for each, value in more.items())
+        )
+        if not same:
+            raise table.cell_error(row, column, "plain.other-values", name=name)
+        assert isinstance(own, kind)
+        return own
+
 
 _Named = TypeVar("_Named")
 DEGREE = 180 / np.pi  # Degrees per radian
@@ -319,3 +373,56 @@ def angles_of(matrices: Floats, block: Block) -> Floats:
     """Return (n, 3) omega, phi, kappa (degrees) of photo axes as columns."""
     kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
     return degrees_typed(Attitudes(matrices).values(kind), MATRIX_ROUNDING)
+
+
+class Transform:
+    """Transformation of table coordinates into the frame, in internal units."""
+
+    def __init__(self, settings: Settings, messages: list[Message]) -> None:
+        self.settings, self._messages = settings, messages
+        self.frame = settings.frame
+
+    def positions(
+        self, name: str, values: Floats, covariances: Floats | None, table: ColumnTable
+    ) -> tuple[Floats, Floats]:
+        """Return (n, 3) positions in the frame, and (n, 3, 3) covariances, m2."""
+        own = np.zeros((len(values), 3, 3)) if covariances is None else covariances
+        crs = self.settings.crs.get(name, "")
+        if not crs:
+            if self.frame.kind != "geographic" and is_geographic(table):
+                raise table.head.error(phrase("plain.degrees"))
+            if self.frame.kind == "geographic":
+                return np.column_stack(
+                    [np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]]
+                ), own
+            return values, own
+        from photogram.formats.crs import to_frame
+
+        if self.settings.length != "m":
+            raise InputError(phrase("plain.crs-unit", unit=self.settings.length), file=self.settings.path)
+        partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
+        if partly.any():
+            row = int(np.flatnonzero(partly)[0])
+            raise table.error(row, phrase("plain.partial-position", crs=crs))
+        known = ~np.isnan(values).any(axis=1)
+        if not known.any():
+            return values, own
+        try:
+            self._settle(crs, values[known])
+            found, turned, remarks = to_frame(crs, values[known], own[known], self.frame)
+        except InputError as error:
+            if error.file:
+                raise
+            raise table.head.error(phrase("plain.crs", message=message_of(error))) from None
+        positions, rotated = np.full_like(values, math.nan), own.copy()
+        positions[known], rotated[known] = found, turned
+        self._messages += [Message(text, table.path) for text in remarks]
+        return positions, rotated
+
+    def _settle(self, crs: str, values: Floats) -> None:
+        """Choose the origin of a topocentric frame: mean of the first positions."""
+        from photogram.formats.crs import amid
+
+        if self.frame.kind == "cartesian" or (self.frame.kind == "topocentric" and self.frame.origin is None):
+            self.frame = Frame("topocentric", "EPSG:4979", amid(crs, values))
+            self._messages.append(Message(phrase("plain.frame", crs=crs, frame=str(self.frame))))

@@ -10,9 +10,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, BASES, FACTORS, SD_AXES, VELOCITY
-from photogram.formats.plain.tables import Tables, covariances_of, indices_of, vectors_of
+from photogram.formats.plain.tables import Tables, covariances_of, indices_of, made, vectors_of
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
 from photogram.network.observations import Observation, Smoothness

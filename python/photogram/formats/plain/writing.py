@@ -26,8 +26,9 @@ from photogram.formats.plain.tables import columns_of, correlations, places_writ
 from photogram.formats.plain.trajectories_written import lost_smoothness, smoothness_table, trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
-from photogram.io.toml import quoted_text, toml_text
-from photogram.io.units import MATRIX_ROUNDING, degrees_typed
+from photogram.io.files import read_text
+from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
+from photogram.io.toml import quoted_text, toml_text, with_comments
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -186,7 +187,10 @@ def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
         },
         "features": {quoted_text(name): {kind: points} for name, (kind, points) in project.features.items()},
     }
-    return toml_text(tables | asked_tables(project.statement, unit))
+    text = toml_text(tables | asked_tables(project.statement, unit))
+    if isinstance(settings, Settings) and settings.path.suffix == ".toml" and settings.path.is_file():
+        return with_comments(text, read_text(settings.path))
+    return text
 
 
 def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:

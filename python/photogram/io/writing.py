@@ -1,0 +1,369 @@
+"""Writer of all results: sets of files that are written together, or not at all.
+
+`docs/command-line.md` describes the behaviour for users.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import re
+import secrets
+import stat
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, BinaryIO, Self
+
+from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+Content = bytes | Callable[[BinaryIO], object]  # Bytes, or a function that writes them to a file
+
+NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+MOST_LINKS = 40  # Largest number of symbolic links that are followed, as in Linux
+_Identity = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Target:
+    """The target of an output."""
+
+    given: Path  # The path of the user, for errors
+    place: str  # The path after all symbolic links
+    status: os.stat_result | None  # Status of the existing file; None without
+    descriptor: int | None = None  # File descriptor of this process, for paths such as `/dev/stdout`
+
+    @property
+    def regular(self) -> bool:
+        """Whether the target is a (new) regular file, not a pipe or device."""
+        return self.descriptor is None and (self.status is None or stat.S_ISREG(self.status.st_mode))
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Add the path of the user to an :class:`OSError`."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+
+
+def follow(path: Path) -> Target:
+    """Return the target of an output path."""
+    if "\0" in str(path):
+        raise InputError(phrase("file.nul"), file=path)
+    with naming(path):
+        place = os.fspath(path)
+        for _ in range(MOST_LINKS):
+            descriptor = _own_descriptor(place)
+            if descriptor is not None:
+                return Target(path, place, os.fstat(descriptor), descriptor)
+            try:
+                place = os.path.join(os.path.dirname(place), os.readlink(place))
+            except OSError as error:
+                if error.errno not in (errno.EINVAL, errno.ENOENT, errno.ENOTDIR):
+                    raise
+                break
+        else:
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+        try:
+            status = os.stat(place)
+        except FileNotFoundError:
+            status = None
+    directory, name = os.path.split(place)
+    if name in ("", os.curdir, os.pardir) or (status and stat.S_ISDIR(status.st_mode)):
+        raise InputError(phrase("file.directory"), file=path)
+    return Target(path, os.path.join(os.path.realpath(directory), name), status)
+
+
+def _own_descriptor(place: str) -> int | None:
+    """Return the file descriptor of this process for a path like `/proc/self/fd/1`."""
+    directory, name = os.path.split(place)
+    if not (name.isascii() and name.isdigit()):
+        return None
+    descriptors = rf"/proc/{os.getpid()}(/task/\d+)?/fd"
+    return int(name) if re.fullmatch(descriptors, os.path.realpath(directory)) else None
+
+
+class Guard:
+    """Rejects outputs that are inputs, directories, or one another, under any name.
+
+    Pipes and devices are written directly and are not checked.
+    """
+
+    def __init__(self, inputs: Iterable[Path], directories: Iterable[Path] = ()) -> None:
+        self._read = {_identity(status) for path in inputs if (status := _status(path))}
+        self._files: dict[object, Path] = {}
+        self._above: set[str] = set()
+        for path in directories:
+            place = os.path.realpath(path)
+            self._above |= {_spelling(place), *_above(place)}
+
+    def add(self, path: Path) -> Target:
+        """Check an output and return its target."""
+        target = follow(path)
+        if not target.regular:
+            return target
+        if target.status and _identity(target.status) in self._read:
+            raise InputError(phrase("file.over-input"), file=path)
+        above = set(_above(target.place))
+        # Keys by which two targets are identical
+        keys: list[object] = [_spelling(target.place)]
+        keys += [_identity(target.status)] if target.status else []
+        if any(key in self._files for key in keys):
+            raise InputError(phrase("file.same-output"), file=path)
+        under = next((self._files[each] for each in above if each in self._files), None)
+        if under or keys[0] in self._above:
+            raise InputError(phrase("file.output-folder"), file=under or path)
+        self._files |= dict.fromkeys(keys, path)
+        self._above |= above
+        return target
+
+
+def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path], directories: Iterable[Path] = ()) -> None:
+    """Check outputs with a :class:`Guard` before anything is computed."""
+    guard = Guard(inputs, directories)
+    for path in outputs:
+        guard.add(path)
+
+
+def _spelling(place: str) -> str:
+    """Fold the letter case of the last part, which some file systems ignore."""
+    directory, name = os.path.split(place)
+    return os.path.join(directory, name.casefold())
+
+
+def _above(place: str) -> Iterable[str]:
+    while (upper := os.path.dirname(place)) != place:
+        yield _spelling(upper)
+        place = upper
+
+
+def _identity(status: os.stat_result) -> _Identity:
+    return status.st_dev, status.st_ino
+
+
+def _status(path: Path) -> os.stat_result | None:
+    try:
+        return os.stat(path)
+    except (OSError, ValueError):
+        return None
+
+
+class _File(io.FileIO):
+    """An open descriptor whose errors contain the path of the user."""
+
+    def __init__(self, descriptor: int, given: Path) -> None:
+        super().__init__(descriptor, "wb")
+        self.given = given
+
+    def write(self, data: ReadableBuffer) -> int:
+        with naming(self.given):
+            return os.write(self.fileno(), data)
+
+    def close(self) -> None:
+        with naming(self.given):
+            super().close()
+
+
+@dataclass
+class _Staged:
+    """A file under a temporary name, which is renamed when its set is complete."""
+
+    target: Target
+    path: str
+    file: io.BufferedWriter | None = None
+    is_moved: bool = False  # Or is being moved
+
+    @property
+    def old(self) -> str:
+        """Second name of the file that is replaced."""
+        return f"{self.path}.old"
+
+    def open(self) -> io.BufferedWriter:
+        status = self.target.status
+        mode = stat.S_IMODE(status.st_mode) & 0o777 if status else 0o666
+        descriptor = os.open(self.path, NEW, mode)
+        self.file = io.BufferedWriter(_File(descriptor, self.target.given))
+        if status and sys.platform != "win32":
+            made = os.fstat(descriptor)
+            if (made.st_uid, made.st_gid) != (status.st_uid, status.st_gid):
+                with suppress(OSError):
+                    os.fchown(descriptor, status.st_uid, status.st_gid)
+            os.fchmod(descriptor, mode)
+        return self.file
+
+    def complete(self) -> None:
+        assert self.file is not None
+        if not self.file.closed:
+            with naming(self.target.given):
+                self.file.flush()
+                os.fsync(self.file.fileno())
+            self.file.close()
+
+    def move(self) -> None:
+        if self.target.status:
+            with suppress(OSError):
+                os.link(self.target.place, self.old, follow_symlinks=False)
+        with naming(self.target.given):
+            self.is_moved = True
+            os.replace(self.path, self.target.place)
+
+    def remove(self, *, restore: bool) -> None:
+        """Remove the temporary names; restore the previous file if this one was moved."""
+        with suppress(OSError):
+            if restore and self.is_moved and not os.path.lexists(self.path):
+                if self.target.status:
+                    os.replace(self.old, self.target.place)
+                else:
+                    os.unlink(self.target.place)
+        for path in (self.path, self.old):
+            with suppress(OSError):
+                os.unlink(path)
+
+
+class OutputSet:
+    """A set of files that are either all written or not at all; a context manager.
+
+    Every file is completed under a temporary name next to its target. When all are complete, they are renamed
+    in one pass. An exception of the block, a signal or a failure restores the previous state.
+
+    Symbolic links are followed and preserved. Pipes and devices are written directly: immediately by
+    :meth:`open`, before the files are renamed by :meth:`write`.
+    """
+
+    def __init__(self, inputs: Iterable[Path] = ()) -> None:
+        self._guard = Guard(inputs)
+        self._staged: list[_Staged] = []
+        self._streams: list[io.BufferedWriter] = []
+        self._late: list[tuple[Target, Content]] = []
+        self._made: list[str] = []
+        self._is_complete = False
+
+    def __enter__(self) -> Self:
+        _live.append(self)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                for staged in self._staged:
+                    staged.complete()
+                for file in self._streams:
+                    file.close()
+                for target, content in self._late:
+                    with _stream(target) as file:
+                        _put(file, content)
+                for staged in self._staged:
+                    staged.move()
+                self._is_complete = True
+        finally:
+            self.abandon()
+
+    def open(self, path: Path) -> io.BufferedWriter:
+        """Open a file for writing in pieces; the set closes it."""
+        target = self._target(path)
+        if target.regular:
+            return self._stage(target)
+        file = _stream(target)
+        self._streams.append(file)
+        return file
+
+    def write(self, path: Path, content: Content) -> None:
+        """Write a file."""
+        target = self._target(path)
+        if target.regular:
+            _put(self._stage(target), content)
+            self._staged[-1].complete()
+        else:
+            self._late.append((target, content))
+
+    def _target(self, path: Path) -> Target:
+        target = self._guard.add(path)
+        if target.regular and target.status and not os.access(target.place, os.W_OK):
+            raise PermissionError(errno.EACCES, "is write-protected", str(path))
+        return target
+
+    def _stage(self, target: Target) -> io.BufferedWriter:
+        with naming(target.given):
+            directory = os.path.dirname(target.place)
+            self._make(directory)
+            # Registered before its creation, so that a signal always removes it.
+            staged = _Staged(target, os.path.join(directory, f".photogram-{secrets.token_hex(8)}"))
+            self._staged.append(staged)
+            return staged.open()
+
+    def _make(self, directory: str) -> None:
+        if os.path.isdir(directory):
+            return
+        self._make(os.path.dirname(directory))
+        # Registered before its creation, so that a signal always removes it.
+        self._made.append(directory)
+        try:
+            os.mkdir(directory)
+        except FileExistsError:
+            self._made.remove(directory)
+            if not os.path.isdir(directory):
+                raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR)) from None
+
+    def abandon(self) -> None:
+        """Remove everything that the set has created, except files of a complete set."""
+        for file in [*(staged.file for staged in self._staged), *self._streams]:
+            # Without flushing: incomplete content is not written.
+            with suppress(OSError):
+                if file is not None:
+                    file.raw.close()
+        for staged in self._staged:
+            staged.remove(restore=not self._is_complete)
+        for directory in [] if self._is_complete else reversed(self._made):
+            with suppress(OSError):
+                os.rmdir(directory)
+        if self in _live:
+            _live.remove(self)
+
+
+_live: list[OutputSet] = []  # Active sets, for a signal that ends the process
+
+
+def abandon_all() -> None:
+    """Abandon all sets of this process, which is about to end."""
+    while _live:
+        _live[-1].abandon()
+
+
+def write_whole(files: Mapping[Path, Content]) -> None:
+    """Write contents by path: all, or none."""
+    with OutputSet() as outputs:
+        for path, content in files.items():
+            outputs.write(path, content)
+
+
+def _put(file: io.BufferedWriter, content: Content) -> None:
+    if callable(content):
+        content(file)
+    else:
+        file.write(content)
+
+
+def _stream(target: Target) -> io.BufferedWriter:
+    """Open a pipe or device for direct writing."""
+    with naming(target.given):
+        if target.descriptor is None:
+            descriptor = os.open(target.place, os.O_WRONLY | getattr(os, "O_NOCTTY", 0))
+        else:
+            # Previous output to the same target must precede.
+            for stream in (sys.stdout, sys.stderr):
+                if stream is not None:
+                    stream.flush()
+            descriptor = os.dup(target.descriptor)
+    return io.BufferedWriter(_File(descriptor, target.given))
