@@ -70,7 +70,7 @@ def test_hints_are_of_photos_at_rest():
 def test_an_adjustment_that_fails_has_the_right_hint():
     block = scanned(photos=True)
     upside = block.replace(cameras=[block.cameras[0].replace(parameters={"c": 60.0})])
-    with pytest.raises(AdjustmentError, match="do not intersect") as told, errors_explained(upside):
+    with pytest.raises(AdjustmentError, match="must intersect") as told, errors_explained(upside):
         adjust(upside)
     hint = "probably the principal distance has the wrong sign"
     assert str(told.value).count("hint: ") == str(told.value).count(f"hint: {hint}") == 1

@@ -217,7 +217,7 @@ def test_records_give_what_they_tell():
     ]
     placed = adjust(block.replace(observations=places))
     assert placed.datum.kind == "observations"
-    with pytest.raises(AdjustmentError, match="not free"):
+    with pytest.raises(AdjustmentError, match="requires a free block"):
         placed.in_datum(InnerConstraints())
 
 

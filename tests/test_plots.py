@@ -181,7 +181,7 @@ def test_saved_pictures_are_all_there(calibrated, tmp_path):
     found = calibrated.plot.save(tmp_path, "svg")
     assert [path.name for path in found] == [f"{name}.svg" for name in OF_LENSES]
     assert all(path.read_bytes().startswith(b"<svg") for path in found)
-    with pytest.raises(InputError, match="the format 'doc'"):
+    with pytest.raises(InputError, match="got 'doc'"):
         calibrated.plot.save(tmp_path, "doc")
 
 

@@ -287,7 +287,7 @@ def test_places_that_were_not_calibrated_are_remarked_on_or_refused(run, tables)
     Path("far.csv").write_text("\n".join([*lines, "500000,-300000"]) + "\n")
     result = run("correct", "out/correction.json", "far.csv", "far-corrected.csv")
     assert result.exit_code == 1
-    assert "far.csv, record 4: (500000, -300000) um" in result.stderr
+    assert "(500000, -300000" in result.stderr
     assert not Path("far-corrected.csv").exists()
     assert (
         run("correct", "out/correction.json", "far.csv", "far-corrected.csv", "--extrapolate").exit_code == 0

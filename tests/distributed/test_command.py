@@ -107,6 +107,7 @@ REFUSED = {
     "--self-calibrate": "all",
     "--snoop": None,
     "--level": 0.01,
+    "--max-bias-ratio": 4,
     "--fdr": 0.1,
     "--unit-weight": "unknown",
     "--statement": None,

@@ -254,10 +254,8 @@ def test_no_output_makes_a_project_ambiguous(run, place, name, target):
     for option in outputs(name):
         result = run(*words(name, **{option: f"galveston/{target}"}))
         assert result.exit_code == 1, result.output
-        name = Path(target).stem.upper()
-        assert (
-            f"galveston/{target}: the file must not have the name of {name} of the project" in result.stderr
-        )
+        of_project = Path(target).stem.upper()
+        assert f"{target}: the file must not have the name of {of_project} of the project" in result.stderr
         assert not (place / "galveston" / target).exists()
 
 

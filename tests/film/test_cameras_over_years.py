@@ -153,6 +153,6 @@ def test_files_of_certificates_and_of_stars(run, tmp_path):
     (tmp_path / "camera.json").write_text("{}")
     done = run("camera", "80.toml", "camera.json")
     assert done.exit_code == 1
-    assert "contains no date" in done.stderr
+    assert "must contain a date" in done.stderr
     done = run("camera", "80.toml", "85.toml", "--day", "1990-01-01")
     assert done.exit_code == 2

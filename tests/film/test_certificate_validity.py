@@ -80,7 +80,7 @@ def test_a_change_after_the_flight_is_told(folder: Path) -> None:
 def test_certificates_of_which_none_can_be_chosen_are_refused(folder: Path) -> None:
     text = (folder / "project.toml").read_text()
     (folder / "project.toml").write_text(text.replace("flown = 1983-07-02\n", ""))
-    with pytest.raises(InputError, match=r"has several certificates"):
+    with pytest.raises(InputError, match=r"several certificates"):
         dated(folder, 1980, 1983, flown="")
     (folder / "1977.toml").write_text((folder / "1983.toml").read_text())
     with pytest.raises(

@@ -192,7 +192,7 @@ def test_names_that_are_numbers_with_decimals_are_refused_with_file_and_column(t
     ):
         formats.read(tmp_path)
     parquet(tmp_path / "control.parquet", x=[1.0, 2.0], y=[1.0, 2.0], z=[1.0, 2.0])
-    with pytest.raises(InputError, match=r"control\.parquet: the column point is missing"):
+    with pytest.raises(InputError, match=r"control\.parquet: the column point is required"):
         formats.read(tmp_path)
 
 

@@ -365,8 +365,8 @@ def test_section_2_5_longitudes_may_be_written_from_0_to_360(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"point_sd": 0.0, "point_positions": 1.0}, "point P0! is fixed"),
-        ({"photo_position_sd": 0.0}, "the position of photo F0 is fixed"),
+        ({"point_sd": 0.0, "point_positions": 1.0}, "point P0! must not be fixed"),
+        ({"photo_position_sd": 0.0}, "the position of photo F0 must not be fixed"),
         ({"image_sd": np.arange(1.0, 37).reshape(18, 2)}, "image observations of photo F0 must have equal"),
     ],
 )

@@ -211,6 +211,9 @@ class Hypotheses:
             return []
         if self.statistic[found[0]] < EXPLAINED * self.excess:
             return []
+        # A term of distortion may explain the same residuals better.
+        terms = [k for k in sets if self.code[k] == "camera-term" and odds[k] > odds[found[0]]]
+        found = sorted([*terms, *found], key=lambda row: -odds[row])
         return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:

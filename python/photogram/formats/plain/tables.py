@@ -154,7 +154,7 @@ class Tables:
             for row, photo in enumerate(photos.rows.tolist()):
                 if texts[row] != cells["camera"][photo]:
                     fields = {"camera": texts[row], "other": cells["camera"][photo]}
-                raise images.error(row, phrase("plain.other-camera", **fields))
+                    raise images.error(row, phrase("plain.other-camera", **fields))
         records = [images.records[row] for row in rows.tolist()]
         return ColumnTable(images.path, images.head, tuple(cells), len(rows), cells, records)
 
