@@ -59,7 +59,7 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=_type_factors(tests) if rejected and result.KNOWN else [],
+        types=_type_factors(tests, result.given.image_unit) if rejected and result.KNOWN else [],
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
@@ -74,8 +74,11 @@ def network_findings(
     )
 
 
-def _type_factors(tests: Tests) -> list[TypeFactor]:
-    """Return the sums of squares and redundancy numbers of all observed types."""
+def _type_factors(tests: Tests, unit: str) -> list[TypeFactor]:
+    """Return the sums of squares and redundancy numbers of all observed types.
+
+    `unit` is the unit of image coordinates.
+    """
     found = []
     for each in tests.normal:
         for kind, components in each.groups.items():
@@ -84,9 +87,10 @@ def _type_factors(tests: Tests) -> list[TypeFactor]:
                 values[:, components][observed] for values in (each.residuals, each.sd, each.redundancy)
             )
             if observed.any():
-                given = float(sd[0]) if np.ptp(sd) <= 1e-9 * sd[0] else math.nan
+                equal = each.type == "image" and np.ptp(sd) <= 1e-9 * sd[0]
+                given = float(sd[0]) if equal else math.nan
                 squares, r = float(np.sum((residuals / sd) ** 2)), float(np.nansum(redundancy))
-                found.append(TypeFactor(kind, squares, r, given))
+                found.append(TypeFactor(kind, squares, r, given, unit))
     return found
 
 

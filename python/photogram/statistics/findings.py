@@ -161,7 +161,8 @@ class TypeFactor:
     group: Text
     squares: float  # q and r: weighted sum of squares, and sum of redundancy numbers
     redundancy: float
-    sd: float  # The given standard deviation; NaN if there are several
+    sd: float  # The given standard deviation of images, with its unit; NaN if there are several
+    unit: str
 
     @property
     def factor(self) -> float:

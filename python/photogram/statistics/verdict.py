@@ -345,7 +345,7 @@ def _types(e: Evidence) -> Phrase | None:
             others.append(each.group)
         elif each.redundancy >= 1.0:
             fields = {"kind": each.group, "factor": each.factor}
-            sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor}
+            sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor, "unit": each.unit}
             causes.append(Phrase(f"part.type{'.sd' if sd else ''}", fields | sd))
     return (
         Phrase("verdict.weights-of-types", {"types": causes, "others": others}) if others and causes else None
