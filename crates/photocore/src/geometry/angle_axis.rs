@@ -50,6 +50,7 @@ fn combined(w: &Vector3, a: f64, b: f64, c: f64) -> Matrix3 {
 }
 
 /// Returns the rotation matrix of a rotation vector (Rodrigues): Exp.
+#[inline]
 pub fn angle_axis_rotation(w: &Vector3) -> Matrix3 {
     let (sine, versine, _) = ratios(w.norm_squared());
     combined(w, 1.0 - versine * w.norm_squared(), sine, versine)
@@ -94,6 +95,7 @@ pub fn quaternion(r: &Matrix3) -> [f64; 4] {
 }
 
 /// Returns the rotation matrix of a unit quaternion w, x, y, z.
+#[inline]
 pub fn quaternion_rotation([w, x, y, z]: [f64; 4]) -> Matrix3 {
     Matrix3::new(
         w * w + x * x - y * y - z * z,

@@ -89,6 +89,7 @@ impl Pose {
     }
 
     /// Returns the distance of a point from the projection centre along the optical axis: negative behind the camera.
+    #[inline]
     pub fn depth(&self, point: &Vector3) -> f64 {
         -self.attitude.column(2).dot(&(point - self.position))
     }
@@ -96,6 +97,7 @@ impl Pose {
     /// Returns the pose after a step: C + dC, and A Exp(rho) with rho about the photo's own axes, orthonormalized to rounding.
     ///
     /// Every attitude is regular. To first order du = -A^T dC + u x rho.
+    #[inline]
     pub fn step(&self, shift: &Vector3, rho: &Vector3) -> Self {
         let turned = self.attitude * angle_axis_rotation(rho);
         // One Newton step for the nearest orthonormal matrix.
@@ -104,6 +106,7 @@ impl Pose {
     }
 
     /// Transforms a pose from the axes of this one to object space: C + A c and A a.
+    #[inline]
     pub fn of_inner(&self, inner: &Self) -> Self {
         Self {
             position: self.position + self.attitude * inner.position,

@@ -9,6 +9,7 @@ use super::axes::{Matrix3, Vector3};
 /// -sk cp   -so sp sk + co ck    co sp sk + so ck
 ///  sp      -so cp               co cp
 /// ```
+#[inline]
 pub fn rotation(angles: [f64; 3]) -> Matrix3 {
     let [(so, co), (sp, cp), (sk, ck)] = angles.map(f64::sin_cos);
     Matrix3::new(
@@ -25,6 +26,7 @@ pub fn rotation(angles: [f64; 3]) -> Matrix3 {
 }
 
 /// Returns M and its partial derivatives with respect to omega, phi and kappa.
+#[inline]
 pub fn rotation_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
     let m = rotation(angles);
     let [(so, co), (sp, cp), (sk, ck)] = angles.map(f64::sin_cos);

@@ -121,6 +121,7 @@ fn along(ray: &Ray, distance: f64) -> Vector3 {
 }
 
 /// Returns the position nearest to all rays: sum of (I - d d^T)(P - O) = 0. None if the rays are parallel or intersect behind a camera.
+#[inline]
 pub fn meet(rays: &[Ray]) -> Option<Vector3> {
     let first = rays.first()?.origin;
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
