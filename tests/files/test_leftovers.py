@@ -28,8 +28,9 @@ writing.write_whole({place / name: b"new" for name in ("a", "b", "made/c")})
 
 
 def heed():
-    # Shells start programs in the background with SIGINT ignored, and Python does not change that.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Shells start programs in the background with ignored signals, and Python does not change that.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
