@@ -317,7 +317,7 @@ def same_unknown(own, read) -> None:
             read.position, own.position, rtol=4e-16 * (own.KIND == "rotation coefficient")
         )
         # Angles are written as short decimals if these are within the rounding of a matrix (1.8e-15 rad).
-        np.testing.assert_allclose(read.attitude, own.attitude, rtol=0, atol=2e-15)
+        np.testing.assert_allclose(read.attitude, own.attitude, rtol=0, atol=4e-15)
         np.testing.assert_allclose(read.deviations, own.deviations, rtol=4e-16)
 
 
@@ -326,7 +326,7 @@ def same_trajectory(own: Trajectory, read: Trajectory) -> None:
     assert read.name == own.name
     for name in ("times", "positions", "attitude_times"):
         np.testing.assert_array_equal(getattr(read.table, name), getattr(own.table, name))
-    np.testing.assert_allclose(read.table.attitudes, own.table.attitudes, rtol=0, atol=2e-15)
+    np.testing.assert_allclose(read.table.attitudes, own.table.attitudes, rtol=0, atol=4e-15)
     assert (read.table.velocities is None) == (own.table.velocities is None)
     if own.table.velocities is not None:
         np.testing.assert_array_equal(read.table.velocities, own.table.velocities)
@@ -351,7 +351,7 @@ def same_trajectory(own: Trajectory, read: Trajectory) -> None:
     assert (read.body is None) == (own.body is None)
     if own.body is not None:
         np.testing.assert_array_equal(read.body[0], own.body[0])
-        np.testing.assert_allclose(read.body[1], own.body[1], rtol=0, atol=2e-15)
+        np.testing.assert_allclose(read.body[1], own.body[1], rtol=0, atol=4e-15)
 
 
 def _same_observations(one: Block, other: Block) -> None:
