@@ -194,8 +194,8 @@ def _snoop_block(
 
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
-        own = standing.weighted_sum_of_squares, standing.degrees_of_freedom
-        found = hypotheses(trial, tests, facts, block, point_axes(block), own, MAX_BIAS_RATIO, known=True)
+        parts = trial, tests, facts, block, point_axes(block), standing.sum_and_freedom, MAX_BIAS_RATIO
+        found = hypotheses(*parts, known=True)
         return found.common_errors() if found.common_is_harmful else []
 
     try:

@@ -9,6 +9,7 @@ it. A read-only array that owns its data is shared.
 from __future__ import annotations
 
 import math
+import random
 import re
 import sys
 from collections.abc import Iterable, Sequence
@@ -281,6 +282,17 @@ def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> boo
 def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:
     """Return an index of the chosen rows: a slice, without copy, for all."""
     return slice(None) if which.all() else which
+
+
+def sampled(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """Return at most so many rows, in order.
+
+    Rows are random but reproducible, because every n-th row of a regular network would form patterns.
+    """
+    if len(rows) <= most:
+        return rows
+    # Not `numpy.random`, whose import takes far longer than the selection.
+    return rows[sorted(random.Random(0).sample(range(len(rows)), most))]
 
 
 def finite_rows(pairs: NDArray[np.float64]) -> NDArray[np.bool_]:

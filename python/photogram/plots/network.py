@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import random
 from typing import Any
 
 import numpy as np
 
-from photogram.arguments.arrays import one_of
+from photogram.arguments.arrays import one_of, sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.picture_data import Pictured, Plan
@@ -147,14 +146,9 @@ def size_of(limits: Floats) -> tuple[float, float]:
 
 
 def thinned(what: str, rows: Indices, most: int) -> tuple[Indices, str]:
-    """Return the rows to draw among many, and a remark.
-
-    Rows are random but reproducible, because every n-th row of a regular network would form patterns.
-    """
-    if len(rows) <= most:
-        return rows, ""
-    chosen = sorted(random.Random(0).sample(range(len(rows)), most))
-    return rows[chosen], f"{most:,} of {len(rows):,} {what} are drawn, taken at random"
+    """Return the rows to draw among many, and a remark."""
+    remark = f"{most:,} of {len(rows):,} {what} are drawn, taken at random" if len(rows) > most else ""
+    return sampled(rows, most), remark
 
 
 def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:

@@ -100,7 +100,7 @@ def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:
     constrained = getattr(result, "unit_variance", "constrained") == "constrained"
     if summary is None or not result.KNOWN or not constrained:
         return None
-    return global_test(summary.standing.weighted_sum_of_squares, summary.standing.degrees_of_freedom)
+    return global_test(*summary.standing.sum_and_freedom)
 
 
 def block_findings(result: Result) -> Findings:

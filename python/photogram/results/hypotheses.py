@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.hypothesis_facts import NO_FACTS, Facts
@@ -340,10 +341,8 @@ def hypotheses(
     """
     suspects, estimated = trial.suspects, None if known else standing
     images = (suspects.kinds == 0) & tests.active
-    adjusted = drawn = np.unique(suspects.points[images])
-    if len(adjusted) > DRAWN:
-        # Every n-th point of a regular network would form patterns.
-        drawn = np.sort(np.random.default_rng(0).choice(adjusted, DRAWN, replace=False))
+    adjusted = np.unique(suspects.points[images])
+    drawn = sampled(adjusted, DRAWN)
     core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
     core.pop("check_sd", None)
     timed = core.pop("timed", False)

@@ -299,9 +299,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """Evaluate the hypotheses of the catalogue with some facts."""
         from photogram.results.hypotheses import hypotheses
 
-        own, axes = found.standing, self._terms().point_axes
-        standing = own.weighted_sum_of_squares, float(own.degrees_of_freedom)
-        standing = standing if self.KNOWN else self.sum_and_freedom
+        axes = self._terms().point_axes
+        standing = found.standing.sum_and_freedom if self.KNOWN else self.sum_and_freedom
         parts = found.trial, found.tests, facts, self.given, axes, standing, self.max_bias_ratio
         return hypotheses(*parts, known=self.KNOWN)
 

@@ -232,6 +232,14 @@ class NetworkTrial:
         return int(self._are_in(out, images).sum() - gone) < SUPPORT
 
 
+def type_name(kind: int, label: str = "") -> Phrase:
+    """Return the name of a type of groups, in the plural; `label` is the type of additional observations."""
+    name = KINDS[kind]
+    if label:
+        return phrase("test.observations", kind=kind_words(label))
+    return phrase("test.control" if name == "control" else f"test.{name}s")
+
+
 class NamedSuspects(Suspects):
     """Observation groups of a network with their names.
 
@@ -301,7 +309,7 @@ class NamedSuspects(Suspects):
 
     def counts(self, rows: Bools, used: Bools) -> dict[Text, tuple[int, int]]:
         """Return the numbers of groups with removed rows, and of all used groups, by type."""
-        removed = np.logical_or.reduceat(rows, self.row_starts[:-1])
+        removed = self.with_any(rows)
         found: dict[Text, tuple[int, int]] = {}
         for kind in np.unique(self.kinds[removed]).tolist():
             own = np.flatnonzero((self.kinds == kind) & (used | removed))
@@ -311,10 +319,13 @@ class NamedSuspects(Suspects):
                 found[each] = (int(removed[own][same].sum()), int(same.sum()))
         return found
 
+    def with_any(self, rows: Bools) -> Bools:
+        """Return (G,) groups with any of some rows."""
+        return np.asarray(np.logical_or.reduceat(rows, self.row_starts[:-1]))
+
     def type(self, kind: int, subject: int) -> Phrase:
         """Return the name of the type of a group, in the plural."""
-        name = KINDS[kind]
-        return phrase("test.control" if name == "control" else f"test.{name}s")
+        return type_name(kind)
 
     def row_name(self, row: int) -> str:
         return self._row(row)[0]
@@ -450,9 +461,7 @@ class BlockSuspects(NamedSuspects):
         return {id(one): each for each in every for all_ in each.coefficients for one in all_}
 
     def type(self, kind: int, subject: int) -> Phrase:
-        if kind != OBSERVATION:
-            return super().type(kind, subject)
-        return phrase("test.observations", kind=kind_words(self.observations[subject].label))
+        return type_name(kind, self.observations[subject].label if kind == OBSERVATION else "")
 
     def other_name(self, kind: int, subject: int) -> Phrase:
         if kind == OBSERVATION:

@@ -88,11 +88,8 @@ class Snooped(Brief, Documented):
 
     def share_removed(self, kind: str) -> float:
         """Return the share of the removed groups of a type, with dependent groups."""
-        own = [group for group in range(len(self.suspects)) if self.suspects.kind(group) == kind]
-        if not own:
-            return 0.0
-        gone = sum(bool(self.outcome.out.rows[self.suspects.rows(group)].any()) for group in own)
-        return gone / len(own)
+        own = np.array(self.suspects.kind_names)[self.suspects.kinds] == kind
+        return float(self.suspects.with_any(self.outcome.out.rows)[own].mean()) if own.any() else 0.0
 
     def table(self) -> pd.DataFrame:
         """Return the log as a data frame, a row for each removed component, with its unit."""
@@ -272,7 +269,7 @@ def _standing(standing: Standing) -> dict[str, Any]:
 
 
 def _said(standing: Standing) -> str:
-    test = global_test(standing.weighted_sum_of_squares, standing.degrees_of_freedom)
+    test = global_test(*standing.sum_and_freedom)
     if test is None:
         return "undefined: no degrees of freedom"
     said = "too high" if test.rejected_high else "too low" if test.rejected_low else "as expected"

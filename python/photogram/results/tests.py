@@ -14,7 +14,7 @@ from photogram.results import network_tables
 from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import deviation, redundancy
-from photogram.results.network_trial import KINDS, OBSERVATION
+from photogram.results.network_trial import KINDS, OBSERVATION, type_name
 from photogram.results.observation_kinds import kind_words, named_observation, parts_of
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Link, Quantity, component
@@ -107,17 +107,16 @@ class Tests:
             return []
         suspects, testable = summary.suspects, summary.testable
         types = []
-        for kind, name in enumerate(KINDS):
+        for kind in range(len(KINDS)):
             groups = np.flatnonzero(suspects.kinds == kind)
             rows = suspects.subjects[groups]
             if kind != OBSERVATION:
-                types.append((phrase("test.control" if name == "control" else f"test.{name}s"), groups, rows))
+                types.append((type_name(kind), groups, rows))
                 continue
             rows = self._terms.observation_rows[rows]
             for each in sorted(self._terms.kinds, key=lambda each: each.kind):
                 own = np.isin(rows, each.rows)
-                title = phrase("test.observations", kind=kind_words(each.kind))
-                types.append((title, groups[own], np.searchsorted(each.rows, rows[own])))
+                types.append((type_name(kind, each.kind), groups[own], np.searchsorted(each.rows, rows[own])))
         found = [
             Tested(
                 title,
@@ -132,9 +131,8 @@ class Tests:
         ]
         if result.KNOWN:
             return found
-        standing = summary.standing
-        tested = standing.weighted_sum_of_squares, standing.degrees_of_freedom
-        return [tests.studentized(*(tested if result.loss else result.sum_and_freedom)) for tests in found]
+        tested = summary.standing if result.loss else result
+        return [tests.studentized(*tested.sum_and_freedom) for tests in found]
 
     @cached_property
     def outliers(self) -> list[Bools]:

@@ -219,6 +219,11 @@ class Removed:
     # Suspects of which one has an error, and the observations do not show which
     disputed: Sequence[Text] = ()
 
+    @property
+    def total(self) -> int:
+        """Number of removed observations."""
+        return len(self.removed) if self.number is None else self.number
+
     def share(self, kind: Text) -> float:
         """Return the removed share of the observations of a type."""
         removed, all_ = self.counts.get(kind, (0, 1))

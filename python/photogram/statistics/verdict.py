@@ -267,7 +267,7 @@ def _too_much_removed(e: Evidence) -> Phrase | None:
     shares = [
         Phrase("part.share", {"percent": 100 * found.share(kind), "kind": kind}) for kind in found.excessive
     ]
-    fields = {"n": found.number or len(found.removed), "shares": shares, "exchanged": list(found.exchanged)}
+    fields = {"n": found.total, "shares": shares, "exchanged": list(found.exchanged)}
     return Phrase("verdict.too-much-removed", fields)
 
 
@@ -281,7 +281,7 @@ def _removed(e: Evidence) -> Phrase | None:
     if found is None or not found.removed or e.high or "too-much-removed" in e.codes:
         return None
     names = [each.get("subject") or each.get("name", "") for each in found.removed]
-    fields = {"n": found.number or len(names), "names": names, "exchanged": list(found.exchanged)}
+    fields = {"n": found.total, "names": names, "exchanged": list(found.exchanged)}
     return Phrase("verdict.usable-after-removal", fields)
 
 

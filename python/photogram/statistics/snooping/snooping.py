@@ -87,7 +87,7 @@ def snooped(
 def is_rejected(work: TakingOut) -> bool:
     """Whether residuals of a converged adjustment are too large."""
     standing = work.standing
-    test = global_test(standing.weighted_sum_of_squares, standing.degrees_of_freedom)
+    test = global_test(*standing.sum_and_freedom)
     return standing.status == "converged" and test is not None and test.rejected_high
 
 

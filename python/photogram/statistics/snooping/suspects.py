@@ -115,6 +115,10 @@ class Standing:
     weighted_sum_of_squares: float
     degrees_of_freedom: int
 
+    @property
+    def sum_and_freedom(self) -> tuple[float, float]:
+        return self.weighted_sum_of_squares, self.degrees_of_freedom
+
 
 @dataclass(frozen=True, eq=False)
 class Tests:
