@@ -24,11 +24,11 @@ SETS = {
 }
 
 
-def block_of(case):
-    """Return the block of a golden case, at the adjusted values."""
+def block_of(case, photos=None, chosen=slice(None)):
+    """Return the block of a golden case, at the adjusted values; on request of some photos and images."""
     golden, observed = GOLDEN, GOLDEN["cases"][case]["observations"]
     camera, sd = golden["camera"], golden["standard_deviations"]
-    poses = np.array(golden["start"]["poses"])
+    poses = np.array(golden["start"]["poses"])[:photos]
     count = len(golden["start"]["points"])
     names = [str(row) for row in range(count)]
     control, points, point_sd = (
@@ -45,13 +45,13 @@ def block_of(case):
         point_positions=points,
         point_ids=names,
         point_sd=point_sd,
-        image_photos=golden["image_photo"],
-        image_points=golden["image_point"],
-        image_xy=np.array(observed["image"]).reshape(-1, 2),
+        image_photos=np.array(golden["image_photo"])[chosen],
+        image_points=np.array(golden["image_point"])[chosen],
+        image_xy=np.array(observed["image"]).reshape(-1, 2)[chosen],
         image_sd=sd["image"],
         cameras=[Camera("simple_radial", values)],
         observations=[
-            *(Position(str(row), each, sd["gnss"]) for row, each in enumerate(observed["gnss"])),
+            *(Position(str(row), each, sd["gnss"]) for row, each in enumerate(observed["gnss"][:photos])),
             Distance(
                 *(str(row) for row in golden["distance_points"]),
                 np.ravel(observed["distance"])[0],

@@ -1,72 +1,47 @@
 """Levels of all hypotheses without an error, by Monte Carlo: their p-values have a uniform distribution."""
 
-import gzip
-import json
+import dataclasses
 from collections import defaultdict
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from photogram import Block, Camera, Distance, Position, adjust
+from photogram import adjust
+from test_hypotheses import GOLDEN, block_of
 
-GOLDEN = json.loads(gzip.decompress((Path(__file__).parent / "data/hypotheses/golden.json.gz").read_bytes()))
 RUNS = 150
 
 
 def surveyed(rng, photos, points):
     """Yield blocks of the first photos and points of the golden network, with other noise."""
-    camera, sd = GOLDEN["camera"], GOLDEN["standard_deviations"]
-    case = next(iter(GOLDEN["cases"].values()))["observations"]
-    poses, count = np.array(GOLDEN["start"]["poses"])[:photos], len(GOLDEN["start"]["points"])
-    control = np.array(GOLDEN["control_points"])
+    sd, pair = GOLDEN["standard_deviations"], GOLDEN["distance_points"]
     of_photos, of_points = np.array(GOLDEN["image_photo"]), np.array(GOLDEN["image_point"])
-    chosen = (of_photos < photos) & ((of_points < points) | np.isin(of_points, control))
-    chosen &= np.bincount(of_points[chosen], minlength=count)[of_points] > 1
-    xy = np.array(case["image"]).reshape(-1, 2)[chosen]
-    names = [str(row) for row in range(count)]
-    control = control[np.isin(control, of_points[chosen])]
-    place, point_sd = np.full((count, 3), np.nan), np.full((count, 3), np.inf)
-    point_sd[control] = sd["control"]
-    place[control] = np.array(case["control"])[np.isin(GOLDEN["control_points"], control)]
-    values = {"f": camera["f"], "cx": camera["cx"], "cy": camera["cy"], "k": camera["k1"]}
-    gnss = np.array(case["gnss"])[:photos]
-    pair = [row for row in GOLDEN["distance_points"] if row in of_points[chosen]]
-
-    def block(xy, place, gnss, length):
-        distances = [Distance(*map(str, pair), length, sd["distance"])] if len(pair) == 2 else []
-        return Block(
-            photo_positions=poses[:, :3],
-            photo_attitudes=poses[:, 3:],
-            point_positions=place,
-            point_ids=names,
-            point_sd=point_sd,
-            image_photos=of_photos[chosen],
-            image_points=of_points[chosen],
-            image_xy=xy,
-            image_sd=sd["image"],
-            cameras=[Camera("simple_radial", values)],
-            observations=[
-                *(Position(str(row), each, sd["gnss"]) for row, each in enumerate(gnss)),
-                *distances,
-            ],
-        )
-
-    length = float(np.ravel(case["distance"])[0])
-    found = adjust(block(xy, place, gnss, length))
+    chosen = (of_photos < photos) & ((of_points < points) | np.isin(of_points, GOLDEN["control_points"]))
+    chosen &= np.bincount(of_points[chosen], minlength=of_points.max() + 1)[of_points] > 1
+    block = block_of("clean", photos, chosen)
+    seen = np.isin(np.arange(len(block.point_ids)), of_points[chosen])
+    block = block.replace(point_sd=np.where(seen[:, np.newaxis], block.point_sd, np.inf))
+    if not np.isin(pair, of_points[chosen]).all():
+        block = block.replace(observations=block.observations[:-1])
     # Observations without errors: the adjusted ones.
-    xy = xy - found.residuals
-    place = np.where(np.isfinite(place), found.point_positions, np.nan)
-    gnss = found.photo_positions
-    if len(pair) == 2:
-        length = float(np.linalg.norm(np.diff(found.point_positions[pair], axis=0)))
+    found = adjust(block)
+    xy, gnss, places = block.image_xy - found.residuals, found.photo_positions, found.point_positions
+    control = np.where(np.isfinite(block.point_positions), places, np.nan)
+    length = float(np.linalg.norm(np.diff(places[pair], axis=0)))
+
+    def noise(of, kind):
+        return rng.normal(size=np.shape(of)) * sd[kind]
+
     for _ in range(RUNS):
-        yield block(
-            xy + rng.normal(size=xy.shape) * sd["image"],
-            place + rng.normal(size=place.shape) * sd["control"],
-            gnss + rng.normal(size=gnss.shape) * sd["gnss"],
-            length + rng.normal() * sd["distance"],
+        values = [*(gnss + noise(gnss, "gnss")), length + noise(length, "distance")]
+        yield block.replace(
+            image_xy=xy + noise(xy, "image"),
+            point_positions=control + noise(control, "control"),
+            observations=[
+                dataclasses.replace(each, **{"position" if each.photos else "length": value})
+                for each, value in zip(block.observations, values, strict=False)
+            ],
         )
 
 
