@@ -12,8 +12,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 
 use super::form::{ByMotions, Curvature, MOTIONS, Partials, RADIUS};
 use super::{FeatureError, Form};
-use photocore::geometry::{Matrix3, Vector3, angle_axis_rotation, principal_axes};
-use photocore::internal::sort_by;
+use photocore::geometry::{Matrix3, Vector3, angle_axis_rotation};
+use photocore::internal::{principal_axes, sort_by};
 
 /// Maximum number of steps, and the step size that ends the iteration; lengths are relative to the root mean square distance of the points.
 const STEPS: usize = 200;

@@ -357,7 +357,7 @@ impl Search<'_> {
 
 /// Returns the standard deviation of a component, estimated from the median of the angles.
 fn spread(misfits: impl Iterator<Item = f64>) -> f64 {
-    photocore::network::median(misfits.collect()).map_or(0.0, |middle| middle / MEDIAN_LENGTH)
+    photocore::internal::median(misfits.collect()).map_or(0.0, |middle| middle / MEDIAN_LENGTH)
 }
 
 fn to_numbers(pose: &Pose) -> [f64; 6] {

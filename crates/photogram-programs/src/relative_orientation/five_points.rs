@@ -13,7 +13,8 @@
 use nalgebra::{SMatrix, SVector, Schur};
 
 use super::oriented::Oriented;
-use photocore::geometry::{Matrix3, Vector3, principal_axes};
+use photocore::geometry::{Matrix3, Vector3};
+use photocore::internal::principal_axes;
 
 /// Maximum number of steps of the decompositions.
 const STEPS: usize = 1000;
