@@ -5,15 +5,17 @@
 //! (Baarda 1968; Förstner 1983). If the observations have the error C d, the unknowns change by Q N d. Local blocks are eliminated as they
 //! are formed, so that only unknowns of retained blocks are solved for.
 
-use std::collections::HashMap;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::ObservationEquations;
+use super::group_test::Few;
 use super::linearized::Linearized;
 use super::problem::AnyProblem;
 use super::terms::Terms;
 use super::walk::Buffers;
+use crate::normals::{Layout, dot};
 use crate::{Threads, parallel};
 
 /// An observation equation of unit weight.
@@ -58,8 +60,17 @@ pub trait AdditionalParameters: Sync {
     /// The local blocks whose observations, or whose unknowns as observations, depend on any of them; None for all.
     fn locals(&self) -> Option<Vec<usize>>;
 
-    /// Appends the parameters that an equation depends on, with its partials in unit weight.
-    fn partials(&self, equation: &Equation<'_>, partials: &mut Vec<(usize, f64)>);
+    /// Appends the parameters that an equation depends on, with its partials in unit weight. The equations of a group follow each other.
+    fn partials(&self, equation: &Equation<'_>, shared: &mut Shared, partials: &mut Vec<(usize, f64)>);
+}
+
+/// Values that are computed once for all equations of a group.
+#[derive(Debug, Default)]
+pub struct Shared {
+    /// The group.
+    pub group: Option<usize>,
+    /// Its values.
+    pub values: Vec<f64>,
 }
 
 /// Sums over all observations that test additional parameters.
@@ -92,6 +103,7 @@ struct LocalRows {
     /// Room for the coefficients and the partials of one equation.
     coefficients: Vec<(usize, f64)>,
     scratch: Vec<(usize, f64)>,
+    shared: Shared,
 }
 
 /// A problem at given values with additional parameters.
@@ -114,9 +126,9 @@ impl LocalRows {
 
     /// Takes over the equation whose coefficients are in the buffer; `first` is the first unknown of the block.
     fn push(&mut self, to: &Extended<'_>, (of, sd, constant): (EquationOf, f64, f64), first: usize) {
-        let Self { width, constants, own, ends, others, partials, coefficients, scratch } = self;
+        let Self { width, constants, own, ends, others, partials, coefficients, scratch, shared } = self;
         scratch.clear();
-        to.parameters.partials(&Equation { of, sd, coefficients }, scratch);
+        to.parameters.partials(&Equation { of, sd, coefficients }, shared, scratch);
         partials.extend(scratch.iter().filter(|partial| partial.1 != 0.0));
         let start = own.len();
         own.resize(start + *width, 0.0);
@@ -163,18 +175,38 @@ impl Extended<'_> {
         });
     }
 
-    /// The inverse of the normal matrix of a local block.
-    fn inverse(&self, local: usize, rows: &LocalRows) -> DMatrix<f64> {
+    /// The inverse of the normal matrix of a local block; zero if it has none.
+    fn inverse(&self, local: usize, rows: &LocalRows) -> Few {
         let range = self.equations.problem().layout().local_range(local);
-        let mut normal = DMatrix::zeros(range.len(), range.len());
+        let count = range.len();
+        let mut normal = Few::from_elem(0.0, count * count);
         for (_, own, ..) in rows.rows() {
-            for (i, a) in own.iter().enumerate() {
-                own.iter().enumerate().for_each(|(j, b)| normal[(i, j)] += a * b);
+            for (a, row) in own.iter().zip(normal.chunks_exact_mut(count)) {
+                row.iter_mut().zip(own).for_each(|(sum, b)| *sum += a * b);
             }
         }
-        range.enumerate().filter(|(_, unknown)| self.fixed[*unknown]).for_each(|(k, _)| normal[(k, k)] = 1.0);
-        let count = normal.nrows();
-        normal.cholesky().map_or_else(|| DMatrix::zeros(count, count), |factor| factor.inverse())
+        range
+            .enumerate()
+            .filter(|(_, unknown)| self.fixed[*unknown])
+            .for_each(|(k, _)| normal[k * count + k] = 1.0);
+        invert(&mut normal, count);
+        normal
+    }
+}
+
+/// Inverts a positive definite matrix by exchanging each unknown with its equation; sets others to zero.
+fn invert(matrix: &mut [f64], count: usize) {
+    for k in 0..count {
+        let pivot = matrix[k * count + k];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return matrix.fill(0.0);
+        }
+        matrix[k * count + k] = 1.0;
+        matrix[k * count..][..count].iter_mut().for_each(|value| *value /= pivot);
+        for i in (0..count).filter(|&i| i != k) {
+            let factor = std::mem::take(&mut matrix[i * count + k]);
+            (0..count).for_each(|j| matrix[i * count + j] -= factor * matrix[k * count + j]);
+        }
     }
 }
 
@@ -185,9 +217,60 @@ struct Sums {
     /// What local blocks take up of the squares.
     taken: DMatrix<f64>,
     observations: Vec<usize>,
-    /// Right-hand sides of unknowns that are not local: where those of each start.
-    starts: HashMap<usize, usize>,
+    /// Unknowns that are not local, with their right-hand sides: an element per parameter.
+    unknowns: Vec<usize>,
     rights: Vec<f64>,
+}
+
+/// Buffers of a thread for sums.
+struct Work {
+    /// First unknown that is not local.
+    first: usize,
+    /// Place of each of these in the sums.
+    places: Vec<u32>,
+    /// Parameters that the equations of a local block depend on, and the place of each parameter among them.
+    columns: Vec<usize>,
+    active: Vec<Option<usize>>,
+    /// Right-hand sides of a local block by these parameters, its solutions, and partials of an equation.
+    right: Vec<f64>,
+    solved: Vec<f64>,
+    left: Vec<f64>,
+}
+
+/// A place that is not used.
+const NONE: u32 = u32::MAX;
+
+impl Work {
+    fn new(layout: &Layout, count: usize) -> Self {
+        let first = layout.all_locals().end;
+        Self {
+            first,
+            places: vec![NONE; layout.unknowns() - first],
+            columns: vec![],
+            active: vec![None; count],
+            right: vec![],
+            solved: vec![],
+            left: vec![],
+        }
+    }
+
+    /// Sets the parameters of the next equations.
+    fn select(&mut self, partials: &[(usize, f64)]) {
+        self.columns.drain(..).for_each(|column| self.active[column] = None);
+        for &(column, _) in partials {
+            if self.active[column].is_none() {
+                self.active[column] = Some(self.columns.len());
+                self.columns.push(column);
+            }
+        }
+    }
+
+    /// Adds to the elements of `values` of each parameter.
+    fn add(active: &[Option<usize>], partials: &[(usize, f64)], mut add: impl FnMut(usize, f64)) {
+        partials
+            .iter()
+            .for_each(|&(column, partial)| active[column].into_iter().for_each(|k| add(k, partial)));
+    }
 }
 
 impl Sums {
@@ -197,7 +280,7 @@ impl Sums {
             squares: DMatrix::zeros(count, count),
             taken: DMatrix::zeros(count, count),
             observations: vec![0; count],
-            starts: HashMap::new(),
+            unknowns: vec![],
             rights: vec![],
         }
     }
@@ -211,43 +294,55 @@ impl Sums {
         }
     }
 
-    /// Adds an equation to the right-hand sides, with these partials by all parameters.
-    fn reduce(&mut self, others: &[(usize, f64)], partials: &[f64]) {
-        let count = partials.len();
+    /// Adds an equation to the right-hand sides, with its partials `left` by the selected parameters.
+    fn reduce(&mut self, others: &[(usize, f64)], work: &mut Work) {
+        let count = self.observations.len();
         for &(unknown, coefficient) in others {
-            let next = self.rights.len();
-            let start = *self.starts.entry(unknown).or_insert(next);
-            if start == next {
-                self.rights.resize(next + count, 0.0);
+            let place = &mut work.places[unknown - work.first];
+            if *place == NONE {
+                *place = self.unknowns.len() as u32;
+                self.unknowns.push(unknown);
+                self.rights.resize(self.unknowns.len() * count, 0.0);
             }
-            let right = &mut self.rights[start..start + count];
-            right.iter_mut().zip(partials).for_each(|(sum, partial)| *sum += partial * coefficient);
+            let right = &mut self.rights[*place as usize * count..][..count];
+            work.columns.iter().zip(&work.left).for_each(|(&k, partial)| right[k] += partial * coefficient);
         }
     }
 
     /// Adds a local block.
-    fn add_local(&mut self, to: &Extended<'_>, local: usize, rows: &LocalRows) {
+    fn add_local(&mut self, to: &Extended<'_>, local: usize, rows: &LocalRows, work: &mut Work) {
         if rows.partials.is_empty() {
             return;
         }
-        let (count, inverse) = (self.observations.len(), to.inverse(local, rows));
-        let mut right = DMatrix::zeros(inverse.nrows(), count);
+        work.select(&rows.partials);
+        let (width, count) = (rows.width, work.columns.len());
+        work.right.clear();
+        work.right.resize(width * count, 0.0);
         for (constant, own, _, partials) in rows.rows() {
             self.add(constant, partials);
-            for &(column, partial) in partials {
-                own.iter().enumerate().for_each(|(k, value)| right[(k, column)] += value * partial);
+            let right = &mut work.right;
+            Work::add(&work.active, partials, |column, partial| {
+                let right = &mut right[column * width..][..width];
+                right.iter_mut().zip(own).for_each(|(sum, value)| *sum += value * partial);
+            });
+        }
+        let inverse = to.inverse(local, rows);
+        work.solved.clear();
+        for right in work.right.chunks_exact(width.max(1)) {
+            let rows = inverse.chunks_exact(width.max(1));
+            work.solved.extend(rows.map(|row| dot(row, right)));
+        }
+        for (i, right) in work.columns.iter().zip(work.right.chunks_exact(width.max(1))) {
+            for (j, solved) in work.columns.iter().zip(work.solved.chunks_exact(width.max(1))) {
+                self.taken[(*i, *j)] += dot(right, solved);
             }
         }
-        let solved = inverse * &right;
-        self.taken += right.tr_mul(&solved);
-        let mut left = vec![0.0; count];
         for (_, own, others, partials) in rows.rows() {
-            for (column, value) in left.iter_mut().enumerate() {
-                let solved = solved.column(column);
-                *value = -own.iter().zip(solved.iter()).map(|(a, x)| a * x).sum::<f64>();
-            }
-            partials.iter().for_each(|&(column, partial)| left[column] += partial);
-            self.reduce(others, &left);
+            work.left.clear();
+            work.left.extend(work.solved.chunks_exact(width.max(1)).map(|solved| -dot(own, solved)));
+            let left = &mut work.left;
+            Work::add(&work.active, partials, |column, partial| left[column] += partial);
+            self.reduce(others, work);
         }
     }
 }
@@ -277,17 +372,23 @@ impl Linearized {
     ) -> Additional {
         let (count, layout) = (parameters.count(), problem.layout());
         let extended = self.extended(problem, parameters, threads);
-        let of_locals = |buffers: &mut Buffers, locals: &mut dyn Iterator<Item = usize>| {
-            let (mut sums, mut rows) = (Sums::new(count), LocalRows::default());
+        let of_locals = |locals: &mut dyn Iterator<Item = usize>| {
+            let (mut sums, mut work) = (Sums::new(count), Work::new(layout, count));
+            let (mut rows, mut buffers) = (LocalRows::default(), Buffers::default());
             for local in locals {
-                extended.write(buffers, local, &mut rows);
-                sums.add_local(&extended, local, &rows);
+                extended.write(&mut buffers, local, &mut rows);
+                sums.add_local(&extended, local, &rows, &mut work);
             }
             sums
         };
         let mut parts = match parameters.locals() {
-            None => problem.for_stretches(threads, |buffers, locals| of_locals(buffers, &mut { locals })),
-            Some(some) => vec![of_locals(&mut Buffers::default(), &mut some.into_iter())],
+            Some(some) => vec![of_locals(&mut some.into_iter())],
+            None => {
+                let (all, length) = (layout.locals(), layout.locals().div_ceil(PARTS).max(AT_LEAST));
+                let ranges = (0..all).step_by(length).map(|first| first..all.min(first + length)).collect();
+                threads
+                    .install(|| parallel::map_each(ranges, &|mut range: Range<usize>| of_locals(&mut range)))
+            }
         };
         parts.push(retained(&extended, count));
 
@@ -298,8 +399,7 @@ impl Linearized {
             sums.squares += part.squares;
             sums.taken += part.taken;
             sums.observations.iter_mut().zip(part.observations).for_each(|(sum, own)| *sum += own);
-            for (unknown, start) in part.starts {
-                let own = &part.rights[start..start + count];
+            for (unknown, own) in part.unknowns.iter().zip(part.rights.chunks_exact(count.max(1))) {
                 own.iter().enumerate().for_each(|(k, value)| rights[(unknown - first, k)] += value);
             }
         }
@@ -331,7 +431,8 @@ impl Linearized {
             let (mut rows, mut buffers) = (LocalRows::default(), Buffers::default());
             extended.write(&mut buffers, local, &mut rows);
             let inverse = extended.inverse(local, &rows);
-            let mut right = DMatrix::zeros(inverse.nrows(), count);
+            let width = rows.width;
+            let mut right = DMatrix::zeros(width, count);
             let mut left = DVector::zeros(count);
             for (_, own, others, partials) in rows.rows() {
                 left.fill(0.0);
@@ -345,7 +446,7 @@ impl Linearized {
                     right.row_mut(k).iter_mut().zip(left.iter()).for_each(|(sum, left)| *sum += value * left);
                 }
             }
-            inverse * right
+            DMatrix::from_row_slice(width, width, &inverse) * right
         };
         threads.install(|| parallel::map(locals.len(), AT_LEAST, |k| change(locals[k])))
     }
@@ -353,24 +454,30 @@ impl Linearized {
 
 /// Local blocks that a thread takes at least.
 const AT_LEAST: usize = 32;
+/// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
+const PARTS: usize = 64;
 
 /// The sums over ties and over unknowns that are not local.
 fn retained(extended: &Extended<'_>, count: usize) -> Sums {
     let problem = extended.equations.problem();
     let (layout, mut sums) = (problem.layout(), Sums::new(count));
     let (groups, first) = (layout.groups() * layout.rows(), layout.all_locals().end);
-    let (mut coefficients, mut partials, mut dense) = (vec![], vec![], vec![0.0; count]);
+    let (mut coefficients, mut partials, mut work) = (vec![], vec![], Work::new(layout, count));
+    let mut shared = Shared::default();
     let mut add = |(of, sd, constant): (EquationOf, f64, f64), coefficients: &mut Vec<(usize, f64)>| {
         partials.clear();
-        extended.parameters.partials(&Equation { of, sd, coefficients }, &mut partials);
+        extended.parameters.partials(&Equation { of, sd, coefficients }, &mut shared, &mut partials);
         if partials.iter().all(|own| own.1 == 0.0) {
             return;
         }
         sums.add(constant, &partials);
-        dense.fill(0.0);
-        partials.iter().for_each(|&(column, partial)| dense[column] += partial);
+        work.select(&partials);
+        work.left.clear();
+        work.left.resize(work.columns.len(), 0.0);
+        let left = &mut work.left;
+        Work::add(&work.active, &partials, |column, partial| left[column] += partial);
         coefficients.retain(|own| !extended.fixed[own.0]);
-        sums.reduce(coefficients, &dense);
+        sums.reduce(coefficients, &mut work);
     };
     extended.equations.each_row_of_ties(|tie, row| {
         coefficients.clear();
@@ -384,4 +491,23 @@ fn retained(extended: &Extended<'_>, count: usize) -> Sums {
         add((EquationOf::Unknown(unknown), problem.sd[unknown], constant), &mut coefficients);
     });
     sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::invert;
+
+    #[test]
+    fn inverse_of_a_definite_matrix() {
+        let matrix = [4.0, 1.0, -2.0, 1.0, 3.0, 0.5, -2.0, 0.5, 5.0];
+        let mut inverse = matrix;
+        invert(&mut inverse, 3);
+        for k in 0..9 {
+            let product: f64 = (0..3).map(|j| matrix[k / 3 * 3 + j] * inverse[3 * j + k % 3]).sum();
+            assert!((product - f64::from(u8::from(k % 4 == 0))).abs() < 1e-15);
+        }
+        let mut singular = [1.0, 1.0, 1.0, 1.0];
+        invert(&mut singular, 2);
+        assert_eq!(singular, [0.0; 4]);
+    }
 }

@@ -131,15 +131,23 @@ pub fn may_correlate(odds: f64, other: f64, limit: f64) -> bool {
 /// * `first`, `second`: their cofactor matrices, row by row;
 /// * `between`: cofactors of the first with the second, row by row.
 pub fn canonical_correlation(first: &[f64], second: &[f64], between: &[f64]) -> f64 {
-    let half = |values: &[f64]| {
-        let count = values.len().isqrt();
-        let eigen = DMatrix::from_row_slice(count, count, values).symmetric_eigen();
-        let root = eigen.eigenvalues.map(|value| if value > VISIBLE { value.sqrt().recip() } else { 0.0 });
-        eigen.eigenvectors * DMatrix::from_diagonal(&root)
-    };
-    let (first, second) = (half(first), half(second));
+    correlation_above(&whitening(first), &whitening(second), between, 0.0)
+}
+
+/// Returns R_g^-1/2 of a group with the cofactor matrix R_g, given row by row.
+pub fn whitening(cofactors: &[f64]) -> DMatrix<f64> {
+    let count = cofactors.len().isqrt();
+    let eigen = DMatrix::from_row_slice(count, count, cofactors).symmetric_eigen();
+    let root = eigen.eigenvalues.map(|value| if value > VISIBLE { value.sqrt().recip() } else { 0.0 });
+    eigen.eigenvectors * DMatrix::from_diagonal(&root)
+}
+
+/// Returns the canonical correlation of two groups, from R_g^-1/2 and R_h^-1/2; 0 if it cannot exceed a limit, because the sum of squares of
+/// all singular values does not.
+pub fn correlation_above(first: &DMatrix<f64>, second: &DMatrix<f64>, between: &[f64], limit: f64) -> f64 {
     let between = DMatrix::from_row_slice(first.nrows(), second.nrows(), between);
-    (first.tr_mul(&between) * second).singular_values().max().min(1.0)
+    let matrix = first.tr_mul(&between) * second;
+    if matrix.norm_squared() <= limit * limit { 0.0 } else { matrix.singular_values().max().min(1.0) }
 }
 
 #[cfg(test)]

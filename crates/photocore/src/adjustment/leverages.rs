@@ -32,6 +32,7 @@ pub struct Leverages {
     /// Cofactors, including leverage matrices of groups.
     pub cofactors: Cofactors,
     selected: SelectedInverse,
+    linearized: Option<Linearized>,
 }
 
 /// Cofactors of the equations a of a tie, included or excluded.
@@ -48,7 +49,10 @@ impl Leverages {
     pub fn of(adjustment: &mut Adjustment, values: &[f64]) -> Option<Self> {
         let (selected, cofactors) = (adjustment.selected.take()?, adjustment.cofactors.take()?);
         let residuals = std::mem::take(&mut adjustment.residuals);
-        Some(Self { values: values.to_vec(), held: adjustment.datum.clone(), residuals, cofactors, selected })
+        let values = values.to_vec();
+        let copied = adjustment.linearized.take();
+        let linearized = copied.map(|own| Linearized { values: values.clone(), ..own });
+        Some(Self { values, held: adjustment.datum.clone(), residuals, cofactors, selected, linearized })
     }
 
     /// Linearizes and inverts a problem at given values with some unknowns constrained.
@@ -68,11 +72,18 @@ impl Leverages {
         let forming = FactorOptions::UNCACHED;
         let formed =
             Linearized::of(&equations, values, held, &forming, threads, &mut between)?.determined()?;
+        let copied = formed.copied();
         let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
         let found = formed.invert(&equations, &inverting, threads, &mut between)?;
         let Inverted { values, held, cofactors, selected, .. } = found;
         let residuals = problem.residuals(threads, &values);
-        Ok(Self { values, held, residuals, cofactors, selected })
+        let linearized = copied.map(|own| Linearized { values: values.clone(), ..own });
+        Ok(Self { values, held, residuals, cofactors, selected, linearized })
+    }
+
+    /// The factored normal equations, which solve for retained unknowns; None if they must be formed again.
+    pub fn linearized(&self) -> Option<&Linearized> {
+        self.linearized.as_ref()
     }
 
     /// Weighted sum of squares of the included observations.

@@ -17,6 +17,9 @@ use crate::normals::{
     SelectedInverse, SolveOptions,
 };
 
+/// Size of the largest factor that is copied for hypotheses before it is inverted, in bytes.
+const COPIED: usize = 64 << 20;
+
 /// Factored normal equations of a problem at given values, in the datum of the constrained unknowns or any other.
 #[derive(Debug)]
 pub struct Linearized {
@@ -115,6 +118,23 @@ impl Linearized {
             basis: None,
             transformation: None,
             seconds,
+        })
+    }
+
+    /// A copy whose factor solves for retained unknowns, at the values of a negligible step later; None if it is large, because forming the
+    /// normal equations again takes time, but no memory.
+    pub(super) fn copied(&self) -> Option<Self> {
+        let is_small = self.factor.bytes() <= COPIED;
+        is_small.then(|| Self {
+            values: vec![],
+            held: self.held.clone(),
+            reweighting: self.reweighting,
+            prior: self.prior.clone(),
+            factor: self.factor.clone(),
+            sum_of_squares: self.sum_of_squares,
+            basis: None,
+            transformation: None,
+            seconds: Seconds::default(),
         })
     }
 

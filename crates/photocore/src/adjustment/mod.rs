@@ -89,14 +89,17 @@ mod transformation;
 mod trust_region;
 mod walk;
 
-pub use additional::{Additional, AdditionalParameters, Equation, EquationOf};
+pub use additional::{Additional, AdditionalParameters, Equation, EquationOf, Shared};
 pub use damped::step_rules;
 pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
 };
-pub use group_test::{Few, GroupTest, VISIBLE, canonical_correlation, leverage_odds, may_correlate};
+pub use group_test::{
+    Few, GroupTest, VISIBLE, canonical_correlation, correlation_above, leverage_odds, may_correlate,
+    whitening,
+};
 pub use leverages::{Leverages, TieCofactors};
 pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::linearized::Linearized;
 use super::options::NEGLIGIBLE;
 use super::options::{Iteration, Status};
 use super::statistics::{Counts, Observed, square, standardized};
@@ -73,6 +74,8 @@ pub struct Adjustment {
     pub cofactors: Option<Cofactors>,
     /// The inverse from which they were computed, if tests of groups will follow.
     pub(super) selected: Option<SelectedInverse>,
+    /// The factor before it was inverted, if tests of groups will follow and it is small.
+    pub(super) linearized: Option<Linearized>,
     /// Cofactors of all pairs of the requested unknowns, row by row (see [`super::adjust_by_groups`]).
     pub joint: Option<Vec<f64>>,
     /// Reason for missing cofactors, if they were requested.

@@ -15,7 +15,7 @@ use super::predictions::OnPoint;
 use super::suspects::{Home, Suspects};
 use super::trial::Trial;
 use crate::adjustment::{
-    AdjustError, Linearized, ObservationRows, canonical_correlation, leverage_odds, may_correlate,
+    AdjustError, Linearized, ObservationRows, correlation_above, leverage_odds, may_correlate, whitening,
 };
 use crate::geometry::{AttitudeNumbers, Matrix3};
 use crate::{Threads, parallel};
@@ -339,13 +339,15 @@ impl Trial {
         let taking_part: Vec<usize> = (0..own.suspects.len()).filter(is_in).collect();
         let alone: Vec<Vec<f64>> = (0..own.suspects.len()).map(|k| block(k, k)).collect();
         let odds: Vec<f64> = alone.iter().map(|cofactors| leverage_odds(from_identity(cofactors))).collect();
+        let roots: Vec<DMatrix<f64>> = taking_part.iter().map(|&k| whitening(&alone[k])).collect();
         for (at, &j) in taking_part.iter().enumerate() {
-            for &i in taking_part[..at].iter().filter(|&&i| may_correlate(odds[i], odds[j], limit)) {
+            let others = taking_part[..at].iter().zip(&roots);
+            for (&i, root) in others.filter(|(i, _)| may_correlate(odds[**i], odds[j], limit)) {
                 let between = block(i, j);
                 if between.iter().any(|value| value.is_nan()) {
                     continue;
                 }
-                let rho = canonical_correlation(&alone[i], &alone[j], &between);
+                let rho = correlation_above(root, &roots[at], &between, limit);
                 if rho > limit {
                     found.push((own.suspects[i], own.suspects[j], rho));
                 }

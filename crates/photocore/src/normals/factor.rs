@@ -22,7 +22,7 @@ use crate::Threads;
 use crate::parallel::lock;
 
 /// Cholesky factor L of the reduced normal equations.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Factor {
     pub(super) panels: Panels,
     /// L^-1 n, in elimination order; for outer unknowns the reduced right-hand side.
@@ -287,6 +287,11 @@ impl Factor {
     /// Releases the cache of local eliminations.
     pub fn forget(&mut self) {
         self.eliminated = Vec::new();
+    }
+
+    /// Memory of its panels in bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.panels.values[..])
     }
 
     /// Returns the retained unknowns that a solution moves, ascending: shares of at least one tenth of the largest. Unknowns are scaled by

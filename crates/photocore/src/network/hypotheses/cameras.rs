@@ -2,7 +2,7 @@
 
 use super::super::trial::Trial;
 use super::catalogue::{Catalogue, put};
-use crate::adjustment::Equation;
+use crate::adjustment::{Equation, Shared};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{Camera, CameraModel};
 
@@ -74,6 +74,7 @@ impl Catalogue<'_> {
         &self,
         (image, local, row): (usize, usize, usize),
         equation: &Equation<'_>,
+        shared: &mut Shared,
         partials: &mut Vec<(usize, f64)>,
     ) {
         let observed = &self.bundle.images[image];
@@ -81,6 +82,18 @@ impl Catalogue<'_> {
         if columns.is_empty() || equation.sd.is_infinite() {
             return;
         }
+        if shared.group.replace(image) != Some(image) {
+            shared.values.clear();
+            self.write_camera_partials((image, local), &mut shared.values);
+        }
+        for (&(_, column), values) in columns.iter().zip(shared.values.chunks_exact(2)) {
+            put(partials, column, values[row] / equation.sd);
+        }
+    }
+
+    /// Appends the partials of both coordinates of an image by each tested parameter of its camera.
+    fn write_camera_partials(&self, (image, local): (usize, usize), values: &mut Vec<f64>) {
+        let observed = &self.bundle.images[image];
         let station = &self.stations.photos[observed.photo];
         let sight = match &self.stations.bent {
             Some(bent) => self.bundle.sight_bent((&self.stations, bent), image, local),
@@ -88,9 +101,9 @@ impl Catalogue<'_> {
         };
         each_camera!(&station.camera, camera => {
             let (_, computed) = camera.compare(&sight, observed.xy);
-            let by_parameters = computed.by_parameters[row].as_ref();
-            for &(parameter, column) in columns {
-                put(partials, column, by_parameters[parameter] / equation.sd);
+            let by_parameters = computed.by_parameters.each_ref().map(|row| row.as_ref());
+            for &(parameter, _) in &self.cameras[observed.photo] {
+                values.extend(by_parameters.map(|row| row[parameter]));
             }
         });
     }

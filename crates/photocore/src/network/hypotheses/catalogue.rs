@@ -8,7 +8,7 @@ use super::super::model::{Bundle, Owner};
 use super::super::stations::Stations;
 use super::super::trial::Trial;
 use super::facts::Facts;
-use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages};
+use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Shared};
 
 /// An error that a set of observations has in common.
 pub(super) struct Cause {
@@ -187,7 +187,7 @@ impl AdditionalParameters for Catalogue<'_> {
         Some(locals)
     }
 
-    fn partials(&self, equation: &Equation<'_>, partials: &mut Vec<(usize, f64)>) {
+    fn partials(&self, equation: &Equation<'_>, shared: &mut Shared, partials: &mut Vec<(usize, f64)>) {
         let image = self.image_of(equation.of);
         let seen = match equation.of {
             EquationOf::Unknown(unknown) => self.seen_by_itself(unknown),
@@ -214,7 +214,7 @@ impl AdditionalParameters for Catalogue<'_> {
             }
         }
         if let Some(image) = image {
-            self.camera_partials(image, equation, partials);
+            self.camera_partials(image, equation, shared, partials);
             self.shutter_partials(image, equation, partials);
         }
     }

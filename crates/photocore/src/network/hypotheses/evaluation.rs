@@ -47,10 +47,17 @@ impl Trial {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let go_on = &mut |_| ControlFlow::Continue(());
         let failed = |error| NetworkError::new(error, &self.assembled);
-        let (values, held) = (found.values.clone(), found.held.clone());
-        let linearized = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
+        let formed;
+        let linearized = match found.linearized() {
+            Some(own) => own,
+            None => {
+                let (values, held) = (found.values.clone(), found.held.clone());
+                formed = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
+                &formed
+            }
+        };
         let criteria = Criteria::new(facts);
-        let sample = Sample::new(self, found, &linearized, &facts.checks);
+        let sample = Sample::new(self, found, linearized, &facts.checks);
 
         let catalogue = catalogue(self, found, facts);
         let sums = linearized.additional(problem, &catalogue, threads);
@@ -102,7 +109,7 @@ impl Trial {
         };
         let pairs = (0..sets).flat_map(|i| (0..sets).map(move |j| (i, j)));
         let correlations = pairs.map(correlation).collect();
-        all.extend(single_errors(self, found, &linearized, &sample, (facts, &criteria), threads));
+        all.extend(single_errors(self, found, linearized, &sample, (facts, &criteria), threads));
         Ok(Hypotheses { all, sets, correlations })
     }
 }

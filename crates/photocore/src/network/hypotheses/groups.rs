@@ -12,7 +12,7 @@ use super::facts::Facts;
 use super::hypothesis::{About, Hypothesis};
 use super::judged::{Criteria, Judged};
 use crate::Threads;
-use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Linearized};
+use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Linearized, Shared};
 
 /// Size of an error that is reported if no error of any size is detected, in standard deviations of its observation.
 const LARGE: f64 = 1000.0;
@@ -136,7 +136,7 @@ impl AdditionalParameters for UnitErrors {
         Some(self.locals.clone())
     }
 
-    fn partials(&self, equation: &Equation<'_>, partials: &mut Vec<(usize, f64)>) {
+    fn partials(&self, equation: &Equation<'_>, _: &mut Shared, partials: &mut Vec<(usize, f64)>) {
         partials.extend(self.columns.get(&equation.of).into_iter().flatten());
     }
 }
