@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
@@ -9,19 +11,18 @@ from photogram.arguments.types import Floats, Indices
 
 def strips_of(positions: Floats) -> list[Indices]:
     """Divide photos at (P, 3) in metric axes, in order, into strips at curves and gaps."""
-    plan = positions[:, :2]
-    steps = np.linalg.norm(np.diff(plan, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(positions[:, :2], axis=0), axis=1)
     usual = float(np.median(steps)) if steps.size else 0.0
+    plan = [complex(x, y) for x, y in positions[:, :2].tolist()]
 
     def follows(before: int, start: int, next_: int, gaps: int) -> bool:
         step = plan[next_] - plan[before]
-        if np.linalg.norm(step) > 2.5 * gaps * usual:
+        if abs(step) > 2.5 * gaps * usual:
             return False
         course = plan[before] - plan[start]
         # Within 45 degrees of the course so far.
-        return before == start or bool(
-            step @ course > np.sqrt(0.5) * np.linalg.norm(step) * np.linalg.norm(course)
-        )
+        along = (step * course.conjugate()).real
+        return before == start or along > math.sqrt(0.5) * abs(step) * abs(course)
 
     strips: list[list[int]] = []
     last = 0

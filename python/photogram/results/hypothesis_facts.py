@@ -67,10 +67,11 @@ def block_facts(block: Block, places: Floats) -> Facts:
         facts |= {"times": times.tolist(), "timed": timed}
     if 1 < len(strips) <= MOST_SETS:
         facts["position_sets"] = sets.tolist()
-    control = np.isfinite(block.point_sd).any(axis=1)
-    _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
-    own = np.unique(kinds[control])
-    if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        set_of = {int(kind): k for k, kind in enumerate(own)}
-        facts["control_sets"] = [set_of.get(kind) for kind in kinds.tolist()]
+    control = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
+    _, kinds, sizes = np.unique(block.point_sd[control], axis=0, return_inverse=True, return_counts=True)
+    if 1 < len(sizes) <= MOST_SETS and (sizes > 1).all():
+        control_sets: list[int | None] = [None] * len(block.point_sd)
+        for point, kind in zip(control.tolist(), kinds.tolist(), strict=True):
+            control_sets[point] = kind
+        facts["control_sets"] = control_sets
     return facts

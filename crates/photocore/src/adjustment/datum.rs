@@ -112,7 +112,7 @@ pub fn moved_with_columns(
 }
 
 /// Rows of B for the carriers, and T = G (B^T G)^-1, with columns such that B without the factors is orthonormal.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Basis {
     carriers: Vec<usize>,
     b: Mat<f64>,

@@ -3,6 +3,7 @@
 //! Excluded observations have infinite standard deviations, so that their normal equations are zero. The pattern, order and symbolic
 //! factorisation are unchanged and include the cofactors of excluded observations.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use super::equations::ObservationEquations;
@@ -81,9 +82,20 @@ impl Leverages {
         Ok(Self { values, held, residuals, cofactors, selected, linearized })
     }
 
-    /// The factored normal equations, which solve for retained unknowns; None if they must be formed again.
-    pub fn linearized(&self) -> Option<&Linearized> {
-        self.linearized.as_ref()
+    /// Returns the factored normal equations, which solve for retained unknowns; they are formed again if the factor is large.
+    ///
+    /// # Errors
+    /// Lack of memory.
+    pub fn linearized(
+        &self,
+        problem: &AnyProblem<'_>,
+        threads: &Threads,
+    ) -> Result<Cow<'_, Linearized>, AdjustError> {
+        if let Some(own) = &self.linearized {
+            return Ok(Cow::Borrowed(own));
+        }
+        let (values, held, mut on) = (self.values.clone(), self.held.clone(), |_| ControlFlow::Continue(()));
+        Ok(Cow::Owned(Linearized::form(problem, None, values, held, threads, &mut on)?))
     }
 
     /// Weighted sum of squares of the included observations.
@@ -139,7 +151,7 @@ impl Leverages {
         Ok(found)
     }
 
-    /// Computes cofactors between groups of fixed local blocks from newly formed normal equations.
+    /// Computes cofactors between groups of fixed local blocks from the factor.
     fn put_together(
         &self,
         problem: &AnyProblem<'_>,
@@ -159,8 +171,7 @@ impl Leverages {
             return Ok(());
         }
         let (_, asked, _) = self.equations(problem, observation_sd, threads);
-        let (values, held, mut on) = (self.values.clone(), self.held.clone(), |_| ControlFlow::Continue(()));
-        let formed = Linearized::form(problem, None, values, held, threads, &mut on)?;
+        let (formed, mut on) = (self.linearized(problem, threads)?, |_| ControlFlow::Continue(()));
         for (place, local, chosen) in chosen {
             let own = &mut found[place];
             let mut functions = problem.system.local_functions(&asked, local);

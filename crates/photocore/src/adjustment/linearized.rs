@@ -21,7 +21,7 @@ use crate::normals::{
 const COPIED: usize = 64 << 20;
 
 /// Factored normal equations of a problem at given values, in the datum of the constrained unknowns or any other.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Linearized {
     pub(super) values: Vec<f64>,
     pub(super) held: Vec<usize>,
@@ -121,21 +121,9 @@ impl Linearized {
         })
     }
 
-    /// A copy whose factor solves for retained unknowns, at the values of a negligible step later; None if it is large, because forming the
-    /// normal equations again takes time, but no memory.
+    /// A copy for hypotheses; None if the factor is large, because forming the normal equations again takes time, but no memory.
     pub(super) fn copied(&self) -> Option<Self> {
-        let is_small = self.factor.bytes() <= COPIED;
-        is_small.then(|| Self {
-            values: vec![],
-            held: self.held.clone(),
-            reweighting: self.reweighting,
-            prior: self.prior.clone(),
-            factor: self.factor.clone(),
-            sum_of_squares: self.sum_of_squares,
-            basis: None,
-            transformation: None,
-            seconds: Seconds::default(),
-        })
+        (self.factor.bytes() <= COPIED).then(|| self.clone())
     }
 
     /// Returns the linearization point.

@@ -1,7 +1,5 @@
 //! The evaluation of all hypotheses of an adjusted network.
 
-use std::ops::ControlFlow;
-
 use nalgebra::DVector;
 
 use super::super::NetworkError;
@@ -14,7 +12,7 @@ use super::hypothesis::{About, Hypotheses, Hypothesis};
 use super::judged::{Criteria, Judged};
 use super::{attitudes, cameras, control, form, positions, shutter};
 use crate::Threads;
-use crate::adjustment::{Leverages, Linearized, canonical_correlation};
+use crate::adjustment::{Leverages, canonical_correlation};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 /// The errors of sets that are possible for a network.
@@ -45,19 +43,10 @@ impl Trial {
     /// Nothing was adjusted before; an interruption, no memory.
     pub fn hypotheses(&self, facts: &Facts, threads: &Threads) -> Result<Hypotheses, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
-        let go_on = &mut |_| ControlFlow::Continue(());
         let failed = |error| NetworkError::new(error, &self.assembled);
-        let formed;
-        let linearized = match found.linearized() {
-            Some(own) => own,
-            None => {
-                let (values, held) = (found.values.clone(), found.held.clone());
-                formed = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
-                &formed
-            }
-        };
+        let linearized = found.linearized(problem, threads).map_err(failed)?;
         let criteria = Criteria::new(facts);
-        let sample = Sample::new(self, found, linearized, &facts.checks);
+        let sample = Sample::new(self, found, &linearized, &facts.checks);
 
         let catalogue = catalogue(self, found, facts);
         let sums = linearized.additional(problem, &catalogue, threads);
@@ -109,7 +98,7 @@ impl Trial {
         };
         let pairs = (0..sets).flat_map(|i| (0..sets).map(move |j| (i, j)));
         let correlations = pairs.map(correlation).collect();
-        all.extend(single_errors(self, found, linearized, &sample, (facts, &criteria), threads));
+        all.extend(single_errors(self, found, &linearized, &sample, (facts, &criteria), threads));
         Ok(Hypotheses { all, sets, correlations })
     }
 }
