@@ -110,7 +110,7 @@ impl Column {
         // Writing to memory cannot fail.
         let _ = match self {
             Self::Floats(column) if column[row].is_nan() => Ok(()),
-            Self::Floats(column) => write!(to, "{:?}", column[row]),
+            Self::Floats(column) => to.write_all(zmij::Buffer::new().format(column[row]).as_bytes()),
             Self::Integers(column) => write!(to, "{}", column[row]),
             Self::Truths(column) => write!(to, "{}", column[row]),
             Self::Texts(column) => column[row].as_deref().map_or(Ok(()), |text| write_text(text, to)),
