@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, Panel, band, bars, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Names, Panel, band, bars, level, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
@@ -79,7 +79,7 @@ def _histogram(values: Floats, unit_weight: float) -> Panel:
         "test value w",
         "density",
         notes=[f"{beyond:,} test values lie beyond ±{reach:.1f}" if beyond else ""],
-        legend="upper right",
+        legend="best",
     )
 
 
@@ -107,7 +107,7 @@ def _quantiles(values: Floats, marked: Bools, worst: list[tuple[float, str]], un
     if beyond.any():
         label = f"outliers of the verdict ({int(marked.sum()):,})"
         marks.append(Markers(places[beyond], "D", 4.0, MARKED, label=label))
-    marks += [Level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
+    marks += [level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
     if worst:
         sizes, names = zip(*worst, strict=True)
         at = normal_quantiles((np.minimum(np.searchsorted(every, sizes), n - 1) + 0.5) / n)
@@ -119,7 +119,7 @@ def _quantiles(values: Floats, marked: Bools, worst: list[tuple[float, str]], un
         f"Quantiles: limit of {n:,} tests ±{limit:.2f} (dotted)",
         "normal quantile",
         "test value w",
-        legend="lower right",
+        legend="best",
     )
 
 

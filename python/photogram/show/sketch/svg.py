@@ -8,12 +8,11 @@ import numpy as np
 
 from photogram.show.sketch import layout
 from photogram.show.sketch.layout import COLOUR_BAR, GAP, LABEL, LEGEND, LEGEND_LINE, NUMBER, SWATCH, Placed
-from photogram.show.sketch.letters import Box, ticks, widest, width
+from photogram.show.sketch.letters import Box, ticks, widest
 from photogram.show.sketch.marks import Labelled, Panel, Shades, Sketch, hexadecimal, stops
 from photogram.show.sketch.svg_marks import (
     Attributes,
     element,
-    levels_written,
     names,
     number,
     path,
@@ -60,8 +59,7 @@ def _panel(placed: Placed, name: str) -> str:
     marks = "".join(svg(mark, placed) for mark in sorted(panel.marks, key=lambda each: each.layer))
     legend, taken = _legend(placed)
     inside = element("g", marks, clip_path=f"url(#{name}-clip)") if marks else ""
-    written = levels_written(placed, taken)
-    words = [_axes(placed), _above(placed), written, legend, names(placed, taken)]
+    words = [_axes(placed), _above(placed), legend, names(placed, taken)]
     if placed.notes:
         heights = (low + placed.below + layout.NOTE_LINE * (k + 0.8) for k in range(len(placed.notes)))
         lines = (text(left, y, line) for y, line in zip(heights, placed.notes, strict=True))
@@ -78,8 +76,8 @@ def _axes(placed: Placed) -> str:
     found = []
     if not panel.bare:
         lines = f"M{number(left)} {number(top)}V{number(low)}H{number(right)}"
-        lines += "".join(f"M{x:.2f} {low:.2f}v{TICK_LENGTH}" for x in over)
-        lines += "".join(f"M{left:.2f} {y:.2f}h-{TICK_LENGTH}" for y in beside)
+        lines += "".join(f"M{number(x)} {number(low)}v{TICK_LENGTH}" for x in over)
+        lines += "".join(f"M{number(left)} {number(y)}h-{TICK_LENGTH}" for y in beside)
         found.append(path(lines, fill="none", stroke=FAINT, stroke_width=0.8))
     if placed.numbered:
         found.append(_across(placed, over))
@@ -87,7 +85,7 @@ def _axes(placed: Placed) -> str:
     numbers = "".join(text(left - 6.0, y + 0.36 * NUMBER, each) for y, each in rows)
     found.append(element("g", numbers, text_anchor="end"))
     if panel.across:
-        name, down = placed.across.named(panel.across), low + placed.axis_below - 5.0
+        name, down = placed.across.named(panel.across), low + placed.below - 5.0
         found.append(text(0.5 * (left + right), down, name, **NAMED))
     if name := placed.up.named(panel.up):
         x, y = left - 12.0 - placed.beside, 0.5 * (top + low)
@@ -124,15 +122,9 @@ def _legend(placed: Placed) -> tuple[str, list[Box]]:
     marks, where = placed.panel.labelled, placed.panel.legend
     if not where or not marks:
         return "", []
-    if where == "above":
-        found, x, y = [], placed.box[2], placed.box[1] - 6.0 - 0.5 * LEGEND_LINE
-        for mark in reversed(marks):
-            x -= SWATCH + 6.0 + width(mark.label, LEGEND) + GAP
-            found.append(_entry(mark, x, y))
-        return "".join(found), []
     box = placed.legend
     entries = [_entry(mark, box[0], box[1] + LEGEND_LINE * (k + 0.5)) for k, mark in enumerate(marks)]
-    if where not in ("beside", "below"):
+    if where != "beside":
         entries.insert(0, element("rect", **place(*box), fill="white", opacity=0.85))
     return "".join(entries), [box]
 
@@ -156,7 +148,7 @@ def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
     found = [element("linearGradient", "".join(steps), id=name, x1=0.0, x2=0.0, y1=1.0, y2=0.0)]
     found.append(element("rect", **place(left, top, right, low), fill=f"url(#{name})"))
     ends, decimal = np.array([shades.low, shades.high]), beside[0].panel.decimal
-    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log).signed(decimal)
+    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log, decimal=decimal)
     heights = low - shades.parts(given.values) * (low - top)
     for y, value in zip(heights.tolist(), given.texts, strict=True):
         found.append(path(f"M{number(right)} {number(y)}h{TICK_LENGTH}", stroke=FAINT, stroke_width=0.8))
