@@ -254,21 +254,18 @@ def _comparison(patterns: Sequence[Pattern]) -> Table:
 
 def _size(patterns: Sequence[Pattern]) -> Table:
     linear = patterns[0].block.linear_unit
-    names = (
-        *("Photos", "New points", "Control points", "Points left out", "Image points"),
-        f"1 mm in the photo on the ground, {linear}",
-        f"sd of image coordinates on the ground, {linear}",
-    )
-    columns = [Quantity(names, kind="name", head=" ")]
-    for pattern in patterns:
-        result, new = pattern.result, pattern.new_points
-        counts = (
-            *(len(pattern.block.photo_ids), new.sum(), (result.used_points & ~new).sum()),
-            *(len(result.dropped), result.used_images.sum()),
-        )
-        sizes = significant(pattern.scale), significant(pattern.unit, 3)
-        columns.append(Quantity([*map(str, counts), *sizes], head=pattern.name))
-    return Table("", "How much", columns)
+    rows = {
+        "Photos": [len(each.block.photo_ids) for each in patterns],
+        "New points": [each.new_points.sum() for each in patterns],
+        "Control points": [(each.result.used_points & ~each.new_points).sum() for each in patterns],
+        "Points left out": [len(each.result.dropped) for each in patterns],
+        "Image points": [each.result.used_images.sum() for each in patterns],
+        f"1 mm in the photo on the ground, {linear}": [significant(each.scale) for each in patterns],
+        f"sd of image coordinates on the ground, {linear}": [significant(each.unit, 3) for each in patterns],
+    }
+    values = np.array([*rows.values()], dtype=str).T
+    columns = [Quantity(own, head=each.name) for each, own in zip(patterns, values, strict=True)]
+    return Table("", "How much", [Quantity([*rows], kind="name", head=" "), *columns])
 
 
 def advice(patterns: Sequence[Pattern]) -> list[Phrase]:

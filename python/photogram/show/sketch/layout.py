@@ -49,7 +49,6 @@ class Placed:
 
     @property
     def scale(self) -> float:
-        """Points of a unit across."""
         return (self.box[2] - self.box[0]) / float(abs(self.panel.limits[1, 0] - self.panel.limits[0, 0]))
 
     @property
@@ -105,7 +104,6 @@ class Placed:
 
 
 def heading(sketch: Sketch) -> list[str]:
-    """Return the lines of the title of all panels."""
     return wrapped(sketch.title, HEAD, 72.0 * sketch.width - GAP)
 
 
@@ -184,7 +182,6 @@ def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
 
 
 def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
-    """Return width and height of a box within limits."""
     if not panel.equal:
         return wide, high
     across, up = np.abs(panel.limits[1] - panel.limits[0]).tolist()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -85,7 +85,6 @@ def free_names(
 
 
 def overlap(one: Box, other: Box) -> bool:
-    """Return whether two boxes overlap."""
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
@@ -126,10 +125,10 @@ def ticks(
     return ends if fit else _written(ends.values[:1], (high - low) / 100.0, decimal)
 
 
-def _candidates(low: float, high: float, log: bool) -> Iterator[tuple[Floats, float]]:
+def _candidates(low: float, high: float, log: bool) -> Iterator[tuple[Any, float]]:
     """Yield values between limits with their step, many first; ratios have the step 0."""
     if log:
-        powers: Floats = 10.0 ** np.arange(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+        powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
         for steps in ((1.0, 2.0, 5.0), (1.0, 5.0), (1.0,)):
             every = np.outer(powers, steps).ravel()
             yield every[(every >= low * (1 - 1e-9)) & (every <= high * (1 + 1e-9))], 0.0

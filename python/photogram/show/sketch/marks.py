@@ -47,7 +47,6 @@ class Shades:
         return (values - self.low) / (self.high - self.low)
 
     def values(self, parts: Floats) -> Floats:
-        """Return the values at relative positions."""
         if self.log:
             return np.asarray(self.low * (self.high / self.low) ** parts)
         return self.low + (self.high - self.low) * parts
@@ -82,7 +81,6 @@ class Line(Labelled):
 
     @property
     def lines(self) -> Sequence[Floats]:
-        """The points of each line."""
         places = self.places
         return [places] if isinstance(places, np.ndarray) and places.ndim == 2 else [*places]
 
@@ -219,7 +217,6 @@ def rgb(shades: Shades, values: Floats) -> Indices:
 
 
 def hexadecimal(colour: Indices) -> str:
-    """Return red, green and blue in hexadecimal notation."""
     return "#{:02x}{:02x}{:02x}".format(*colour.tolist())
 
 
@@ -300,7 +297,6 @@ class Panel:
 
     @property
     def labelled(self) -> list[Labelled]:
-        """Marks in the legend."""
         return [mark for mark in self.marks if isinstance(mark, Labelled) and mark.label]
 
     def even(self, places: Floats) -> Floats:
@@ -324,12 +320,10 @@ class Sketch:
 
     @property
     def rows(self) -> int:
-        """Number of rows of panels."""
         return -(-len(self.panels) // self.columns)
 
 
 def spread(*values: Floats | float) -> tuple[float, float]:
-    """Return limits with a margin around finite values."""
     every = np.concatenate([np.ravel(each) for each in values])
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 0.0)

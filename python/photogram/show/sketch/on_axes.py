@@ -132,7 +132,6 @@ def _colours(shades: marks.Shades) -> dict[str, Any]:
 
 
 def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
-    """Write names near their points, without overlaps."""
     named = [(axes, mark) for axes, panel in drawn for mark in panel.marks if isinstance(mark, marks.Names)]
     # Legends and axes with equal scales have their final positions in the second layout.
     for axes, _ in named[:1] * 2:
@@ -150,7 +149,6 @@ def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
 
 
 def lay_out(whole: Any) -> None:
-    """Compute the final positions of axes and legends of a figure."""
     whole = whole.canvas.figure
     if (engine := whole.get_layout_engine()) is not None:
         engine.execute(whole)

@@ -20,7 +20,6 @@ from photogram.show.sketch.svg_marks import (
     sample,
     svg,
     text,
-    upwards,
 )
 from photogram.show.style import FAINT, INK, SETTINGS
 
@@ -86,26 +85,24 @@ def _axes(placed: Placed) -> str:
     found.append(element("g", numbers, text_anchor="end"))
     if panel.across:
         name, down = placed.across.named(panel.across), low + placed.below - 5.0
-        found.append(text(0.5 * (left + right), down, name, **NAMED))
+        found.append(text(0.5 * (left + right), down, name, turned=False, **NAMED))
     if name := placed.up.named(panel.up):
         x, y = left - 12.0 - placed.beside, 0.5 * (top + low)
-        found.append(text(x, y, name, **NAMED, transform=upwards(x, y)))
+        found.append(text(x, y, name, turned=True, **NAMED))
     return "".join(found)
 
 
 def _across(placed: Placed, places: Sequence[float]) -> str:
-    """Return numbers or names below an axis."""
     rows, low = zip(places, placed.across.texts, strict=True), placed.box[3]
     if not placed.panel.turned:
         level = "".join(text(x, low + NUMBER + 4.0, each) for x, each in rows)
         return element("g", level, text_anchor="middle")
     y = low + 5.0
-    turned = "".join(text(x, y, each, transform=upwards(x, y), dy=0.36 * NUMBER) for x, each in rows)
+    turned = "".join(text(x, y, each, turned=True, dy=0.36 * NUMBER) for x, each in rows)
     return element("g", turned, text_anchor="end")
 
 
 def _above(placed: Placed) -> str:
-    """Return title and scale bars above a box."""
     panel, (left, top, _, _) = placed.panel, placed.box
     first, found = top - placed.above - 3.0, []
     for k, line in enumerate(placed.title, 1):
@@ -118,7 +115,6 @@ def _above(placed: Placed) -> str:
 
 
 def _legend(placed: Placed) -> tuple[str, list[Box]]:
-    """Return a legend and its boxes."""
     marks, where = placed.panel.labelled, placed.panel.legend
     if not where or not marks:
         return "", []
@@ -154,5 +150,5 @@ def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
         found.append(path(f"M{number(right)} {number(y)}h{TICK_LENGTH}", stroke=FAINT, stroke_width=0.8))
         found.append(text(right + 6.0, y + 0.36 * NUMBER, value, fill=INK))
     x, y = left + COLOUR_BAR - 8.0, 0.5 * (top + low)
-    found.append(text(x, y, shades.label, **NAMED, fill=INK, transform=upwards(x, y)))
+    found.append(text(x, y, shades.label, turned=True, **NAMED, fill=INK))
     return "".join(found)

@@ -43,13 +43,13 @@ def element(name: str, content: str = "", /, **attributes: str | float) -> str:
 
 
 def number(value: float) -> str:
-    """Return a number with at most two decimals."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 
-def text(x: float, y: float, words: str, **attributes: str | float) -> str:
-    """Return text that begins at a point, or as in `text_anchor`."""
-    return element("text", escape(words), x=x, y=y, **attributes)
+def text(x: float, y: float, words: str, turned: bool = False, **attributes: str | float) -> str:
+    """Return text that begins at a point, or as in `text_anchor`; upwards if `turned`."""
+    rotation = f"rotate(-90 {number(x)} {number(y)})" if turned else ""
+    return element("text", escape(words), x=x, y=y, **attributes, transform=rotation)
 
 
 def path(data: str, **attributes: str | float) -> str:
@@ -58,13 +58,7 @@ def path(data: str, **attributes: str | float) -> str:
 
 
 def place(left: float, top: float, right: float, low: float) -> Attributes:
-    """Return the attributes of a rectangle."""
     return {"x": left, "y": top, "width": right - left, "height": low - top}
-
-
-def upwards(x: float, y: float) -> str:
-    """Return the rotation of upward text at a point."""
-    return f"rotate(-90 {number(x)} {number(y)})"
 
 
 def joined(places: Floats, end: str = "") -> str:
