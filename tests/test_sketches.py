@@ -16,9 +16,7 @@ from photogram.lazy_dataclasses import fields
 from photogram.show.sketch.layout import laid_out
 from photogram.show.sketch.letters import ticks, width, wrapped
 from photogram.show.sketch.marks import (
-    Contours,
     Ellipses,
-    Level,
     Markers,
     Mesh,
     Names,
@@ -26,6 +24,8 @@ from photogram.show.sketch.marks import (
     Shades,
     Sketch,
     Texts,
+    contours,
+    level,
     rgb,
 )
 from photogram.show.sketch.svg import svg_of
@@ -233,10 +233,9 @@ def test_contours_have_the_colours_between_their_levels_and_say_these():
     x, y = np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 21)
     values = np.where(x < 0.5, np.nan, np.repeat(10.0 ** x[np.newaxis], 21, axis=0))
     shades = Shades(1.0, 100.0, "", log=True)
-    mark = Contours(x, y, values, np.array([1.0, 10.0, 100.0]), shades, steps=2)
-    assert mark.bounds == pytest.approx(10.0 ** np.array([0.0, 0.5, 1.0, 1.5, 2.0]))
-    placed = placed_on([[0.0, 0.0], [2.0, 1.0]], [mark])
-    drawn = svg(mark, placed)
+    made = contours(x, y, values, np.array([1.0, 10.0, 100.0]), shades, steps=2)
+    placed = placed_on([[0.0, 0.0], [2.0, 1.0]], made)
+    drawn = "".join(svg(mark, placed) for mark in made)
     colours = re.findall(r'fill="(#\w+)"', drawn)
     middles = rgb(shades, 10.0 ** np.array([0.25, 0.75, 1.25, 1.75]))
     assert colours == ["#{:02x}{:02x}{:02x}".format(*each) for each in middles.tolist()]
@@ -255,7 +254,7 @@ def test_equal_ratios_are_equally_long_along_logarithmic_axes():
 
 def test_names_of_panels_below_each_other_are_aligned():
     panels = [
-        Panel(np.array([[0.0, 0.0], [1.0, top]]), [Level(0.0, "black")], up=f"up {top}")
+        Panel(np.array([[0.0, 0.0], [1.0, top]]), [level(0.0, "black")], up=f"up {top}")
         for top in (1.0, 123456.0)
     ]
     drawn = svg_of(Sketch(5.0, 6.0, panels, 1), "name", "")
@@ -263,6 +262,6 @@ def test_names_of_panels_below_each_other_are_aligned():
     assert places[0] == places[1]
 
 
-@pytest.mark.parametrize("mark", [Level, Ellipses, Mesh, Texts, Names, Contours])
+@pytest.mark.parametrize("mark", [Ellipses, Mesh, Texts, Names])
 def test_marks_of_which_a_legend_shows_nothing_have_no_label(mark):
     assert "label" not in {each.name for each in fields(mark)}

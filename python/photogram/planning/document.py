@@ -46,23 +46,23 @@ IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
 MOTION_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
 _PANEL_INCHES = 6.0  # Longer side of a panel
 _MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
-_KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s"))
 
 
 def plan_document(patterns: Sequence[Pattern]) -> Document:
     """Return the document of a plan."""
     title = "Expected standard deviation in height"
     drawing = Drawing("picture-plan", title, about("plan.caption"), partial(plan_sketch, patterns))
-    new = any(pattern.new_points.any() for pattern in patterns)
+    new = [pattern.new_points.any() for pattern in patterns]
+    headline = _judgement(patterns) if all(new) else phrase("plan.compared.none")
     return Document(
         what="Prediction of a network before it is flown",
         title=patterns[0].block.title,
-        judgements=[Judgement("Prediction", str(_comparison(patterns)))],
+        judgements=[Judgement("Prediction", str(headline))],
         advice=advice(patterns),
         highlights=_highlights(patterns),
         sections=[
-            Section("network", "Plan of the network", [drawing] if new else []),
-            _comparison_section(patterns),
+            Section("network", "Plan of the network", [drawing] if any(new) else []),
+            Section("comparison", "Side by side", [_comparison(patterns)] if all(new) else []),
             Section("size", "How much", [_size(patterns)]),
             _layers("points", "New points", patterns, _points, about("plan.points")),
             _layers("photos", "Photos", patterns, _photos),
@@ -147,39 +147,36 @@ def _multiples(pattern: Pattern) -> Table:
 
 
 def _photos(pattern: Pattern) -> Table:
-    turned = ("omega", "phi", "kappa")
-    axes = [Axis.of(name, pattern.block.linear_unit) for name in pattern.axes] + [*map(Axis.turned, turned)]
+    turned = map(Axis.turned, ("omega", "phi", "kappa"))
+    axes = [*(Axis.of(name, pattern.block.linear_unit) for name in pattern.axes), *turned]
     redundancy = of_each(pattern.photos, "redundancy", head="Mean redundancy of weighted values", decimals=3)
-    rms, largest = ([getattr(each, name) for each in pattern.photos] for name in ("rms_sd", "max_sd"))
-    return _deviations(pattern, axes, rms, largest, redundancy)
+    return _deviations(pattern, axes, [(each.rms_sd, each.max_sd) for each in pattern.photos], redundancy)
 
 
 def _motion(pattern: Pattern) -> Table:
-    known, linear = pattern.known_rms_sd or (), pattern.block.linear_unit
     units = [MOTION_UNITS.get(each.unit, (each.unit, 1.0)) for each in pattern.motion]
     axes = [
         Axis(each.unknown, small=unit, factor=factor)
         for each, (unit, factor) in zip(pattern.motion, units, strict=True)
     ]
-    if known:
-        axes += [
-            Axis.of(f"{axis} of new points if the readout time is known", linear) for axis in pattern.axes
-        ]
-    rms = [*(each.rms_sd for each in pattern.motion), *known]
-    largest = [*(each.max_sd for each in pattern.motion), *(np.nan for _ in known)]
-    better = [*(None for _ in pattern.motion), *(_improvements(pattern) if known else ())]
-    return _deviations(pattern, axes, rms, largest, Quantity(better, head="Times better", decimals=2))
+    sd = [(each.rms_sd, each.max_sd) for each in pattern.motion]
+    better = [*(None for _ in pattern.motion), *_improvements(pattern)]
+    for axis, known in zip(pattern.axes, pattern.known_rms_sd or (), strict=False):
+        name = f"{axis} of new points if the readout time is known"
+        axes.append(Axis.of(name, pattern.block.linear_unit))
+        sd.append((known, np.nan))
+    return _deviations(pattern, axes, sd, Quantity(better, head="Times better", decimals=2))
 
 
 def _deviations(
-    pattern: Pattern, axes: Sequence[Axis], rms: Sequence[float], largest: Sequence[float], more: Quantity
+    pattern: Pattern, axes: Sequence[Axis], sd: Sequence[tuple[float, float]], more: Quantity
 ) -> Table:
     """Return a table with one row per unknown and its unit."""
-    own, of = tuple(axes), np.arange(len(axes))
+    own, of, (rms, largest) = tuple(axes), np.arange(len(axes)), np.reshape(sd, (-1, 2)).T
     columns = [
         replace(component(own, of)[0], head="Unknown"),
-        Quantity(np.array(rms), own, "deviation", head="rms sd", of=of),
-        Quantity(np.array(largest), own, "deviation", head="Largest sd", of=of),
+        Quantity(rms, own, "deviation", head="rms sd", of=of),
+        Quantity(largest, own, "deviation", head="Largest sd", of=of),
         more,
     ]
     return Table("", pattern.name, columns)
@@ -216,9 +213,7 @@ def _layers(
     return Section(key, title, layered_tables(key, tables), intro)
 
 
-def _comparison(patterns: Sequence[Pattern]) -> Phrase:
-    if not all(pattern.new_points.any() for pattern in patterns):
-        return phrase("plan.compared.none")
+def _judgement(patterns: Sequence[Pattern]) -> Phrase:
     heights = {pattern.name: pattern.points[-1].rms_sd[2] for pattern in patterns}
     best, worst = min(heights, key=heights.__getitem__), max(heights, key=heights.__getitem__)
     figures = {"rms": significant(heights[best], 3), "unit": patterns[0].block.linear_unit}
@@ -240,9 +235,7 @@ def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
     return [*facts, Fact("An image error on the ground", error, unit, "standard deviation, mean of all")]
 
 
-def _comparison_section(patterns: Sequence[Pattern]) -> Section:
-    if not all(pattern.new_points.any() for pattern in patterns):
-        return Section("comparison", "Side by side", [])
+def _comparison(patterns: Sequence[Pattern]) -> Table:
     unit, names = patterns[0].block.linear_unit, [pattern.name for pattern in patterns]
     groups = [pattern.points[-1] for pattern in patterns]
     sd = np.array([np.ravel([group.rms_sd, group.max_sd], order="F") for group in groups])
@@ -256,26 +249,23 @@ def _comparison_section(patterns: Sequence[Pattern]) -> Section:
         Quantity(best, kind="name", head="Best"),
         Quantity(ratios, head="Largest over smallest", decimals=2),
     ]
-    return Section("comparison", "Side by side", [Table("", "All new points", columns)])
+    return Table("", "All new points", columns)
 
 
 def _size(patterns: Sequence[Pattern]) -> Table:
     linear = patterns[0].block.linear_unit
-    names = (
-        *("Photos", "New points", "Control points", "Points left out", "Image points"),
-        f"1 mm in the photo on the ground, {linear}",
-        f"sd of image coordinates on the ground, {linear}",
-    )
-    columns = [Quantity(names, kind="name", head=" ")]
-    for pattern in patterns:
-        result, new = pattern.result, pattern.new_points
-        counts = (
-            *(len(pattern.block.photo_ids), new.sum(), (result.used_points & ~new).sum()),
-            *(len(result.dropped), result.used_images.sum()),
-        )
-        sizes = significant(pattern.scale), significant(pattern.unit, 3)
-        columns.append(Quantity([*map(str, counts), *sizes], head=pattern.name))
-    return Table("", "How much", columns)
+    rows = {
+        "Photos": [len(each.block.photo_ids) for each in patterns],
+        "New points": [each.new_points.sum() for each in patterns],
+        "Control points": [(each.result.used_points & ~each.new_points).sum() for each in patterns],
+        "Points left out": [len(each.result.dropped) for each in patterns],
+        "Image points": [each.result.used_images.sum() for each in patterns],
+        f"1 mm in the photo on the ground, {linear}": [significant(each.scale) for each in patterns],
+        f"sd of image coordinates on the ground, {linear}": [significant(each.unit, 3) for each in patterns],
+    }
+    values = np.array([*rows.values()], dtype=str).T
+    columns = [Quantity(own, head=each.name) for each, own in zip(patterns, values, strict=True)]
+    return Table("", "How much", [Quantity([*rows], kind="name", head=" "), *columns])
 
 
 def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
@@ -283,8 +273,7 @@ def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
     phrases = []
     for pattern in patterns:
         of_pattern = partial(phrase, pattern=pattern.name)
-        unchecked = pattern.points[-1].unchecked
-        if pattern.new_points.any() and unchecked > MAX_UNCHECKED:
+        if (unchecked := pattern.points[-1].unchecked) > MAX_UNCHECKED:  # NaN without new points
             phrases.append(of_pattern("plan.unchecked", percent=100 * unchecked))
         weak = [each.component for each in pattern.control if each.held and each.redundancy < MIN_REDUNDANCY]
         if weak:
@@ -299,18 +288,15 @@ def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
             ]
             if assumed := found.assumed(FEWEST):
                 phrases.append(of_pattern("plan.assumed", errors=assumed))
-        readout = [quality for quality in pattern.motion if quality.unit == "s"]
-        ratio = max(_improvements(pattern))
-        if readout and ratio > MIN_IMPROVEMENT:
-            phrases.append(of_pattern("plan.readout", sd=1e3 * readout[0].rms_sd, ratio=ratio))
+        if (ratio := max(_improvements(pattern), default=1.0)) > MIN_IMPROVEMENT:
+            sd = next(quality.rms_sd for quality in pattern.motion if quality.unit == "s")
+            phrases.append(of_pattern("plan.readout", sd=1e3 * sd, ratio=ratio))
     return phrases
 
 
 def _improvements(pattern: Pattern) -> list[float]:
-    known = pattern.known_rms_sd
-    if known is None:
-        return [1.0]
-    return [sd / better for sd, better in zip(pattern.points[-1].rms_sd, known, strict=True)]
+    known = pattern.known_rms_sd or ()
+    return [sd / better for sd, better in zip(pattern.points[-1].rms_sd, known, strict=False)]
 
 
 def _remarks(patterns: Sequence[Pattern]) -> list[str]:
@@ -336,9 +322,10 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
     label = f"expected standard deviation in height, {patterns[0].block.linear_unit}"
     shades = Shades(float(heights.min()), float(heights.max()), label)
     panels = [_panel(pattern, limits, shades) for pattern in patterns]
+    # The legend beside the last panel names the control of all panels.
     known = {mark.label for mark in panels[-1].labelled}
-    every = {mark.label: mark for panel in panels for mark in panel.labelled if isinstance(mark, Markers)}
-    more = [replace(mark, places=NOWHERE) for label, mark in every.items() if label not in known]
+    labelled = {mark.label: mark for panel in panels for mark in panel.marks if isinstance(mark, Markers)}
+    more = [replace(mark, places=NOWHERE) for label, mark in labelled.items() if label not in {"", *known}]
     panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside")
     width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()
     stacked = width > _MAX_SIDE_BY_SIDE * height
@@ -360,12 +347,13 @@ def _panel(pattern: Pattern, limits: Floats, shades: Shades) -> Panel:
     ]
     held = np.isfinite(pattern.block.point_sd) & pattern.result.used_points[:, np.newaxis]
     plane, height = held[:, :2].any(axis=1), held[:, 2]
-    chosen = plane & height, height & ~plane, plane & ~height
-    marks += [
-        Markers(plan[rows], shape, 7.7, VERMILION, "white", 1.6, label=name)
-        for (name, shape), rows in zip(_KINDS, chosen, strict=True)
-        if rows.any()
-    ]
+    for name, shape, rows in (
+        ("full control", "^", plane & height),
+        ("height control", "o", height & ~plane),
+        ("plane control", "s", plane & ~height),
+    ):
+        if rows.any():
+            marks.append(Markers(plan[rows], shape, 7.7, VERMILION, "white", 1.6, label=name))
     quality = pattern.points[-1]
     figures = f"rms {quality.rms_sd[2]:#.3g} {unit}, largest {quality.max_sd[2]:#.3g} {unit}"
     across, up = (f"{axis}, {unit}" for axis in pattern.axes[:2])

@@ -22,17 +22,9 @@ from photogram.show.sketch.plot import Plot
 
 P = ParamSpec("P")
 
-PLOTS: dict[str, Callable[[Any], Plot]] = {
-    "network": network,
-    "residuals": residuals,
-    "redundancy": redundancy,
-    "undetected": undetected,
-    "tests": tests,
-    "correlations": correlations,
-    "distortion": distortion,
-    "features": features,
-    "films": films,
-}
+# Plots of any network, in the order in which they are written
+DRAWN = (network, residuals, redundancy, undetected, tests, correlations, distortion, features, films)
+PLOTS: dict[str, Callable[[Any], Plot]] = {function.__name__: function for function in DRAWN}
 
 
 class _Method(Generic[P]):
@@ -78,8 +70,7 @@ class Plots:
         redundancy, undetected errors and tests without covariances, features and films of a block without
         them.
         """
-        plots = {name: sketch_of(self._result, name) for name in PLOTS}
-        return {name: plot for name, plot in plots.items() if plot is not None}
+        return {name: plot for name in PLOTS if (plot := sketch_of(self._result, name))}
 
     def save(self, folder: Path | str, ending: str = "png") -> list[Path]:
         """Write all available plots to a folder, `network.png` ..., and return the paths.

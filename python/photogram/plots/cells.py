@@ -19,17 +19,11 @@ class Cells:
     counts: Indices  # (rows columns,) image points of each cell
 
     @property
-    def side(self) -> Floats:
-        """Width and height of a cell."""
-        found: Floats = (self.edges[1] - self.edges[0]) / [self.columns, self.rows]
-        return found
-
-    @property
     def middles(self) -> Floats:
         """(rows columns, 2) middles of the cells."""
-        column, row = np.arange(self.rows * self.columns) % self.columns, np.arange(self.rows * self.columns)
-        found: Floats = self.edges[0] + self.side * (np.column_stack([column, row // self.columns]) + 0.5)
-        return found
+        row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
+        part = (np.column_stack([column, row]) + 0.5) / [self.columns, self.rows]
+        return np.asarray(self.edges[0] + (self.edges[1] - self.edges[0]) * part)
 
     def means(self, values: Floats) -> Floats:
         """Return (rows columns,) means of (m,) values; NaN for empty cells."""

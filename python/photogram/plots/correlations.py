@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram.errors import InputError
 from photogram.plots.picture_data import Correlated
+from photogram.plots.selection import first_panels
 from photogram.show.sketch.marks import Mark, Mesh, Panel, Shades, Texts
 from photogram.show.sketch.plot import Plot
-from photogram.words import phrase
 
 MAX_CAMERAS = 4
 MAX_WRITTEN_PARAMETERS = 14  # Matrices of more parameters are drawn without coefficients
@@ -26,19 +25,13 @@ def correlations(result: Any) -> Plot:
         If no camera has two estimated parameters, or covariances are missing.
     """
     cameras = result._plot_data().correlations
-    if not cameras:
-        raise InputError(phrase("plot.correlations"))
-    shown = cameras[:MAX_CAMERAS]
-    columns = min(2, len(shown))
-    rows = -(-len(shown) // columns)
-    side = 2.2 + 0.36 * max(len(each.names) for each in shown)
-    left_out = len(cameras) > len(shown)
-    said = f"the first {len(shown)} of {len(cameras)} cameras are drawn" if left_out else ""
-    found = [_matrix(each, said if each is shown[-1] else "") for each in shown]
-    return Plot(columns * side + 0.9, rows * (side + 0.2), found, columns, SHADES)
+    panels = first_panels("correlations", "cameras", cameras, MAX_CAMERAS, _matrix)
+    columns = min(2, len(panels))
+    side = 2.2 + 0.36 * max(len(panel.up_names) for panel in panels)
+    return Plot(columns * side + 0.9, -(-len(panels) // columns) * (side + 0.2), panels, columns, SHADES)
 
 
-def _matrix(each: Correlated, said: str) -> Panel:
+def _matrix(each: Correlated) -> Panel:
     count = len(each.names)
     first, last = -0.5, count - 0.5
     marks: list[Mark] = [Mesh(np.array([[first, first], [last, last]]), each.coefficients, SHADES)]
@@ -53,9 +46,8 @@ def _matrix(each: Correlated, said: str) -> Panel:
     return Panel(
         np.array([[first, last], [last, first]]),
         marks,
-        ", ".join(part for part in (each.camera, each.remark) if part),
+        f"{each.camera}, {each.remark}".removesuffix(", "),
         equal=True,
-        notes=[said],
         across_names=each.names,
         up_names=each.names,
         turned=max(map(len, each.names)) > 3,

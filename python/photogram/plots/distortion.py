@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import Curve, Curves
-from photogram.show.sketch.marks import Level, Line, Mark, Panel, band, spread
+from photogram.plots.picture_data import Curve, Curves, enlarged
+from photogram.show.sketch.marks import Line, Mark, Panel, band, level, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
 from photogram.words import phrase
@@ -44,10 +45,9 @@ def side_by_side(cameras: Sequence[Curves]) -> list[Panel | None]:
 
 
 def _column(curves: Curves) -> list[Panel]:
-    factor, unit = curves.shown_as
+    factor, unit = enlarged(curves.unit)
     seen = curves.radii <= curves.observed
-    taken = 0
-    across = spread(curves.radii)
+    across, colours = spread(curves.radii), cycle(COLOURS)
     found, deviations, sizes = list[Panel](), list[Mark](), list[Floats]()
     named = f"radius, {curves.unit}; dashed beyond {curves.observed:.4g}, where images end"
     banded = any(curve.bands for curve in curves.curves)
@@ -58,13 +58,12 @@ def _column(curves: Curves) -> list[Panel]:
         ]
         for name, sd in curve.bands.items():
             low, high = factor * (curve.values - sd), factor * (curve.values + sd)
-            colour = COLOURS[taken % len(COLOURS)]
-            taken += 1
+            colour = next(colours)
             marks.append(band(curves.radii, low, high, colour, 0.3, label=f"± sd of the {name}"))
             # Bands are thin on curves of hundreds of micrometres, and are therefore also drawn separately.
             deviations += _dashed(curves.radii, factor * sd, seen, colour, f"sd of the {name}")
             sizes.append(factor * sd)
-        marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), Level(0.0, FAINT)]
+        marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), level(0.0, FAINT)]
         title = curve.name if number else f"Radial distortion of {curves.camera}"
         below = "" if banded or number + 1 < len(curves.curves) else named
         limits = np.column_stack([across, _reach(curves, curve)])
@@ -77,14 +76,10 @@ def _column(curves: Curves) -> list[Panel]:
 
 def _reach(curves: Curves, curve: Curve) -> tuple[float, float]:
     """Return the limits of a curve, without effect of extreme single photos."""
-    factor, _ = curves.shown_as
-    if not len(curves.others):
-        bands = (factor * (curve.values + sign * sd) for sd in curve.bands.values() for sign in (-1, 1))
-        return spread(0.0, factor * curve.values, *bands)
-    ends = np.quantile(factor * curves.others, [0.1, 0.9], axis=0)
-    bottom = min(0.0, float(ends.min()), float(factor * curve.values.min()))
-    top = max(0.0, float(ends.max()), float(factor * curve.values.max()))
-    return bottom - 0.1 * (top - bottom), top + 0.1 * (top - bottom)
+    factor, _ = enlarged(curves.unit)
+    ends = [*np.quantile(curves.others, [0.1, 0.9], axis=0)] if len(curves.others) else []
+    bands = (curve.values + sign * sd for sd in curve.bands.values() for sign in (-1, 1))
+    return spread(0.0, *(factor * each for each in (curve.values, *ends, *bands)))
 
 
 def _dashed(radii: Floats, values: Floats, seen: Bools, colour: str, label: str) -> list[Mark]:

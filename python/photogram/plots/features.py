@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from photogram.errors import InputError
-from photogram.plots.picture_data import Deviations
-from photogram.show.sketch.marks import Level, Line, Mark, Markers, Panel, spread
+from photogram.plots.picture_data import Deviations, enlarged
+from photogram.plots.selection import first_panels
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, level, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
-from photogram.words import phrase
 
 MAX_FEATURES = 4
 MAX_POINT_NAMES = 40
@@ -25,26 +24,20 @@ def features(result: Any) -> Plot:
     InputError
         If no feature has deviations.
     """
-    every = result._plot_data().deviations
-    if not every:
-        raise InputError(phrase("plot.features"))
-    shown = every[:MAX_FEATURES]
-    said = f"the first {MAX_FEATURES} of {len(every)} features are drawn" if len(every) > MAX_FEATURES else ""
-    panels = [_panel(each, said if each is shown[-1] else "") for each in shown]
-    return Plot(7.0, 0.4 + 2.5 * len(shown), panels)
+    panels = first_panels("features", "features", result._plot_data().deviations, MAX_FEATURES, _panel)
+    return Plot(7.0, 0.4 + 2.5 * len(panels), panels)
 
 
-def _panel(each: Deviations, said: str) -> Panel:
-    factor, unit = each.shown_as
+def _panel(each: Deviations) -> Panel:
+    factor, unit = enlarged(each.unit, float(np.abs(each.values).max(initial=0.0)))
     places, count = np.arange(len(each.points)), len(each.directions)
     values, bars = factor * each.values, factor * np.nan_to_num(each.expanded)
     # Side by side, so that bars do not overlap.
     across = places[:, np.newaxis] + 0.2 * (np.arange(count) - (count - 1) / 2)
-    marks: list[Mark] = [Level(0.0, FAINT, 0.8)]
+    marks: list[Mark] = [level(0.0, FAINT, 0.8)]
     for k, direction in enumerate(each.directions):
         at = np.column_stack([across[:, k], values[:, k]])
-        ends = np.stack([at, at], axis=1)
-        ends[:, :, 1] += bars[:, k, np.newaxis] * [-1.0, 1.0]
+        ends = error_bars(at, at[:, 1] - bars[:, k], at[:, 1] + bars[:, k])
         marks += [Line(ends, COLOURS[k], 1.0), Markers(at, "o", 3.5, COLOURS[k], label=direction)]
     named = len(places) <= MAX_POINT_NAMES
     return Panel(
@@ -53,8 +46,7 @@ def _panel(each: Deviations, said: str) -> Panel:
         each.title,
         "" if named else "points, in the order of the feature",
         f"deviation ± U, {unit}",
-        notes=[said],
-        legend="above" if count > 1 else "",
+        legend="beside" if count > 1 else "",
         across_names=each.points if named else (),
         turned=max(map(len, each.points)) * len(places) > 80,
     )

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from photogram.arguments.arrays import one_of, sampled
-from photogram.arguments.types import Floats, Indices
-from photogram.lazy_dataclasses import replace
+from photogram.arguments.arrays import one_of
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.plots.picture_data import Pictured, Plan
+from photogram.plots.selection import thinned
 from photogram.show.sketch.letters import NOWHERE
 from photogram.show.sketch.marks import (
     Arrows,
@@ -23,6 +24,7 @@ from photogram.show.sketch.marks import (
     ScaleBar,
     Shades,
     ellipse_axes,
+    error_bars,
     hexadecimal,
     rgb,
 )
@@ -56,39 +58,83 @@ def network(result: Any, *, plane: str | None = None) -> Plot:
         If `plane` is another text.
     """
     drawn = result._plot_data()
-    plan = drawn.plan
-    seen = _plane(plan, plane)
-    limits = _limits(plan, seen, drawn.footprints if seen[2] == 2 else None)
-    marks, said = list[Mark](), list[str]()
-    for part in (_footprints(drawn, seen), _points(plan, seen), _photos(plan, seen)):
-        marks += part[0]
-        said.append(part[1])
-    arrows, ends = _vectors(plan, seen, limits, marks, said)
-    bars = [*_ellipses(drawn, seen, limits, marks, said), *arrows]
-    known = plan.points[np.isfinite(plan.points).all(axis=1)][:, list(seen[:2])]
-    beyond = int((~((known >= limits[0]) & (known <= limits[1])).all(axis=1)).sum())
-    said.append(f"{beyond} points lie beyond the picture" if beyond else "")
-    panel = replace(
-        _frame(plan, seen, limits),
-        marks=[*marks, *_names(plan, seen, ends)],
-        title=drawn.title or "Network",
-        notes=said,
-        bars=bars,
-        legend="beside",
-    )
-    return Plot(*size_of(limits), [panel])
+    view = View(drawn.plan, _plane(drawn.plan, plane))
+    footprints, notes = drawn.footprints if view.axes[2] == 2 else np.empty((0, 1, 3)), list[str]()
+    view.include(footprints)
+    marks = [*_footprints(view, footprints, notes), *_points(view, notes), *_photos(view, notes)]
+    control, arrows, ends = _control(view, notes)
+    ellipses, bars = _ellipses(drawn, view, notes)
+    beyond = np.count_nonzero(view.known & ~view.inside)
+    notes.append(f"{beyond} points lie beyond the picture" if beyond else "")
+    marks += [*ellipses, *control, *_names(view, ends)]
+    title = drawn.title or "Network"
+    return view.plot(marks, title=title, notes=notes, bars=[*bars, *arrows])
 
 
-def view_of_plan(plan: Plan) -> tuple[Panel, tuple[int, int, int]]:
-    """Return a panel of the plane with the largest extent of the points, and its axes."""
-    seen = _plane(plan, None)
-    return _frame(plan, seen, _limits(plan, seen)), seen
+class View:
+    """A network in a plane: `axes` to the right, upwards, and out of the plot."""
+
+    def __init__(self, plan: Plan, axes: tuple[int, int, int] | None = None) -> None:
+        self.plan, self.axes = plan, axes or _plane(plan, None)
+        self.points, self.photos = self.flat(plan.points), self.flat(plan.photos)
+        self.known = np.isfinite(plan.points).all(axis=1)
+        self.unit = f" {plan.unit}" if plan.unit else ""
+        points = self.points[self.known]
+        parts = [_central(self.photos), points[plan.kinds[self.known] != "pass"]]
+        every = np.concatenate([*parts, _central(points)])
+        self.low, self.high = every.min(axis=0), every.max(axis=0)
+
+    def include(self, outlines: Floats) -> None:
+        """Extend the limits to outlines, unless these are far larger than the network."""
+        shown = self.flat(outlines).reshape(-1, 2)
+        shown = shown[np.isfinite(shown).all(axis=1)]
+        largest = LARGE_FOOTPRINT * (self.high - self.low).max()
+        if len(shown) and (np.ptp(shown, axis=0) < largest).all():
+            self.low, self.high = (
+                np.minimum(self.low, shown.min(axis=0)),
+                np.maximum(self.high, shown.max(axis=0)),
+            )
+
+    def flat(self, places: Floats) -> Floats:
+        """Return (..., 3) positions or vectors in the plane."""
+        return places[..., list(self.axes[:2])]
+
+    @property
+    def limits(self) -> Floats:
+        """(2, 2) limits of stations, control and nearly all points."""
+        margin = 0.05 * max(float((self.high - self.low).max()), 1e-9)
+        return np.array([self.low - margin, self.high + margin])
+
+    @property
+    def extent(self) -> float:
+        return float(np.ptp(self.limits, axis=0).max())
+
+    @property
+    def inside(self) -> Bools:
+        """(n,) points within the limits."""
+        low, high = self.limits
+        return np.asarray(((self.points >= low) & (self.points <= high)).all(axis=1))
+
+    def bar(self, scale: float, colour: str, meaning: str) -> ScaleBar:
+        """Return the scale bar of marks that are enlarged by `scale`."""
+        length = round_length(0.12 * self.extent / scale)
+        return scale * length, colour, f"{length:g}{self.unit}: {meaning} (× {scale:,g})"
+
+    def panel(self, marks: Sequence[Mark], **more: Any) -> Panel:
+        unit = f", {self.plan.unit}" if self.plan.unit else ""
+        across, up = (f"{self.plan.axes[axis]}{unit}" for axis in self.axes[:2])
+        return Panel(self.limits, marks, across=across, up=up, equal=True, **more)
+
+    def plot(self, marks: Sequence[Mark], **more: Any) -> Plot:
+        """Return a plot with a legend beside the network."""
+        across, up = 6.5 * np.minimum(1.0, (self.limits[1] - self.limits[0]) / self.extent)
+        panel = self.panel(marks, legend="beside", **more)
+        return Plot(max(float(across), 2.5) + 3.3, max(float(up), 1.6) + 1.6, [panel])
 
 
-def _frame(plan: Plan, seen: tuple[int, int, int], limits: Floats) -> Panel:
-    unit = f", {plan.unit}" if plan.unit else ""
-    across, up = (f"{plan.axes[axis]}{unit}" for axis in seen[:2])
-    return Panel(limits, across=across, up=up, equal=True)
+def _central(places: Floats) -> Floats:
+    """Return the limits of nearly all of many positions, or few positions unchanged."""
+    return np.quantile(places, [1 - CENTRAL, CENTRAL], axis=0) if len(places) > 500 else places
 
 
 def _plane(plan: Plan, plane: str | None) -> tuple[int, int, int]:
@@ -112,81 +158,45 @@ def _areas(places: Floats) -> dict[str, float]:
     return {name: float(extent[a] * extent[b]) for name, (a, b, _) in PLANES.items()}
 
 
-def _limits(plan: Plan, seen: tuple[int, int, int], outlines: Floats | None = None) -> Floats:
-    """Return (2, 2) lower and upper limits of stations, control and nearly all points.
-
-    They include footprints, unless these are far larger than the network.
-    """
-    axes = list(seen[:2])
-    points = plan.points[np.isfinite(plan.points).all(axis=1)][:, axes]
-    parts = [plan.photos[:, axes]]
-    if len(points):
-        parts.append(np.quantile(points, [1 - CENTRAL, CENTRAL], axis=0) if len(points) > 500 else points)
-        parts.append(points[(plan.kinds != "pass")[np.isfinite(plan.points).all(axis=1)]])
-    stations = parts[0]
-    if len(stations) > 500:
-        parts[0] = np.quantile(stations, [1 - CENTRAL, CENTRAL], axis=0)
-    every = np.concatenate(parts)
-    low, high = every.min(axis=0), every.max(axis=0)
-    shown = np.empty((0, 2)) if outlines is None else outlines[..., axes].reshape(-1, 2)
-    shown = shown[np.isfinite(shown).all(axis=1)]
-    if len(shown) and (np.ptp(shown, axis=0) < LARGE_FOOTPRINT * (high - low).max()).all():
-        low, high = np.minimum(low, shown.min(axis=0)), np.maximum(high, shown.max(axis=0))
-    margin = 0.05 * max(float((high - low).max()), 1e-9)
-    return np.array([low - margin, high + margin])
-
-
-def size_of(limits: Floats) -> tuple[float, float]:
-    """Return width and height of a plot of a network with a legend beside it, inches."""
-    width, height = limits[1] - limits[0]
-    longer = 6.5
-    across = longer * min(1.0, width / height)
-    up = longer * min(1.0, height / width)
-    return max(across, 2.5) + 3.3, max(up, 1.6) + 1.6
-
-
-def thinned(what: str, rows: Indices, most: int) -> tuple[Indices, str]:
-    """Return the rows to draw among many, and a remark."""
-    remark = f"{most:,} of {len(rows):,} {what} are drawn, taken at random" if len(rows) > most else ""
-    return sampled(rows, most), remark
-
-
-def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
-    outlines = drawn.footprints if seen[2] == 2 else np.empty((0, 1, 3))
+def _footprints(view: View, outlines: Floats, notes: list[str]) -> list[Mark]:
     good = np.flatnonzero(np.isfinite(outlines).all(axis=(1, 2)))
     if not len(good):
-        return [], ""
-    chosen, said = thinned("footprints", good, MAX_FOOTPRINTS)
-    shown = outlines[chosen][:, :, list(seen[:2])]
-    inside = float(np.clip(0.4 / len(shown), 0.003, 0.06))
-    edge = float(np.clip(25.0 / len(shown), 0.5, 0.7))
-    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, label="footprint of a photo")], said
+        return []
+    chosen, note = thinned("footprints", good, MAX_FOOTPRINTS)
+    notes.append(note)
+    inside = float(np.clip(0.4 / len(chosen), 0.003, 0.06))
+    edge = float(np.clip(25.0 / len(chosen), 0.5, 0.7))
+    shown = view.flat(outlines[chosen])
+    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, label="footprint of a photo")]
 
 
-def _photos(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
-    chosen, said = thinned("photos", np.arange(len(plan.photos)), MAX_PHOTOS)
-    shown = plan.photos[chosen][:, list(seen[:2])]
-    size = float(np.clip(60.0 / np.sqrt(len(shown)), 2.0, 7.0))
-    colour, label = INK if len(shown) <= 300 else FAINT, f"photo ({len(plan.photos):,})"
-    return [Markers(shown, "+", size, colour, edge=0.7, label=label, layer=3.0)], said
+def _photos(view: View, notes: list[str]) -> list[Mark]:
+    count = len(view.photos)
+    chosen, note = thinned("photos", np.arange(count), MAX_PHOTOS)
+    notes.append(note)
+    size = float(np.clip(60.0 / np.sqrt(len(chosen)), 2.0, 7.0))
+    colour, label = INK if len(chosen) <= 300 else FAINT, f"photo ({count:,})"
+    return [Markers(view.photos[chosen], "+", size, colour, edge=0.7, label=label, layer=3.0)]
 
 
-def _points(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
-    rows = np.flatnonzero((plan.kinds == "pass") & np.isfinite(plan.points).all(axis=1))
+def _points(view: View, notes: list[str]) -> list[Mark]:
+    plan = view.plan
+    rows = np.flatnonzero((plan.kinds == "pass") & view.known)
     if not len(rows):
-        return [], ""
+        return []
     every = np.searchsorted(MIN_RAYS_OF_CLASSES, plan.rays, side="right") - 1
     classes = every[rows]
     there = np.unique(classes).tolist()
-    chosen, said = thinned("points", rows, MAX_POINTS)
+    chosen, note = thinned("points", rows, MAX_POINTS)
+    notes.append(note)
     size = float(np.sqrt(np.clip(9000.0 / len(chosen), 2.0, 14.0)))
     colours = rgb(Shades(0.0, 1.0, ""), np.linspace(0.82 if len(there) > 1 else 0.0, 0.0, len(there)))
     marks = list[Mark]()
     for colour, number in zip(colours, there, strict=True):
-        own = plan.points[chosen[every[chosen] == number]][:, list(seen[:2])]
+        own = view.points[chosen[every[chosen] == number]]
         label = f"{_class(number, plan.rays[rows])} ({int((classes == number).sum()):,})"
         marks.append(Markers(own, "o", size, hexadecimal(colour), label=label))
-    return marks, said
+    return marks
 
 
 def _class(number: int, rays: Indices) -> str:
@@ -197,47 +207,36 @@ def _class(number: int, rays: Indices) -> str:
     return f"{low} ray{'s' * (low > 1)}" if high <= low else f"{low} to {high} rays"
 
 
-def _ellipses(
-    drawn: Pictured, seen: tuple[int, int, int], limits: Floats, marks: list[Mark], said: list[str]
-) -> list[ScaleBar]:
-    """Add error ellipses of points, or medians by cell; return their scale."""
-    plan, pair = drawn.plan, list(seen[:2])
-    inside = ((plan.points[:, pair] >= limits[0]) & (plan.points[:, pair] <= limits[1])).all(axis=1)
-    rows = np.flatnonzero(inside)
+def _ellipses(drawn: Pictured, view: View, notes: list[str]) -> tuple[list[Mark], list[ScaleBar]]:
+    """Return error ellipses of points, or medians by cell, and their scale bar."""
+    rows, pair, extent = np.flatnonzero(view.inside), list(view.axes[:2]), view.extent
     covariances = drawn.covariances(rows)[:, pair][:, :, pair]
     good = np.isfinite(covariances).all(axis=(1, 2))
     rows, covariances = rows[good], covariances[good]
     axes_of, angles = ellipse_axes(covariances)
     axes_of *= np.sqrt(-2.0 * np.log(1.0 - CONFIDENCE))
     if not len(rows) or not axes_of[:, 0].any():
-        return []
-    extent = float((limits[1] - limits[0]).max())
+        return [], []
+    chosen = np.arange(len(rows))
     if len(rows) > MAX_ELLIPSES:
-        chosen = _of_cells(plan.points[rows][:, pair], axes_of[:, 0], extent / 12.0)
-        said.append(f"error ellipses: of {len(rows):,} points, the median one of each of {len(chosen)} cells")
-    else:
-        chosen = np.arange(len(rows))
+        chosen = _of_cells(view.points[rows], axes_of[:, 0], extent / 12.0)
+        notes.append(
+            f"error ellipses: of {len(rows):,} points, the median one of each of {len(chosen)} cells"
+        )
     sizes = axes_of[chosen, 0]
-    typical = float(np.median(sizes[sizes > 0])) if (sizes > 0).any() else 0.0
-    if typical == 0:
-        return []
+    if not (sizes > 0).any():
+        return [], []
     # The semi-axis of a typical ellipse is a fifth of the distance to its neighbour.
     spacing = extent / np.sqrt(max(len(chosen), 9))
-    scale = round_length(0.22 * spacing / typical)
-    shown = chosen[scale * axes_of[chosen, 0] < 0.2 * extent]
+    scale = round_length(0.22 * spacing / float(np.median(sizes[sizes > 0])))
+    shown = chosen[scale * sizes < 0.2 * extent]
     if len(shown) < len(chosen):
-        said.append(f"{len(chosen) - len(shown)} ellipses are too large to be drawn at this scale")
-    places = plan.points[rows[shown]][:, pair]
-    marks.append(Ellipses(places, scale * axes_of[shown], angles[shown], BLUE, 0.8, layer=4.0))
-    worst = int(np.argmax(axes_of[:, 0]))
-    unit = f" {plan.unit}" if plan.unit else ""
-    said.append(
-        f"largest semi-axis of an ellipse: {axes_of[worst, 0]:.3g}{unit}, point {plan.point_ids[rows[worst]]}"
-    )
-    bar = round_length(0.12 * extent / scale)
-    return [
-        (scale * bar, BLUE, f"{bar:g}{unit}: semi-axes of error ellipses, {CONFIDENCE:.0%} (× {scale:,g})")
-    ]
+        notes.append(f"{len(chosen) - len(shown)} ellipses are too large to be drawn at this scale")
+    places, worst = view.points[rows[shown]], int(np.argmax(axes_of[:, 0]))
+    largest = f"{axes_of[worst, 0]:.3g}{view.unit}, point {view.plan.point_ids[rows[worst]]}"
+    notes.append(f"largest semi-axis of an ellipse: {largest}")
+    marks: list[Mark] = [Ellipses(places, scale * axes_of[shown], angles[shown], BLUE, 0.8, layer=4.0)]
+    return marks, [view.bar(scale, BLUE, f"semi-axes of error ellipses, {CONFIDENCE:.0%}")]
 
 
 def _of_cells(places: Floats, sizes: Floats, side: float) -> Indices:
@@ -249,66 +248,50 @@ def _of_cells(places: Floats, sizes: Floats, side: float) -> Indices:
     return np.asarray(order[starts + counts // 2])
 
 
-def _vectors(
-    plan: Plan, seen: tuple[int, int, int], limits: Floats, marks: list[Mark], said: list[str]
-) -> tuple[list[ScaleBar], Floats]:
-    """Add control and check points with their coordinate differences.
-
-    Returns scale bars, and (k, 2) positions on the arrows, which names should not cover.
-    """
-    pair = list(seen[:2])
-    there = np.isfinite(plan.points).all(axis=1)
-    drawn: list[Indices] = []
+def _control(view: View, notes: list[str]) -> tuple[list[Mark], list[ScaleBar], Floats]:
+    """Return control and check points, their differences, scale bars, and positions on the arrows."""
+    plan, marks, drawn = view.plan, list[Mark](), list[Indices]()
     for kind, marker in (("control", "^"), ("check", "s")):
-        rows = np.flatnonzero((plan.kinds == kind) & there)
+        rows = np.flatnonzero((plan.kinds == kind) & view.known)
         if not len(rows):
             continue
-        chosen, remark = thinned(f"{kind} points", rows, MAX_VECTORS)
-        said.append(remark)
+        chosen, note = thinned(f"{kind} points", rows, MAX_VECTORS)
+        notes.append(note)
         size = float(np.clip(60.0 / np.sqrt(len(chosen)), 3.0, 7.0))
-        label, places = f"{kind} point ({len(rows):,})", plan.points[chosen][:, pair]
-        marks.append(Markers(places, marker, size, face="white", edge=0.9, label=label, layer=5.0))
+        label = f"{kind} point ({len(rows):,})"
+        marks.append(
+            Markers(view.points[chosen], marker, size, face="white", edge=0.9, label=label, layer=5.0)
+        )
         drawn.append(chosen)
-    if not drawn:
-        return [], NOWHERE
     # One scale for both types: the scale of the larger differences.
-    size = max(usual(plan.differences[rows]) for rows in drawn)
-    rows = np.concatenate(drawn)
-    what = "difference", "differences of control and check points, adjusted less given"
-    return vectors(plan, seen, limits, rows, plan.differences[rows], size, what, marks)
+    size = max((usual(plan.differences[rows]) for rows in drawn), default=0.0)
+    rows = np.concatenate([*drawn, np.empty(0, dtype=np.int64)])
+    meaning = "differences of control and check points, adjusted less given"
+    arrows, bars, ends = vectors(view, rows, plan.differences[rows], size, "difference", meaning)
+    return [*marks, *arrows], bars, ends
 
 
 def vectors(
-    plan: Plan,
-    seen: tuple[int, int, int],
-    limits: Floats,
-    rows: Indices,
-    differences: Floats,
-    size: float,
-    what: tuple[str, str],
-    marks: list[Mark],
-) -> tuple[list[ScaleBar], Floats]:
-    """Add (k, 3) differences of points; return scale bars, and (k, 2) positions on the arrows.
+    view: View, rows: Indices, differences: Floats, size: float, name: str, meaning: str
+) -> tuple[list[Mark], list[ScaleBar], Floats]:
+    """Return (k, 3) differences of points, scale bars, and positions on the arrows.
 
-    `size` is a usual length; `what` the name of one difference, and the meaning of the scale bar.
+    `size` is a usual length, `name` of one difference; `meaning` is written at the scale bar.
     """
     if not size:
-        return [], NOWHERE
-    across, out = differences[:, list(seen[:2])], differences[:, seen[2]]
-    extent = float((limits[1] - limits[0]).max())
-    scale = round_length(0.08 * extent / size)
-    places, moved = plan.points[rows][:, list(seen[:2])], scale * np.nan_to_num(across)
+        return [], [], NOWHERE
+    out, marks = differences[:, view.axes[2]], list[Mark]()
+    scale = round_length(0.08 * view.extent / size)
+    places, moved = view.points[rows], scale * np.nan_to_num(view.flat(differences))
     if (long := np.hypot(*moved.T) > 0).any():
-        label = f"{what[0]} in plan"
+        label = f"{name} in plan"
         marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label=label, layer=6.0))
     if (high := np.isfinite(out) & (out != 0)).any():
-        tops = places[high] + np.column_stack([np.zeros(high.sum()), scale * out[high]])
-        label = f"{what[0]} in height, + upwards"
-        marks.append(Line(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label=label, layer=5.5))
-    unit = f" {plan.unit}" if plan.unit else ""
-    bar = round_length(0.12 * extent / scale)
+        label, feet = f"{name} in height, + upwards", places[high]
+        bars = error_bars(feet, feet[:, 1], feet[:, 1] + scale * out[high])
+        marks.append(Line(bars, PURPLE, 2.2, label=label, layer=5.5))
     between = np.concatenate([places + moved, places + 0.5 * moved])
-    return [(scale * bar, VERMILION, f"{bar:g}{unit}: {what[1]} (× {scale:,g})")], between
+    return marks, [view.bar(scale, VERMILION, meaning)], between
 
 
 def usual(differences: Floats) -> float:
@@ -317,11 +300,12 @@ def usual(differences: Floats) -> float:
     return float(np.quantile(sizes[sizes > 0], 0.9)) if (sizes > 0).any() else 0.0
 
 
-def _names(plan: Plan, seen: tuple[int, int, int], ends: Floats) -> list[Mark]:
-    held = np.flatnonzero((plan.kinds != "pass") & np.isfinite(plan.points).all(axis=1))
-    held = held if len(held) <= MAX_NAMES else held[:0]
-    photos = np.arange(len(plan.photos) if len(plan.photos) <= MAX_NAMES else 0)
-    places = np.concatenate([plan.points[held], plan.photos[photos]])[:, list(seen[:2])]
-    texts = [plan.point_ids[row] for row in held.tolist()] + [plan.photo_ids[row] for row in photos.tolist()]
-    colours = [INK] * len(held) + [SOFT] * len(photos)
+def _names(view: View, ends: Floats) -> list[Mark]:
+    plan = view.plan
+    control = np.flatnonzero((plan.kinds != "pass") & view.known)
+    control = control if len(control) <= MAX_NAMES else control[:0]
+    photos = len(plan.photo_ids) if len(plan.photo_ids) <= MAX_NAMES else 0
+    places = np.concatenate([view.points[control], view.photos[:photos]])
+    texts = [*(plan.point_ids[row] for row in control.tolist()), *plan.photo_ids[:photos]]
+    colours = [INK] * len(control) + [SOFT] * photos
     return [Names(places, texts, colours, ends)] if texts else []

@@ -16,6 +16,12 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.statistics.findings import Tested
 
 
+def enlarged(unit: str, largest: float = 0.0) -> tuple[float, str]:
+    """Return the factor of small lengths in plots, and their unit there."""
+    small = {"m": (1e6, "µm") if largest < 1e-3 else (1e3, "mm"), "mm": (1e3, "µm")}
+    return small[unit] if unit in small and largest < 1.0 else (1.0, unit)
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A network of P photos and n points in metric axes."""
@@ -46,20 +52,7 @@ class Images:
     down: bool  # Whether y increases downwards, like rows of pixels
     # (m,) True for sample and line of a scanner, whose residuals refer to its focal plane. Such observations
     # have separate cameras.
-    scanned: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    def of_scanner(self, camera: int) -> bool:
-        """Whether the observations of a camera are samples and lines."""
-        return bool(self.scanned.any() and self.scanned[self.cameras == camera].any())
-
-    @property
-    def shown_as(self) -> tuple[float, str]:
-        """Factor of residuals in plots, and their unit."""
-        return _enlarged(self.unit)
-
-
-def _enlarged(unit: str) -> tuple[float, str]:
-    return (1000.0, "µm") if unit == "mm" else (1.0, unit)
+    scanned: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +86,6 @@ class Curves:
     # (q, r) curves of single photos, drawn faintly
     others: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
-    @property
-    def shown_as(self) -> tuple[float, str]:
-        """Factor of the curves in plots, and their unit."""
-        return _enlarged(self.unit)
-
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
@@ -109,13 +97,6 @@ class Deviations:
     directions: Sequence[str]  # Names of the d deviations of each point
     values: Floats  # (n, d) deviations, and k times their standard deviations
     expanded: Floats
-
-    @property
-    def shown_as(self) -> tuple[float, str]:
-        """Factor of deviations in plots, and their unit."""
-        largest = float(np.abs(self.values).max(initial=0.0))
-        small = {"m": (1e6, "µm") if largest < 1e-3 else (1e3, "mm"), "mm": (1e3, "µm")}
-        return small[self.unit] if self.unit in small and largest < 1.0 else (1.0, self.unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,56 +126,36 @@ class Pictured(Protocol):
     """The plot data of an adjusted network; each part is computed on demand."""
 
     @property
-    def title(self) -> str:
-        """Name of the network, or an empty text."""
-
+    def title(self) -> str: ...  # Name of the network, or an empty text
     @property
-    def plan(self) -> Plan:
-        """The network."""
+    def plan(self) -> Plan: ...
+    def covariances(
+        self, points: Indices
+    ) -> Floats: ...  # (k, 3, 3) along the axes of the plan; NaN if missing
 
-    def covariances(self, points: Indices) -> Floats:
-        """Return (k, 3, 3) point covariances along the plan axes; NaN if missing."""
-
+    # (P, v, 3) closed outlines of photos on level ground, in the axes of the plan. NaN for photos without
+    # ground; (0, v, 3) if no axis of the plan is vertical.
     @property
-    def footprints(self) -> Floats:
-        """(P, v, 3) closed outlines of photos on level ground, in the axes of the plan.
-
-        NaN for photos without ground; (0, v, 3) if no axis of the plan is vertical.
-        """
-
+    def footprints(self) -> Floats: ...
     @property
-    def images(self) -> Images:
-        """The used image observations."""
-
+    def images(self) -> Images: ...
     @property
-    def tested(self) -> Sequence[Tested]:
-        """All observations with their standardized residuals, by type."""
-
+    def tested(self) -> Sequence[Tested]: ...  # All observations with their standardized residuals, by type
     @property
-    def outlying(self) -> list[Bools]:
-        """Masks of components that are outliers of the verdict."""
-
-    def moved(self, error: int | None) -> Moved | None:
-        """Return the effect of an undetected error, by default of the worst; None if not computed."""
-
+    def outlying(self) -> list[Bools]: ...  # Masks of components that are outliers of the verdict
+    def moved(
+        self, error: int | None
+    ) -> Moved | None: ...  # By default of the worst error; None: not computed
     @property
-    def unit_weight(self) -> float:
-        """The root of the variance of unit weight; 1 if undefined."""
-
+    def unit_weight(self) -> float: ...  # The root of the variance of unit weight; 1 if undefined
     @property
-    def correlations(self) -> list[Correlated]:
-        """Cameras with two or more estimated parameters; empty without covariances."""
-
+    def correlations(self) -> list[Correlated]: ...  # Of cameras with several estimated parameters
     @property
-    def distortion(self) -> list[Curves]:
-        """Cameras with radial distortion."""
-
+    def distortion(self) -> list[Curves]: ...  # Of cameras with radial distortion
     @property
-    def deviations(self) -> list[Deviations]:
-        """Features with deviations of points."""
+    def deviations(self) -> list[Deviations]:  # Of points from features
         return []
 
     @property
-    def films(self) -> list[VectorField]:
-        """Mean residuals of the marks of cameras, and patterns of films."""
+    def films(self) -> list[VectorField]:  # Mean residuals of the marks of cameras, and patterns of films
         return []

@@ -10,9 +10,10 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
-from photogram.plots.network import thinned, view_of_plan
+from photogram.plots.network import View
 from photogram.plots.picture_data import Images, Pictured
 from photogram.plots.residuals import frame
+from photogram.plots.selection import thinned
 from photogram.show.sketch.marks import Mark, Markers, Mesh, Panel, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.words import phrase
@@ -41,21 +42,19 @@ def redundancy(result: Any) -> Plot:
     values = images.redundancy.mean(axis=1)
     if not np.isfinite(values).any():
         raise InputError(phrase("plot.redundancy"))
-    network = replace(_over_network(drawn, values), shades=SHADES)
-    return Plot(10.5, 4.9, [_over_frame(images, values), network], 2)
+    return Plot(10.5, 4.9, [_over_frame(images, values), _over_network(drawn, values)], 2)
 
 
 def _over_frame(images: Images, values: Floats) -> Panel:
     """Return observations over frames, or samples and lines if all are scanned."""
-    scanned = bool(images.scanned.any() and images.scanned.all())
-    kept = ~images.scanned if images.scanned.any() and not scanned else np.ones(len(values), dtype=bool)
+    scanned = bool(images.scanned.all())
+    kept = ~images.scanned | scanned
     xy, shown = images.xy[kept], values[kept]
     said = "" if kept.all() else f"{np.count_nonzero(~kept):,} images of scanners are left out"
     grid = cells(xy, CELLS_OF_FRAME)
     over = "samples and lines" if scanned else "the frame"
-    marks, cells_are = _shaded(xy, shown, np.sqrt(14.0)), ""
-    if len(shown) > MAX_SINGLE_IMAGES:
-        marks, cells_are = _mesh(grid, shown, "images")
+    many = len(shown) > MAX_SINGLE_IMAGES
+    marks, cells_are = _shaded(xy, shown, np.sqrt(14.0), grid if many else None, "images")
     return replace(
         frame(images, grid.edges, scanned=scanned),
         marks=[marks],
@@ -66,30 +65,25 @@ def _over_frame(images: Images, values: Floats) -> Panel:
 
 def _over_network(drawn: Pictured, values: Floats) -> Panel:
     """Return points coloured by least redundancy number, or means of cells."""
-    plan, images = drawn.plan, drawn.images
-    least = np.full(len(plan.points), np.inf)
+    view, images = View(drawn.plan), drawn.images
+    least = np.full(len(view.points), np.inf)
     np.minimum.at(least, images.points, values)
-    rows = np.flatnonzero(np.isfinite(least) & np.isfinite(plan.points).all(axis=1))
-    panel, seen = view_of_plan(plan)
-    places, limits = plan.points[rows][:, list(seen[:2])], panel.limits
-    inside = ((places >= limits[0]) & (places <= limits[1])).all(axis=1)
-    rows, places = rows[inside], places[inside]
+    rows = np.flatnonzero(np.isfinite(least) & view.known & view.inside)
+    places = view.points[rows]
     size = float(np.sqrt(np.clip(9000.0 / max(len(rows), 1), 3.0, 20.0)))
-    marks, cells_are = _shaded(places, least[rows], size), ""
-    if len(rows) > MAX_SINGLE_POINTS:
-        marks, cells_are = _mesh(cells(places, CELLS_OF_NETWORK), least[rows], "points")
-    photos, _ = thinned("photos", np.arange(len(plan.photos)), MAX_PHOTOS)
-    stations = Markers(plan.photos[photos][:, list(seen[:2])], "+", 3.0, edge=0.5, opacity=0.5)
+    grid = cells(places, CELLS_OF_NETWORK) if len(rows) > MAX_SINGLE_POINTS else None
+    points, cells_are = _shaded(places, least[rows], size, grid, "points")
+    photos, _ = thinned("photos", np.arange(len(view.photos)), MAX_PHOTOS)
+    stations = Markers(view.photos[photos], "+", 3.0, edge=0.5, opacity=0.5)
     title = "Over the network: the least of the images of a point"
-    return replace(panel, marks=[marks, stations], title=title, notes=[cells_are])
+    return view.panel([points, stations], title=title, notes=[cells_are], shades=SHADES)
 
 
-def _shaded(places: Floats, values: Floats, size: float) -> Mark:
-    return Markers(places, "o", size, values=values, shades=SHADES, layer=1.0)
-
-
-def _mesh(grid: Cells, values: Floats, what: str) -> tuple[Mark, str]:
+def _shaded(places: Floats, values: Floats, size: float, grid: Cells | None, what: str) -> tuple[Mark, str]:
+    """Return coloured points, or the means of cells with a note."""
+    if grid is None:
+        return Markers(places, "o", size, values=values, shades=SHADES, layer=1.0), ""
     means = grid.means(values).reshape(grid.rows, grid.columns)
     counts = grid.counts[grid.counts > 0]
-    said = f"means of cells with {counts.min():,} to {counts.max():,} {what}"
-    return Mesh(grid.edges, means, SHADES), said
+    note = f"means of cells with {counts.min():,} to {counts.max():,} {what}"
+    return Mesh(grid.edges, means, SHADES), note

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
-from photogram.plots.picture_data import Images
+from photogram.plots.picture_data import Images, enlarged
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Panel, ScaleBar
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED, round_length
@@ -34,8 +34,8 @@ def residuals(result: Any) -> Plot:
     columns = min(3, len(cameras))
     rows = -(-len(cameras) // columns)
     width = 6.4 if columns == 1 else 4.2 * columns
-    shown = images.cameras == cameras[0]
-    extent = np.ptp(images.xy[shown], axis=0) if shown.any() else np.ones(2)
+    shown = images.xy[images.cameras == cameras[0]]
+    extent = np.ptp(shown, axis=0) if len(shown) else np.ones(2)
     across, up = np.maximum(extent + 2 * MARGIN * extent.max(), 1e-12)
     many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > MAX_SINGLE_IMAGES
     # Title, scale and labels; for means, also an explanation.
@@ -70,26 +70,20 @@ def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
 def _field(images: Images, camera: int, left_out: str) -> Panel | None:
     own = images.cameras == camera
     xy, vectors = images.xy[own], images.residuals[own]
-    factor, unit = images.shown_as
+    factor, unit = enlarged(images.unit)
     if not len(xy):
         return None
     longer = int(np.clip(np.sqrt(len(xy) / MEAN_IMAGES_OF_CELL), 6, MAX_CELLS))
-    grid = cells(xy, longer)
-    scanned = images.of_scanner(camera)
-    remark: list[str] = []
-    if len(xy) <= MAX_SINGLE_IMAGES:
-        places, shown, colours = xy, vectors, [INK] * len(xy)
-    else:
-        places, shown, colours, remark = _means(grid, vectors)
+    grid, many = cells(xy, longer), len(xy) > MAX_SINGLE_IMAGES
+    scanned = bool(images.scanned[own].any())
+    places, shown, colours, remark = _means(grid, vectors) if many else (xy, vectors, INK, [])
     marks: list[Mark] = [Markers(places, ".", 2.0, FAINT, layer=1.0)]
-    cut = 0
-    size = float(np.quantile(np.hypot(*shown.T), 0.9)) if len(shown) else 0.0
-    extent = float((grid.edges[1] - grid.edges[0]).max())
-    bars: list[ScaleBar] = []
+    bars, cut, lengths = list[ScaleBar](), 0, np.hypot(*shown.T)
+    size = float(np.quantile(lengths, 0.9)) if len(shown) else 0.0
     if size > 0:
-        scale = 0.7 * extent / longer / size if len(xy) > MAX_SINGLE_IMAGES else 0.045 * extent / size
+        extent = float((grid.edges[1] - grid.edges[0]).max())
+        scale = (0.7 / longer if many else 0.045) * extent / size
         longest = LONGEST_VECTOR * 0.1 * extent / scale
-        lengths = np.hypot(*shown.T)
         cut = int((lengths > longest).sum())
         shown = shown * np.minimum(1.0, longest / np.maximum(lengths, 1e-300))[:, np.newaxis]
         marks.append(Arrows(places, scale * shown, colours, 0.0028))
@@ -106,7 +100,7 @@ def _field(images: Images, camera: int, left_out: str) -> Panel | None:
     )
 
 
-def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, list[str], list[str]]:
+def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, str | list[str], list[str]]:
     from photogram.statistics.distributions import critical_chi_square
 
     means = np.column_stack([grid.means(vectors[:, axis]) for axis in (0, 1)])
@@ -116,13 +110,11 @@ def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, list[str], lis
         square = (means[filled] ** 2 * grid.counts[filled, np.newaxis] / variance).sum(axis=1)
     beyond = square > critical_chi_square(LEVEL / len(filled), 2)
     colours = np.where(beyond, MARKED, INK).tolist()
-    per_cell = _between(grid.counts[filled])
-    said = [f"means of cells with {per_cell} images,", f"those with less than {MIN_IMAGES} are left out"]
+    ends = dict.fromkeys(f"{end(grid.counts[filled]):,}" for end in (np.min, np.max))
+    said = [
+        f"means of cells with {' to '.join(ends)} images,",
+        f"those with less than {MIN_IMAGES} are left out",
+    ]
     if beyond.any():
         said.append(f"{int(beyond.sum())} of {len(filled)} are larger than chance gives (coloured)")
     return grid.middles[filled], means[filled], colours, said
-
-
-def _between(counts: Indices) -> str:
-    low, high = int(counts.min()), int(counts.max())
-    return f"{low:,}" if low == high else f"{low:,} to {high:,}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from heapq import nlargest
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, Panel, band, bars, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Names, Panel, band, bars, level, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
@@ -41,13 +42,14 @@ def tests(result: Any) -> Plot:
         If test values were not computed (`covariance=False`).
     """
     drawn = result._plot_data()
-    groups = [_speaking(each) for each in drawn.tested]
+    groups, outlying = [_speaking(each) for each in drawn.tested], drawn.outlying
     values = np.concatenate([each.values.ravel() for each in groups])
-    values = values[np.isfinite(values)]
+    tested = np.isfinite(values)
+    marked, values = np.concatenate([each.ravel() for each in outlying])[tested], values[tested]
     if len(values) < 2:
         raise InputError(phrase("plot.tests"))
-    weight = drawn.unit_weight
-    return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(groups, drawn.outlying, weight)], 2)
+    quantiles = _quantiles(values, marked, _worst(groups, outlying), drawn.unit_weight)
+    return Plot(10.0, 4.6, [_histogram(values, drawn.unit_weight), quantiles], 2)
 
 
 def _speaking(group: Tested) -> Tested:
@@ -77,7 +79,7 @@ def _histogram(values: Floats, unit_weight: float) -> Panel:
         "test value w",
         "density",
         notes=[f"{beyond:,} test values lie beyond ±{reach:.1f}" if beyond else ""],
-        legend="upper right",
+        legend="best",
     )
 
 
@@ -85,18 +87,11 @@ def _bell(x: Floats, sd: float) -> Floats:
     return np.asarray(np.exp(-0.5 * (x / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
-def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: float) -> Panel:
-    values = np.concatenate([each.values.ravel() for each in groups])
-    tested = np.isfinite(values)
-    marked = np.concatenate([each.ravel() for each in outlying])[tested]
-    values = values[tested]
-    n = len(values)
-    rows = _rows(n)
+def _quantiles(values: Floats, marked: Bools, worst: list[tuple[float, str]], unit_weight: float) -> Panel:
+    order, n = np.argsort(values), len(values)
+    rows, every = _rows(n), values[order]
     probability = (rows + 0.5) / n
-    expected = normal_quantiles(probability)
-    order = np.argsort(values)
-    every = values[order]
-    ordered, beyond = every[rows], marked[order][rows]
+    expected, ordered, beyond = normal_quantiles(probability), every[rows], marked[order][rows]
     # Approximate, for order statistics of independent values; residuals are nearly independent.
     spread = 1.96 * np.sqrt(probability * (1.0 - probability) / n) / _bell(expected, 1.0)
     ends, places = expected[[0, -1]], np.column_stack([expected, ordered])
@@ -112,11 +107,10 @@ def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: flo
     if beyond.any():
         label = f"outliers of the verdict ({int(marked.sum()):,})"
         marks.append(Markers(places[beyond], "D", 4.0, MARKED, label=label))
-    marks += [Level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
-    if worst := _worst(groups, outlying):
-        sizes = [value for value, _ in worst]
+    marks += [level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
+    if worst:
+        sizes, names = zip(*worst, strict=True)
         at = normal_quantiles((np.minimum(np.searchsorted(every, sizes), n - 1) + 0.5) / n)
-        names = [name for _, name in worst]
         marks.append(Names(np.column_stack([at, sizes]), names, [INK] * len(worst)))
     reach = 1.3 * max(float(np.abs(ordered).max()), limit)
     return Panel(
@@ -125,7 +119,7 @@ def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: flo
         f"Quantiles: limit of {n:,} tests ±{limit:.2f} (dotted)",
         "normal quantile",
         "test value w",
-        legend="lower right",
+        legend="best",
     )
 
 
@@ -138,17 +132,14 @@ def _rows(n: int) -> Any:
 
 
 def _worst(groups: Sequence[Tested], outlying: list[Bools]) -> list[tuple[float, str]]:
-    found = []
-    for each, own in zip(groups, outlying, strict=True):
-        sizes = np.where(own, np.nan_to_num(np.abs(each.values)), 0.0)
-        order = np.argsort(-sizes, axis=None)[:MAX_NAMES]
-        for flat in order.tolist():
-            index = tuple(int(k) for k in np.unravel_index(flat, sizes.shape))
-            if sizes[index] > 0:
-                found.append((float(each.values[index]), str(each.name(index))))
-    return sorted(found, key=lambda pair: -abs(pair[0]))[:MAX_NAMES]
+    found = (
+        (float(each.values[index]), each, index)
+        for each, own in zip(groups, outlying, strict=True)
+        for index in map(tuple, np.argwhere(own & np.isfinite(each.values)).tolist())
+    )
+    worst = nlargest(MAX_NAMES, found, key=lambda one: abs(one[0]))
+    return [(value, str(each.name(index))) for value, each, index in worst]
 
 
 def normal_quantiles(probability: Floats) -> Floats:
-    """Return quantiles of the normal distribution."""
     return np.array([NORMAL.inv_cdf(p) for p in probability.tolist()])

@@ -8,9 +8,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import replace
-from photogram.plots.network import size_of, thinned, usual, vectors, view_of_plan
+from photogram.plots.network import View, usual, vectors
 from photogram.plots.picture_data import Moved
+from photogram.plots.selection import thinned
 from photogram.show.sketch.marks import Mark, Markers, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, PURPLE
@@ -42,32 +42,28 @@ def undetected(result: Any, *, error: int | None = None) -> Plot:
     moved = drawn.moved(error)
     if moved is None:
         raise InputError(phrase("plot.undetected"))
-    plan = drawn.plan
-    panel, seen = view_of_plan(plan)
-    pair = list(seen[:2])
-    photos, _ = thinned("photos", np.arange(len(plan.photos)), MAX_PHOTOS)
-    marks, shades = _points(moved, plan.points[moved.points][:, pair])
-    marks.append(Markers(plan.photos[photos][:, pair], "+", 4.0, FAINT, edge=0.6, label="photo"))
+    view = View(drawn.plan)
+    photos, _ = thinned("photos", np.arange(len(view.photos)), MAX_PHOTOS)
+    marks, shades = _points(moved, view.points[moved.points])
+    marks.append(Markers(view.photos[photos], "+", 4.0, FAINT, edge=0.6, label="photo"))
     size = usual(moved.changes)
     short = np.linalg.norm(moved.changes, axis=1) <= LONGEST * size
-    what = "change", "changes of points by the error"
-    arrows = moved.points[short], moved.changes[short]
-    bars, _ = vectors(plan, seen, panel.limits, *arrows, size, what, marks)
-    control = plan.points[plan.kinds == "control"][:, pair]
+    rows, changes = moved.points[short], moved.changes[short]
+    arrows, bars, _ = vectors(view, rows, changes, size, "change", "changes of points by the error")
+    marks += arrows
+    control = view.points[drawn.plan.kinds == "control"]
     if len(control):
         marks.append(Markers(control, "^", 5.0, INK, "white", 0.8, label="control point", layer=5.0))
     if len(moved.suspects):
-        label = "observation with the error"
-        marks.append(Markers(moved.suspects[:, pair], "s", 11.0, PURPLE, "none", 1.6, label=label, layer=7.0))
+        at, label = view.flat(moved.suspects), "observation with the error"
+        marks.append(Markers(at, "s", 11.0, PURPLE, "none", 1.6, label=label, layer=7.0))
     count, every = len(moved.points), moved.several
     notes = [
         moved.sentence,
         f"{count:,} of {every:,} points are drawn" if count < every else "",
         "" if short.all() else f"{np.count_nonzero(~short):,} larger changes are drawn without arrows",
     ]
-    title = "Effect of an undetected error"
-    panel = replace(panel, marks=marks, title=title, notes=notes, bars=bars, legend="beside", shades=shades)
-    return Plot(*size_of(panel.limits), [panel])
+    return view.plot(marks, title="Effect of an undetected error", notes=notes, bars=bars, shades=shades)
 
 
 def _points(moved: Moved, places: Floats) -> tuple[list[Mark], Shades | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -63,23 +63,17 @@ def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Docum
 def _written(parts: Sequence[Part], numeral: Callable[[str], str], draw: Draw) -> list[Any]:
     found: list[Any] = []
     for part in parts:
-        if isinstance(part, Layers):
-            layers = _written(part.parts, numeral, draw)
-            found += layers if len(layers) < 2 else [replace(part, parts=layers)]
-        elif isinstance(part, Drawing):
-            found += [drawing] if (drawing := draw(part)) else []
-        elif not _is_empty(part):
-            found.append(written(part, numeral))
+        match part:
+            case Layers():
+                layers = _written(part.parts, numeral, draw)
+                found += layers if len(layers) < 2 else [replace(part, parts=layers)]
+            case Drawing():
+                found += [drawing] if (drawing := draw(part)) else []
+            case quantity.Table(visible=False) | Facts(facts=[]) | Remarks(sentences=[]) | Text(text=""):
+                continue
+            case _:
+                found.append(written(part, numeral))
     return found
-
-
-def _is_empty(part: Part) -> bool:
-    match part:
-        case quantity.Table():
-            return not part.visible
-        case Facts(facts=content) | Remarks(sentences=content) | Text(text=content):
-            return not content
-    return False
 
 
 def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
@@ -93,39 +87,30 @@ def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
     columns = part.columns
     if part.shown is not None:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
-    pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations)]
+    pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations, numeral)]
     rows = [*zip(*(cells for _, cells in pairs), strict=True)]
-    if numeral is not str:
-        rows = [
-            tuple(cell if cell.number is None else cell._replace(text=numeral(cell.text)) for cell in row)
-            for row in rows
-        ]
     return Table(part.title, [column for column, _ in pairs], rows, part.note)
 
 
-def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, list[Cell]]]:
-    """Yield each column of a quantity with its cells."""
-    axes, of, text = each.axes, each.of, each.kind == "name"
-    mixed = len({axis.small for axis in axes}) > 1  # If components share a column, each has its own unit
-    if not axes or (text and of is None):
-        yield Column(each.head, text=text), _marked(_plain(each), each.marked)
-    elif of is not None and text:
-        names = [
-            f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name for axis in axes
+def _columns(
+    each: Quantity, by: Floats | None, numeral: Callable[[str], str]
+) -> Iterator[tuple[Column, Iterable[Cell]]]:
+    axes, of = each.axes, each.of
+    if each.kind == "name" or not axes:
+        yield Column(each.head, text=each.kind == "name"), _looked_at(_plain(each), each.marked, numeral)
+        return
+    mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
+    decimals, marked = _decimals(each, by, mixed), each.marked
+    values = np.reshape(each.outward(), (-1, len(axes) if of is None else 1))
+    for k, column in enumerate(values.T):
+        axis, rows = axes[k], np.full(len(column), k) if of is None else of
+        cells = [
+            _cell(each, value, axes[row], decimals[row])
+            for value, row in zip(column.tolist(), rows.tolist(), strict=True)
         ]
-        yield Column(each.head, text=True), [Cell(names[k]) for k in of.tolist()]
-    elif of is not None:
-        decimals = _decimals(each, by, mixed)
-        rows = zip(each.outward().tolist(), of.tolist(), strict=True)
-        cells = [_cell(each, value, axes[k], decimals[k]) for value, k in rows]
-        yield Column(each.head, "" if mixed else _unit(each, axes[0])), _marked(cells, each.marked)
-    else:
-        values = np.reshape(each.outward(), (-1, len(axes)))
-        marked = None if each.marked is None else np.reshape(each.marked, values.shape)
-        for k, (axis, count) in enumerate(zip(axes, _decimals(each, by, False), strict=True)):
-            cells = [_cell(each, value, axis, count) for value in values[:, k].tolist()]
-            head = each.head.format(axis.label or axis.name)
-            yield Column(head, _unit(each, axis)), _marked(cells, None if marked is None else marked[:, k])
+        head = each.head.format(axis.label or axis.name) if of is None else each.head
+        own = None if marked is None else np.reshape(marked, values.shape)[:, k]
+        yield Column(head, "" if mixed else _unit(each, axis)), _looked_at(cells, own, numeral)
 
 
 def _unit(each: Quantity, axis: Axis) -> str:
@@ -169,6 +154,13 @@ def _plain(each: Quantity) -> list[Cell]:
             Cell(text, None if isinstance(value, str) else value)
             for text, value in zip(texts, shown.tolist(), strict=True)
         ]
+    if each.axes and each.of is not None:  # Components with units if these differ
+        mixed = len({axis.small for axis in each.axes}) > 1
+        names = [
+            f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
+            for axis in each.axes
+        ]
+        return [Cell(names[k]) for k in each.of.tolist()]
     if each.link is None:
         return [Cell(str(name)) for name in plain.tolist()]
     ids = [f"{each.link.kind}-{row}" for row in each.link.rows.tolist()]
@@ -177,7 +169,6 @@ def _plain(each: Quantity) -> list[Cell]:
 
 
 def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cell:
-    """Return a formatted number in the unit of its axis."""
     if each.words and value in each.words:
         return Cell(each.words[value])
     if each.kind == "value" and axis.angle == "dms" and math.isfinite(value):
@@ -185,7 +176,10 @@ def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cel
     return Cell(number_text(value, decimals, each.figures), value)
 
 
-def _marked(cells: list[Cell], marked: Bools | None) -> list[Cell]:
+def _looked_at(cells: list[Cell], marked: Bools | None, numeral: Callable[[str], str]) -> Iterable[Cell]:
+    """Return cells with their marks, and numbers in another language."""
+    if numeral is not str:
+        cells = [cell if cell.number is None else cell._replace(text=numeral(cell.text)) for cell in cells]
     if marked is None:
         return cells
     return [cell._replace(tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]

@@ -78,7 +78,6 @@ def _judged(document: Document) -> list[TitledLines]:
 
 
 def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
-    """Return lines of key figures and non-empty sections with titles."""
     every = [each for each in (*document.sections, *document.details) if each.key in keys or not keys]
     titled = [("Key figures", fact_lines([*document.head, *document.highlights]))]
     for section in formatted(replace(document, sections=every, details=())).sections:

@@ -23,12 +23,8 @@ MARKS: dict[Tone, str] = {
 
 
 def judged(verdict: Verdict, on: str = "") -> Judgement:
-    """Return a verdict for a page."""
     tested = verdict.is_tested_as_a_whole
-    if verdict.exit or verdict.warning:
-        tone: Tone = "bad" if verdict.exit else "look"
-    else:
-        tone = "good" if tested else ""
+    tone: Tone = "bad" if verdict.exit else "look" if verdict.warning else "good" if tested else ""
     mark = "Look first" if tone == "look" and not tested else MARKS[tone]
     return Judgement(mark, verdict.headline, tuple(map(str, verdict.lines)), tone, on)
 

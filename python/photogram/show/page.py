@@ -130,7 +130,6 @@ class Section:
 
     @classmethod
     def of(cls, table: quantity.Table) -> Section:
-        """Return a section with one table."""
         return cls(table.key, table.title, [table], table.about)
 
 
@@ -171,7 +170,6 @@ class Document:
     numeral: Callable[[str], str] = str  # Formats numbers of tables in the language
 
     def with_sections(self, *more: Section) -> Document:
-        """Return the page with more sections at its end."""
         return replace(self, sections=[*self.sections, *more])
 
     def tables(self, *, layers: bool = False) -> list[quantity.Table]:
@@ -179,7 +177,6 @@ class Document:
         return [part for part in self.parts(layers=layers) if isinstance(part, quantity.Table)]
 
     def drawings(self) -> list[Drawing]:
-        """Return the plots of all sections and details."""
         return [part for part in self.parts(layers=True) if isinstance(part, Drawing)]
 
     def parts(self, *, layers: bool = False) -> list[Part]:

@@ -91,11 +91,9 @@ class Quantity:
 
     @property
     def single(self) -> bool:
-        """Whether each item has one value."""
         return not self.axes or self.of is not None or np.ndim(self.values) == 1
 
     def unit(self, axis: Axis) -> str:
-        """Return the unit of a component in reports."""
         if self.kind == "number":
             return ""
         if self.kind == "value":
@@ -148,7 +146,6 @@ class Table:
         return len(rows) > 0 and any(column.head for column in self.columns)
 
     def frame(self) -> pd.DataFrame:
-        """Return the named columns as a data frame."""
         import pandas as pd
 
         return pd.DataFrame(frame(self.columns))
@@ -187,7 +184,6 @@ def column(name: str, values: Any, head: str = "", **more: Any) -> Quantity:
 
 
 def named(table: Quantities, name: str) -> Quantity:
-    """Return the quantity with this column name."""
     return next(column for column in table if column.name == name)
 
 

@@ -9,10 +9,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from photogram import _photocore
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import printable
 from photogram.show.page import Fact, Facts, Part, Section, about
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Quantity, Table, of_each
 
 LISTED = 200  # Maximum number of listed input files
 BYTES, SECONDS = (Axis.of("", "bytes"),), (Axis.of("", "s"),)
@@ -36,8 +36,7 @@ class Run:
     inputs: Sequence[InputFile]  # The files that were read
     began: datetime
     seconds: float  # Up to the report
-    others: int = field(default=0)
-    """Number of read files that are not in `inputs`."""
+    others: int = 0  # Number of read files that are not in `inputs`
 
 
 def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
@@ -55,17 +54,14 @@ def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
     """Return the last report section: a command's run, and engine seconds."""
     made = [Fact("photogram", _photocore.__version__), Fact("Python", platform.python_version())]
     if run is not None:
-        stamp = run.began.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S")
-        made += [
-            Fact("Command", printable(run.command)),
-            Fact("Began", stamp, "UTC"),
-            Fact("Time up to this report", f"{run.seconds:.2f}", "s"),
-        ]
+        made.append(Fact("Command", printable(run.command)))
+        made.append(Fact("Began", run.began.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S"), "UTC"))
+        made.append(Fact("Time up to this report", f"{run.seconds:.2f}", "s"))
     inputs, options = (run.inputs, run.options) if run else ((), dict[str, str]())
     files = [
         Quantity([printable(str(each.path)) for each in inputs], kind="name", head="File"),
-        Quantity([each.size for each in inputs], BYTES, "deviation", head="Size", decimals=0),
-        Quantity([each.sha256 for each in inputs], kind="name", head="SHA-256"),
+        of_each(inputs, "size", BYTES, "deviation", head="Size", decimals=0),
+        of_each(inputs, "sha256", (), "name", head="SHA-256"),
     ]
     values = [
         Quantity([*options], kind="name", head="Option"),

@@ -22,13 +22,13 @@ def band(x: Floats, y: Floats, error: Floats, colour: str, label: str) -> list[M
     return [area(x, y - error, y + error, colour, 0.2), Line(np.column_stack([x, y]), colour, label=label)]
 
 
-def curves(marks: Sequence[Mark], across: str, up: str, title: str = "", legend: str = "best") -> Panel:
+def curves(marks: Sequence[Mark], across: str, up: str, title: str = "") -> Panel:
     """Return a panel that contains all given lines and bands."""
-    lines = [mark.places for mark in marks if isinstance(mark, Line)]
+    lines = [line for mark in marks if isinstance(mark, Line) for line in mark.lines]
     x, y = np.concatenate(lines).T
-    bands = [mark.places[..., 1] for mark in marks if isinstance(mark, Polygons)]
+    bands = [outline[:, 1] for mark in marks if isinstance(mark, Polygons) for outline in mark.places]
     limits = np.column_stack([spread(x), spread(y, *bands)])
-    return Panel(limits, marks, title, across, up, legend=legend)
+    return Panel(limits, marks, title, across, up, legend="best")
 
 
 def vectors(

@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.sketch.marks import Arrows, Contours, Line, Mark, Markers, Panel, Shades
+from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, Shades, contours
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, VERMILION, round_length
 from photogram.targets.calibration_difference import CameraDifference
@@ -200,8 +200,8 @@ def _map(
     levels = steps_of_125(max(float(positive.min()), lowest * high), high)
     shades = Shades(float(levels[0]), float(levels[-1]), unit, log=True)
     shown = np.where(values > 0, values, np.nan)
-    contours = Contours(columns, rows, shown, levels, shades, steps=COLOURS_PER_CONTOUR)
-    return replace(panel, marks=[contours, *marks], shades=shades)
+    areas = contours(columns, rows, shown, levels, shades, steps=COLOURS_PER_CONTOUR)
+    return replace(panel, marks=[*areas, *marks], shades=shades)
 
 
 def _known(found: UncertaintyMap) -> list[Mark]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.comparator.listing.parameters import table_nodes
 from photogram.comparator.pictures.vectors import MAIN, MM, OF_COMPARATOR, plan
-from photogram.show.sketch.marks import Contours, Line, Mark, Markers, Panel, Shades, around
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, Shades, around, contours
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, round_length
 
@@ -36,7 +36,7 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: 
         Panel(
             np.array([centre - half, centre + half]) / MM,
             [
-                Contours(x / MM, y / MM, values[..., axis], levels, shades, "black", 0.4),
+                *contours(x / MM, y / MM, values[..., axis], levels, shades, "black", 0.4),
                 Markers(measured, ".", 3.0, INK, opacity=0.7),
             ],
             f"correction in {'xy'[axis]}",

@@ -15,7 +15,6 @@ from photogram.results.statement.texts import Texts
 from photogram.show.sketch.marks import (
     Arrows,
     Ellipses,
-    Level,
     Line,
     Mark,
     Markers,
@@ -27,6 +26,7 @@ from photogram.show.sketch.marks import (
     around,
     ellipse_axes,
     error_bars,
+    level,
     spread,
 )
 from photogram.show.sketch.plot import Plot
@@ -55,7 +55,7 @@ def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
     if len(found):
         panel = _points(panel, found, float(extent.max()), texts)
     height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
-    return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="above")])
+    return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="beside")])
 
 
 def _in_plan(limits: Floats, texts: Texts) -> Panel:
@@ -98,7 +98,7 @@ def lengths(found: Lengths, texts: Texts) -> Plot:
     marks: list[Mark] = [
         Line(error_bars(places, *ends), BLUE, 0.7),
         Markers(places, "o", 3.0, BLUE),
-        Level(0.0, SOFT, 0.6),
+        level(0.0, SOFT, 0.6),
     ]
     if test.limits is not None:
         for limit in (test.limits, -test.limits):

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.sketch.letters import Box, Ticks, ticks, widest, width, wrapped
-from photogram.show.sketch.marks import Level, Line, Markers, Panel, Polygons, Sketch
+from photogram.show.sketch.marks import Line, Markers, Panel, Polygons, Sketch
 
 HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0  # Sizes of letters
 HEAD_LINE, TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 15.0, 13.0, 9.6, 11.5, 12.0
@@ -49,29 +49,21 @@ class Placed:
 
     @property
     def scale(self) -> float:
-        """Points of a unit across."""
         return (self.box[2] - self.box[0]) / float(abs(self.panel.limits[1, 0] - self.panel.limits[0, 0]))
 
     @property
     def above(self) -> float:
-        """Height of title, legend and bars over the box."""
-        legend = LEGEND_LINE if self.panel.legend == "above" else 0.0
-        return 6.0 + TITLE_LINE * len(self.title) + legend + BAR_LINE * len(self.panel.bars)
+        """Height of title and bars over the box."""
+        return 6.0 + TITLE_LINE * len(self.title) + BAR_LINE * len(self.panel.bars)
 
     @property
-    def axis_below(self) -> float:
+    def below(self) -> float:
         """Height of the numbers and of the name of the axis below the box."""
         panel, numbers = self.panel, 0.0
         if self.numbered:
             turned = widest(panel.across_names, NUMBER) if panel.turned else 0.0
             numbers = 5.0 + max(turned, NUMBER + 2.0)
         return numbers + (LABEL + 5.0 if panel.across else 0.0) + 3.0
-
-    @property
-    def below(self) -> float:
-        """Height of axis and legend below the box, down to its notes."""
-        legend = self.legend_size[1] + GAP / 2 if self.panel.legend == "below" else 0.0
-        return self.axis_below + legend
 
     @property
     def legend_size(self) -> tuple[float, float]:
@@ -81,21 +73,14 @@ class Placed:
 
     @property
     def legend(self) -> Box:
-        """Left, upper, right and lower side of the legend."""
-        left, top, right, low = self.box
-        wide, high = self.legend_size
-        inner, where = GAP / 2, self.panel.legend
-        corners = {
-            "upper right": (right - wide - inner, top + inner),
-            "upper left": (left + inner, top + inner),
-            "lower left": (left + inner, low - high - inner),
-            "lower right": (right - wide - inner, low - high - inner),
-        }
-        if where == "best":
-            curves = np.concatenate([np.empty((0, 2)), *map(self.at, _curves(self.panel))])
-            where = min(corners, key=lambda name: _inside(curves, *corners[name], wide, high))
-        corners |= {"beside": (right + GAP, top), "below": (left, low + self.axis_below)}
-        x, y = corners[where]
+        """Left, upper, right and lower side of the legend: beside the box, or in the emptiest corner."""
+        (left, top, right, low), (wide, high) = self.box, self.legend_size
+        if self.panel.legend == "beside":
+            return right + GAP, top, right + GAP + wide, top + high
+        curves = np.concatenate([np.empty((0, 2)), *map(self.at, _curves(self.panel))])
+        inner = left + GAP / 2, top + GAP / 2, right - wide - GAP / 2, low - high - GAP / 2
+        corners = [(x, y) for y in (inner[1], inner[3]) for x in (inner[2], inner[0])]
+        x, y = min(corners, key=lambda corner: _inside(curves, corner, self.legend_size))
         return x, y, x + wide, y + high
 
     @property
@@ -107,18 +92,18 @@ class Placed:
     def end(self) -> tuple[float, float]:
         """Right and lower limit of the panel with all its text."""
         (left, _, right, low), panel = self.box, self.panel
-        ends = [left + widest(self.title, TITLE), left + widest(self.notes, NOTE)]
-        ends.append(right + 0.5 * widest(self.across.texts[-1:], NUMBER))
-        ends.append(left + self.legend_size[0] if panel.legend == "below" else 0.0)
-        ends.append(0.5 * (left + right + width(self.across.named(panel.across), LABEL)))
-        ends.append(self.right_side + (GAP + COLOUR_BAR if panel.shades else 0.0))
-        ends += [left + self.scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars]
+        ends = [
+            left + max(widest(self.title, TITLE), widest(self.notes, NOTE)),
+            right + 0.5 * widest(self.across.texts[-1:], NUMBER),
+            0.5 * (left + right + width(self.across.named(panel.across), LABEL)),
+            self.right_side + (GAP + COLOUR_BAR if panel.shades else 0.0),
+            *(left + self.scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars),
+        ]
         down = low + self.below + NOTE_LINE * len(self.notes)
         return max(ends), max(down, self.legend[3]) if panel.legend == "beside" else down
 
 
 def heading(sketch: Sketch) -> list[str]:
-    """Return the lines of the title of all panels."""
     return wrapped(sketch.title, HEAD, 72.0 * sketch.width - GAP)
 
 
@@ -190,14 +175,13 @@ def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
     across, up = (
         Ticks(np.arange(len(names), dtype=float), list(names))
         if names
-        else ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log).signed(panel.decimal)
+        else ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log, decimal=panel.decimal)
         for axis, (names, length, log) in enumerate(sides)
     )
     return across, up
 
 
 def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
-    """Return width and height of a box within limits."""
     if not panel.equal:
         return wide, high
     across, up = np.abs(panel.limits[1] - panel.limits[0]).tolist()
@@ -207,15 +191,13 @@ def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
 
 def _curves(panel: Panel) -> list[Floats]:
     """Return (n, 2) points that a legend should not cover."""
-    found: list[Floats] = []
-    for mark in panel.marks:
-        if isinstance(mark, (Line, Markers, Polygons)):
-            found.append(mark.places.reshape(-1, 2))
-        elif isinstance(mark, Level):
-            left, right = panel.limits[:, 0].tolist()
-            found.append(np.column_stack([np.linspace(left, right, 60), np.full(60, mark.height)]))
-    return found
+    marks = [
+        mark.lines if isinstance(mark, Line) else mark.places
+        for mark in panel.marks
+        if isinstance(mark, (Line, Markers, Polygons))
+    ]
+    return [places.reshape(-1, 2) for mark in marks for places in mark]
 
 
-def _inside(places: Floats, x: float, y: float, wide: float, high: float) -> int:
-    return int(((places > [x, y]) & (places < [x + wide, y + high])).all(axis=1).sum())
+def _inside(places: Floats, corner: tuple[float, float], size: tuple[float, float]) -> int:
+    return int(((places > corner) & (places < np.add(corner, size))).all(axis=1).sum())

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TypeAlias
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from photogram.lazy_dataclasses import dataclass
 
 Box: TypeAlias = tuple[float, float, float, float]  # Left, low, right and high side
 NOWHERE = np.empty((0, 2))
+SIDES = ((0, 0), (2, 2), (2, 0), (0, 2), (0, 1), (2, 1), (1, 0), (1, 2))  # Of a point, in the order of trial
 # Advance widths of DejaVu Sans 2.37 from space to tilde, in thousandths of the size. It is the widest of the
 # fonts of pages, so that the text also fits with the others.
 _ASCII = (
@@ -54,42 +55,36 @@ def wrapped(text: str, size: float, room: float) -> list[str]:
 
 
 def free_names(
-    texts: Sequence[str], places: Floats, avoid: Floats, size: float, room: Box, taken: list[Box]
+    texts: Sequence[str],
+    places: Floats,
+    avoid: Floats,
+    size: float,
+    room: Box,
+    taken: list[Box],
+    centred: bool = False,
 ) -> Iterator[tuple[int, Box]]:
-    """Yield rows and boxes of names that fit at one of eight sides of their points.
+    """Yield rows and boxes of names that fit at one of eight sides of their points, or at their centre.
 
-    Boxes are within `room`. They cover no point, none of `avoid`, and none of the boxes `taken`, to which
-    they are added. `size` is the letter size.
+    Boxes are within `room`. They cover no other point, none of `avoid`, and none of the boxes `taken`, to
+    which they are added. `size` is the letter size.
     """
-    obstacles, gap, high = np.concatenate([places, avoid]), 4.0 / 7.0 * size, 8.0 / 7.0 * size
+    obstacles = avoid if centred else np.concatenate([places, avoid])
+    gap, high = 4.0 / 7.0 * size, 8.0 / 7.0 * size
     for row, (text, (x, y)) in enumerate(zip(texts, places.tolist(), strict=True)):
         wide = width(text, size) + 0.8 / 7.0 * size
         across, up = (x + gap, x - wide / 2, x - gap - wide), (y + gap, y - high / 2, y - gap - high)
-        sides = ((0, 0), (2, 2), (2, 0), (0, 2), (0, 1), (2, 1), (1, 0), (1, 2))
-        boxes = [(across[i], up[j], across[i] + wide, up[j] + high) for i, j in sides]
-        if box := first_free(boxes, room, taken, obstacles):
-            yield row, box
-
-
-def first_free(
-    boxes: Iterable[Box], room: Box, taken: list[Box], places: Floats = NOWHERE, gap: float = 0.0
-) -> Box | None:
-    """Return the first box within `room` that avoids points and the boxes `taken`.
-
-    It is added to `taken`.
-    """
-    for left, low, right, high in boxes:
-        inside = room[0] <= left and right <= room[2] and room[1] <= low and high <= room[3]
-        if inside and not ((places > [left, low]) & (places < [right, high])).all(axis=1).any():
-            around = left - gap, low - gap, right + gap, high + gap
-            if not any(overlap(around, other) for other in taken):
-                taken.append((left, low, right, high))
-                return taken[-1]
-    return None
+        for i, j in ((1, 1),) if centred else SIDES:
+            box = left, low, right, top = across[i], up[j], across[i] + wide, up[j] + high
+            inside = room[0] <= left and right <= room[2] and room[1] <= low and top <= room[3]
+            if not inside or ((obstacles > [left, low]) & (obstacles < [right, top])).all(axis=1).any():
+                continue
+            if not any(overlap(box, other) for other in taken):
+                taken.append(box)
+                yield row, box
+                break
 
 
 def overlap(one: Box, other: Box) -> bool:
-    """Return whether two boxes overlap."""
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
@@ -109,57 +104,48 @@ class Ticks:
         """Return the name of the axis with the power of ten of its numbers."""
         return f"{name} (× {self.power})".strip() if self.power else name
 
-    def signed(self, decimal: str) -> Ticks:
-        """Return the ticks with the decimal sign of a language."""
-        return Ticks(self.values, [text.replace(".", decimal) for text in self.texts], self.power)
 
-
-def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool = False) -> Ticks:
-    """Return ticks of an axis with (2,) limits; `length` and `size` in points.
+def ticks(
+    limits: Floats, length: float, size: float, *, across: bool, log: bool = False, decimal: str = "."
+) -> Ticks:
+    """Return ticks of an axis with (2,) limits; `length` and `size` in points, `decimal` the decimal sign.
 
     With `across`, numbers are next to each other. Logarithmic axes have 1, 2, 5 times powers of ten.
     """
     low, high = sorted(limits.tolist())
-    if log and (ratios := _ratios(low, high, length, size, across=across)):
-        return ratios
-    extent = high - low
-    if not extent > 0:
-        return _written(np.array([low]), extent)
-    least = extent / MAX_STEPS if across else max(extent / MAX_STEPS, 2.6 * size / max(length, 1e-9) * extent)
-    steps = 10.0 ** math.floor(math.log10(least)) * np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])
-    for step in steps[steps >= least * (1 - 1e-9)].tolist():
-        values = step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
-        if len(values) < 2:
-            break
-        found = _written(values, step)
-        if not across or widest(found.texts, size) + 1.6 * size < step / extent * length:
+    for values, step in _candidates(low, high, log):
+        places = np.log(values / low) / math.log(high / low) if log else (values - low) / (high - low)
+        found = _written(values, step, decimal)
+        room = widest(found.texts, size) + 1.6 * size if across else 2.6 * size
+        if len(values) > 1 and (np.diff(places) * length > room).all():
             return found
     # A short axis without space for two of these has its ends, or one of them.
-    ends = _written(np.array([low, high]), step / 10.0)
+    ends = _written(np.unique([low, high]), (high - low) / 100.0, decimal)
     fit = not across or widest(ends.texts, size) + size < length
-    return ends if fit else _written(ends.values[:1], step / 10.0)
+    return ends if fit else _written(ends.values[:1], (high - low) / 100.0, decimal)
 
 
-def _ratios(low: float, high: float, length: float, size: float, *, across: bool) -> Ticks | None:
-    """Return ticks of a logarithmic axis; None if fewer than two fit."""
-    powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
-    for steps in ((1.0, 2.0, 5.0), (1.0, 5.0), (1.0,)):
-        every = np.outer(powers, steps).ravel()
-        values = every[(every >= low * (1 - 1e-9)) & (every <= high * (1 + 1e-9))]
-        found = Ticks(values, [f"{value:g}" for value in values.tolist()])
-        places = np.log(values) / math.log(high / low) * length
-        room = widest(found.texts, size) + 0.8 * size if across else 1.6 * size
-        if len(values) > 1 and (np.diff(places) > room).all():
-            return found
-    return None
+def _candidates(low: float, high: float, log: bool) -> Iterator[tuple[Any, float]]:
+    """Yield values between limits with their step, many first; ratios have the step 0."""
+    if log:
+        powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+        for steps in ((1.0, 2.0, 5.0), (1.0, 5.0), (1.0,)):
+            every = np.outer(powers, steps).ravel()
+            yield every[(every >= low * (1 - 1e-9)) & (every <= high * (1 + 1e-9))], 0.0
+    least = (high - low) / MAX_STEPS
+    power = 10.0 ** math.floor(math.log10(least)) if least > 0 else 0.0
+    for step in (factor * power for factor in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)):
+        if step >= least * (1 - 1e-9) > 0:
+            yield step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1), step
 
 
-def _written(values: Floats, step: float) -> Ticks:
-    largest = float(np.abs(values).max())
-    power = 0
-    if largest > 0 and not 1e-3 <= largest < 1e8:
+def _written(values: Floats, step: float, decimal: str) -> Ticks:
+    largest, power = float(np.abs(values).max(initial=0.0)), 0
+    if largest > 0 and step and not 1e-3 <= largest < 1e8:
         power = math.floor(math.log10(largest))
-    decimals = max(0, power - math.floor(math.log10(step) + 1e-9)) if step > 0 else 0
-    texts = [f"{value / 10.0**power:.{min(decimals, 15)}f}" for value in values.tolist()]
+    decimals = min(max(0, power - math.floor(math.log10(step) + 1e-9)), 15) if step > 0 else 0
+    layout = f".{decimals}f" if step else "g"
+    texts = [f"{value / 10.0**power:{layout}}" for value in values.tolist()]
     texts = [text.lstrip("-") if not text.strip("-0.") else text.replace("-", "−") for text in texts]
+    texts = [text.replace(".", decimal) for text in texts]
     return Ticks(values, texts, f"10{str(power).translate(SUPERSCRIPT)}" if power else "")

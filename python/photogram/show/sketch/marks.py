@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.sketch.letters import NOWHERE
-from photogram.show.style import BLUE, INK, VERMILION
+from photogram.show.style import BLUE, INK, VERMILION, need
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,6 +46,11 @@ class Shades:
             return np.asarray(np.log(values / self.low) / np.log(self.high / self.low))
         return (values - self.low) / (self.high - self.low)
 
+    def values(self, parts: Floats) -> Floats:
+        if self.log:
+            return np.asarray(self.low * (self.high / self.low) ** parts)
+        return self.low + (self.high - self.low) * parts
+
 
 @dataclass(frozen=True, eq=False)
 class Markers(Labelled):
@@ -66,23 +71,18 @@ class Markers(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Line(Labelled):
-    """A line through (n, 2) points, or k through (k, n, 2); `dash` style."""
+    """A line through (n, 2) points, or several lines; `dash` style."""
 
-    places: Floats
+    places: Floats | Sequence[Floats]
     colour: str = INK
     width: float = 1.5
     dash: str = ""
     opacity: float = 1.0
 
-
-@dataclass(frozen=True, eq=False)
-class Level(Mark):
-    """A horizontal line over the whole panel."""
-
-    height: float
-    colour: str
-    width: float = 0.5
-    dash: str = ""
+    @property
+    def lines(self) -> Sequence[Floats]:
+        places = self.places
+        return [places] if isinstance(places, np.ndarray) and places.ndim == 2 else [*places]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +97,11 @@ class Arrows(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Polygons(Labelled):
-    """Closed outlines through (n, v, 2) points, with colours and opacities."""
+    """Closed outlines through (v, 2) points; without an edge they are one area, with holes."""
 
-    places: Floats
+    places: Floats | Sequence[Floats]
     face: str
-    face_opacity: float
+    face_opacity: float = 1.0
     edge: str = ""
     edge_opacity: float = 1.0
     width: float = 0.0
@@ -134,29 +134,6 @@ class Mesh(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Contours(Mark):
-    """Areas between contour lines of a grid."""
-
-    across: Floats  # (columns,) and (rows,) positions along the axes
-    up: Floats
-    values: Floats  # (rows, columns); NaN: none
-    levels: Floats  # Levels of the lines, ascending; each is written on its lines
-    shades: Shades
-    colour: str = "white"  # Colour of the lines
-    width: float = 0.9
-    steps: int = 1  # Number of colours between two levels
-    layer: float = field(default=1.0, kw_only=True)
-
-    @property
-    def bounds(self) -> Floats:
-        """Limits of the areas of one colour."""
-        places = np.arange(self.steps * (len(self.levels) - 1) + 1) / self.steps
-        along = np.log(self.levels) if self.shades.log else self.levels
-        found = np.interp(places, np.arange(len(self.levels)), along)
-        return np.asarray(np.exp(found) if self.shades.log else found)
-
-
-@dataclass(frozen=True, eq=False)
 class Texts(Mark):
     """Words at (n, 2) points, which are their `start`, `middle` or `end`."""
 
@@ -170,13 +147,19 @@ class Texts(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Names(Mark):
-    """Names near (n, 2) points, if space; none covers points or `avoid`."""
+    """Names near (n, 2) points, or `centred`, if space; none covers other points or `avoid`."""
 
     places: Floats
     texts: Sequence[str]
     colours: Sequence[str]
     avoid: Floats = field(default_factory=lambda: NOWHERE)
+    centred: bool = False
     layer: float = field(default=9.0, kw_only=True)
+
+
+def level(height: float, colour: str, width: float = 0.5, dash: str = "") -> Line:
+    """Return a horizontal line over the whole panel."""
+    return Line(np.array([[-np.inf, height], [np.inf, height]]), colour, width, dash)
 
 
 def band(across: Floats, low: Floats, high: Floats, colour: str, opacity: float, label: str = "") -> Polygons:
@@ -234,8 +217,52 @@ def rgb(shades: Shades, values: Floats) -> Indices:
 
 
 def hexadecimal(colour: Indices) -> str:
-    """Return red, green and blue in hexadecimal notation."""
     return "#{:02x}{:02x}{:02x}".format(*colour.tolist())
+
+
+def contours(
+    across: Floats,
+    up: Floats,
+    values: Floats,
+    levels: Floats,
+    shades: Shades,
+    colour: str = "white",
+    width: float = 0.9,
+    steps: int = 1,
+) -> list[Mark]:
+    """Return areas and lines of the contours of (rows, columns) values, with the levels of long lines.
+
+    Levels ascend; there are `steps` colours between two of them. Cells with NaN are empty.
+    """
+    need("contourpy", "contours", "report")
+    from contourpy import FillType, LineType, contour_generator  # part of matplotlib, fast to import
+
+    kinds: Any = {"fill_type": FillType.OuterOffset, "line_type": LineType.Separate}
+    made: Any = contour_generator(across, up, np.ma.masked_invalid(values), **kinds)
+    places = np.interp(
+        np.arange(steps * (len(levels) - 1) + 1) / steps, np.arange(len(levels)), shades.parts(levels)
+    )
+    bounds = shades.values(places)
+    beyond = max(np.nanmax(values), bounds[-1]) + 1.0
+    # Values below the first level have its colour as well; each area covers the previous ones, without seams.
+    lows = [np.nanmin(values) - 1.0, *bounds[1:-1].tolist()]
+    marks: list[Mark] = []
+    for low, tone in zip(lows, rgb(shades, shades.values((places[:-1] + places[1:]) / 2)), strict=True):
+        filled = zip(*made.filled(low, beyond), strict=True)
+        rings = [ring for outlines, ends in filled for ring in np.split(outlines, ends[1:-1])]
+        marks.append(Polygons(rings, hexadecimal(tone)))
+    written = [
+        (f"{level:g}".replace("-", "−"), line) for level in levels.tolist() for line in made.lines(level)
+    ]
+    lines = [line for _, line in written]
+    # Names of adjacent lines are at different parts of these.
+    texts, at = [], []
+    for k, (text, line) in enumerate(written):
+        if np.hypot(*np.diff(line, axis=0).T).sum() > 0.1 * max(np.ptp(across), np.ptp(up)):
+            texts.append(text)
+            at.append(line[int(len(line) * (0.5, 0.3, 0.7)[k % 3])])
+    names = Names(np.reshape(at, (-1, 2)), texts, [INK] * len(at), centred=True)
+    return [*marks, Line(lines, colour, width, layer=1.0), names]
 
 
 ScaleBar: TypeAlias = tuple[float, str, str]
@@ -254,8 +281,7 @@ class Panel:
     equal: bool = False  # Whether both axes have the same scale
     notes: Sequence[str] = ()  # Notes below the panel
     bars: Sequence[ScaleBar] = ()  # Scale bars of enlarged marks, below the title
-    # Position: `beside`, `above`, `below`, a corner (`upper right` ...), `best` (the emptiest), or empty
-    legend: str = ""
+    legend: Literal["", "beside", "best"] = ""  # Beside the panel, or in its emptiest corner
     # Names at 0, 1, 2 ... instead of numbers
     across_names: Sequence[str] = ()
     up_names: Sequence[str] = ()
@@ -271,7 +297,6 @@ class Panel:
 
     @property
     def labelled(self) -> list[Labelled]:
-        """Marks in the legend."""
         return [mark for mark in self.marks if isinstance(mark, Labelled) and mark.label]
 
     def even(self, places: Floats) -> Floats:
@@ -295,12 +320,10 @@ class Sketch:
 
     @property
     def rows(self) -> int:
-        """Number of rows of panels."""
         return -(-len(self.panels) // self.columns)
 
 
 def spread(*values: Floats | float) -> tuple[float, float]:
-    """Return limits with a margin around finite values."""
     every = np.concatenate([np.ravel(each) for each in values])
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 0.0)

@@ -16,12 +16,7 @@ from photogram.show.style import FAINT, INK, styled
 from photogram.words import phrase
 
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
-LEGENDS: dict[str, dict[str, Any]] = {
-    "beside": {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0},
-    "below": {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "borderaxespad": 4.5},
-    "above": {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)},
-    "lower right": {"loc": "lower right", "frameon": True, "framealpha": 1.0, "edgecolor": "white"},
-}
+BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
 ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 
@@ -92,11 +87,10 @@ def _around(axes: Any, panel: Panel) -> None:
     from matplotlib.transforms import ScaledTranslation
 
     if panel.legend:
-        columns = len(axes.get_legend_handles_labels()[0]) if panel.legend == "above" else 1
-        legend = axes.legend(**LEGENDS.get(panel.legend, {"loc": panel.legend}), ncols=columns)
+        legend = axes.legend(**(BESIDE if panel.legend == "beside" else {"loc": "best"}))
         for handle in legend.legend_handles:
             if isinstance(handle, PathCollection):
-                handle.set_sizes([16.0])
+                handle.set_sizes(np.maximum(handle.get_sizes(), 16.0))
     left, right = axes.get_xlim()
     outside = {"textcoords": "offset points", "color": INK, "annotation_clip": False, "fontsize": NOTE}
     for row, (length, colour, text) in enumerate(reversed(panel.bars)):
@@ -138,7 +132,6 @@ def _colours(shades: marks.Shades) -> dict[str, Any]:
 
 
 def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
-    """Write names near their points, without overlaps."""
     named = [(axes, mark) for axes, panel in drawn for mark in panel.marks if isinstance(mark, marks.Names)]
     # Legends and axes with equal scales have their final positions in the second layout.
     for axes, _ in named[:1] * 2:
@@ -147,7 +140,7 @@ def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
         point, at = axes.figure.dpi / 72.0, axes.transData.transform(mark.places)
         room, avoid = axes.get_window_extent().extents, axes.transData.transform(mark.avoid)
         # The boxes that matplotlib draws are wider than the words.
-        for row, box in free_names(mark.texts, at, avoid, 1.1 * NAME * point, room, []):
+        for row, box in free_names(mark.texts, at, avoid, 1.1 * NAME * point, room, [], mark.centred):
             shift = (box[0] - at[row, 0]) / point + 0.4, (box[1] - at[row, 1]) / point + 1.8
             look = {"textcoords": "offset points", "fontsize": NAME, "color": mark.colours[row]}
             name = axes.annotate(mark.texts[row], mark.places[row], shift, **look)
@@ -156,7 +149,6 @@ def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
 
 
 def lay_out(whole: Any) -> None:
-    """Compute the final positions of axes and legends of a figure."""
     whole = whole.canvas.figure
     if (engine := whole.get_layout_engine()) is not None:
         engine.execute(whole)
@@ -171,20 +163,24 @@ def draw(mark: marks.Mark, axes: Any) -> None:
         case marks.Markers():
             _markers(mark, axes, given)
         case marks.Line():
-            lines = np.atleast_3d(mark.places.T).T
-            ends = np.full((len(lines), 1, 2), np.nan)  # Lines are not connected
-            places = np.concatenate([lines, ends], axis=1).reshape(-1, 2)
-            axes.plot(*places.T, **_stroke(mark), alpha=mark.opacity, solid_capstyle="butt", **given)
-        case marks.Level():
-            axes.axhline(mark.height, **_stroke(mark), zorder=mark.layer)
+            ends = axes.get_xlim()
+            gap = np.full((1, 2), np.nan)  # Lines are not connected
+            places = np.concatenate([part for line in mark.lines for part in (line, gap)])
+            places = np.nan_to_num(places, nan=np.nan, neginf=min(ends), posinf=max(ends))
+            given |= {"color": mark.colour, "linewidth": mark.width, "linestyle": mark.dash or "-"}
+            axes.plot(*places.T, alpha=mark.opacity, solid_capstyle="butt", **given)
         case marks.Arrows():
             given |= {"color": mark.colours, "width": mark.width, "headwidth": 3.5, "headlength": 4.5}
             plain = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
             axes.quiver(*mark.places.T, *mark.vectors.T, **plain, **given)
         case marks.Polygons() | marks.Ellipses():
             _outlines(mark, axes, given)
-        case marks.Mesh() | marks.Contours():
-            _surface(mark, axes)
+        case marks.Mesh():
+            (left, low), (right, high) = mark.corners
+            rows, columns = mark.values.shape
+            x, y = np.linspace(left, right, columns + 1), np.linspace(low, high, rows + 1)
+            look = {"zorder": mark.layer, **_colours(mark.shades)}
+            axes.pcolormesh(x, y, np.ma.masked_invalid(mark.values), rasterized=True, **look)
         case marks.Texts():
             look = {"ha": ALIGNED[mark.anchor], "va": "center", "fontsize": mark.size}
             for (x, y), text, colour in zip(mark.places.tolist(), mark.texts, mark.colours, strict=True):
@@ -193,23 +189,18 @@ def draw(mark: marks.Mark, axes: Any) -> None:
             raise TypeError(f"the renderer for matplotlib does not draw {type(mark).__name__}")
 
 
-def _stroke(mark: marks.Line | marks.Level) -> dict[str, Any]:
-    return {"color": mark.colour, "linewidth": mark.width, "linestyle": mark.dash or "-"}
-
-
 def _markers(mark: marks.Markers, axes: Any, given: dict[str, Any]) -> None:
-    given |= {"alpha": mark.opacity, "rasterized": len(mark.places) > MAX_VECTOR_MARKS}
-    dots: dict[str, Any] = {"s": mark.size**2, "marker": mark.shape, "linewidths": 0}
-    places = mark.places
+    given |= {"alpha": mark.opacity, "rasterized": len(mark.places) > MAX_VECTOR_MARKS, "marker": mark.shape}
+    places, edge = mark.places, 0 if mark.shape == "o" and not mark.face else mark.edge
+    given |= {"s": mark.size**2, "linewidths": edge}
     if mark.values is not None and mark.shades is not None:
         order = np.argsort((1.0 if mark.rising else -1.0) * mark.values, kind="stable")
-        given |= {**dots, "c": mark.values[order], **_colours(mark.shades)}
-        axes.scatter(places[order, 0], places[order, 1], **given)
-    elif mark.shape == "o" and not mark.face:
-        axes.scatter(places[:, 0], places[:, 1], color=mark.colour, **dots, **given)
+        places, given = places[order], given | {"c": mark.values[order], **_colours(mark.shades)}
+    elif mark.face:
+        given |= {"facecolors": mark.face, "edgecolors": mark.colour}
     else:
-        given |= {"markersize": mark.size, "markeredgewidth": mark.edge, "markeredgecolor": mark.colour}
-        axes.plot(*places.T, mark.shape, markerfacecolor=mark.face or mark.colour, **given)
+        given["color"] = mark.colour
+    axes.scatter(*places.T, **given)
 
 
 def _outlines(mark: marks.Polygons | marks.Ellipses, axes: Any, given: dict[str, Any]) -> None:
@@ -229,18 +220,3 @@ def _outlines(mark: marks.Polygons | marks.Ellipses, axes: Any, given: dict[str,
         wide, high = 2 * mark.semi_axes.T
         drawn = EllipseCollection(wide, high, mark.angles, linewidths=mark.width, **given)
     axes.add_collection(drawn, autolim=False)
-
-
-def _surface(mark: marks.Mesh | marks.Contours, axes: Any) -> None:
-    values, given = np.ma.masked_invalid(mark.values), {"zorder": mark.layer, **_colours(mark.shades)}
-    if isinstance(mark, marks.Mesh):
-        (left, low), (right, high) = mark.corners
-        rows, columns = values.shape
-        x, y = np.linspace(left, right, columns + 1), np.linspace(low, high, rows + 1)
-        axes.pcolormesh(x, y, values, rasterized=True, **given)
-        return
-    areas = axes.contourf(mark.across, mark.up, values, mark.bounds, extend="min", **given)
-    areas.set_edgecolor("face")  # No seams between colours
-    look = {"colors": mark.colour, "linewidths": mark.width, "linestyles": "solid"}
-    lines = axes.contour(mark.across, mark.up, values, mark.levels, **look)
-    axes.clabel(lines, fmt="%g", fontsize=8.0)

@@ -8,12 +8,11 @@ import numpy as np
 
 from photogram.show.sketch import layout
 from photogram.show.sketch.layout import COLOUR_BAR, GAP, LABEL, LEGEND, LEGEND_LINE, NUMBER, SWATCH, Placed
-from photogram.show.sketch.letters import Box, ticks, widest, width
+from photogram.show.sketch.letters import Box, ticks, widest
 from photogram.show.sketch.marks import Labelled, Panel, Shades, Sketch, hexadecimal, stops
 from photogram.show.sketch.svg_marks import (
     Attributes,
     element,
-    levels_written,
     names,
     number,
     path,
@@ -21,7 +20,6 @@ from photogram.show.sketch.svg_marks import (
     sample,
     svg,
     text,
-    upwards,
 )
 from photogram.show.style import FAINT, INK, SETTINGS
 
@@ -60,8 +58,7 @@ def _panel(placed: Placed, name: str) -> str:
     marks = "".join(svg(mark, placed) for mark in sorted(panel.marks, key=lambda each: each.layer))
     legend, taken = _legend(placed)
     inside = element("g", marks, clip_path=f"url(#{name}-clip)") if marks else ""
-    written = levels_written(placed, taken)
-    words = [_axes(placed), _above(placed), written, legend, names(placed, taken)]
+    words = [_axes(placed), _above(placed), legend, names(placed, taken)]
     if placed.notes:
         heights = (low + placed.below + layout.NOTE_LINE * (k + 0.8) for k in range(len(placed.notes)))
         lines = (text(left, y, line) for y, line in zip(heights, placed.notes, strict=True))
@@ -78,8 +75,8 @@ def _axes(placed: Placed) -> str:
     found = []
     if not panel.bare:
         lines = f"M{number(left)} {number(top)}V{number(low)}H{number(right)}"
-        lines += "".join(f"M{x:.2f} {low:.2f}v{TICK_LENGTH}" for x in over)
-        lines += "".join(f"M{left:.2f} {y:.2f}h-{TICK_LENGTH}" for y in beside)
+        lines += "".join(f"M{number(x)} {number(low)}v{TICK_LENGTH}" for x in over)
+        lines += "".join(f"M{number(left)} {number(y)}h-{TICK_LENGTH}" for y in beside)
         found.append(path(lines, fill="none", stroke=FAINT, stroke_width=0.8))
     if placed.numbered:
         found.append(_across(placed, over))
@@ -87,27 +84,25 @@ def _axes(placed: Placed) -> str:
     numbers = "".join(text(left - 6.0, y + 0.36 * NUMBER, each) for y, each in rows)
     found.append(element("g", numbers, text_anchor="end"))
     if panel.across:
-        name, down = placed.across.named(panel.across), low + placed.axis_below - 5.0
-        found.append(text(0.5 * (left + right), down, name, **NAMED))
+        name, down = placed.across.named(panel.across), low + placed.below - 5.0
+        found.append(text(0.5 * (left + right), down, name, turned=False, **NAMED))
     if name := placed.up.named(panel.up):
         x, y = left - 12.0 - placed.beside, 0.5 * (top + low)
-        found.append(text(x, y, name, **NAMED, transform=upwards(x, y)))
+        found.append(text(x, y, name, turned=True, **NAMED))
     return "".join(found)
 
 
 def _across(placed: Placed, places: Sequence[float]) -> str:
-    """Return numbers or names below an axis."""
     rows, low = zip(places, placed.across.texts, strict=True), placed.box[3]
     if not placed.panel.turned:
         level = "".join(text(x, low + NUMBER + 4.0, each) for x, each in rows)
         return element("g", level, text_anchor="middle")
     y = low + 5.0
-    turned = "".join(text(x, y, each, transform=upwards(x, y), dy=0.36 * NUMBER) for x, each in rows)
+    turned = "".join(text(x, y, each, turned=True, dy=0.36 * NUMBER) for x, each in rows)
     return element("g", turned, text_anchor="end")
 
 
 def _above(placed: Placed) -> str:
-    """Return title and scale bars above a box."""
     panel, (left, top, _, _) = placed.panel, placed.box
     first, found = top - placed.above - 3.0, []
     for k, line in enumerate(placed.title, 1):
@@ -120,19 +115,12 @@ def _above(placed: Placed) -> str:
 
 
 def _legend(placed: Placed) -> tuple[str, list[Box]]:
-    """Return a legend and its boxes."""
     marks, where = placed.panel.labelled, placed.panel.legend
     if not where or not marks:
         return "", []
-    if where == "above":
-        found, x, y = [], placed.box[2], placed.box[1] - 6.0 - 0.5 * LEGEND_LINE
-        for mark in reversed(marks):
-            x -= SWATCH + 6.0 + width(mark.label, LEGEND) + GAP
-            found.append(_entry(mark, x, y))
-        return "".join(found), []
     box = placed.legend
     entries = [_entry(mark, box[0], box[1] + LEGEND_LINE * (k + 0.5)) for k, mark in enumerate(marks)]
-    if where not in ("beside", "below"):
+    if where != "beside":
         entries.insert(0, element("rect", **place(*box), fill="white", opacity=0.85))
     return "".join(entries), [box]
 
@@ -156,11 +144,11 @@ def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
     found = [element("linearGradient", "".join(steps), id=name, x1=0.0, x2=0.0, y1=1.0, y2=0.0)]
     found.append(element("rect", **place(left, top, right, low), fill=f"url(#{name})"))
     ends, decimal = np.array([shades.low, shades.high]), beside[0].panel.decimal
-    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log).signed(decimal)
+    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log, decimal=decimal)
     heights = low - shades.parts(given.values) * (low - top)
     for y, value in zip(heights.tolist(), given.texts, strict=True):
         found.append(path(f"M{number(right)} {number(y)}h{TICK_LENGTH}", stroke=FAINT, stroke_width=0.8))
         found.append(text(right + 6.0, y + 0.36 * NUMBER, value, fill=INK))
     x, y = left + COLOUR_BAR - 8.0, 0.5 * (top + low)
-    found.append(text(x, y, shades.label, **NAMED, fill=INK, transform=upwards(x, y)))
+    found.append(text(x, y, shades.label, turned=True, **NAMED, fill=INK))
     return "".join(found)

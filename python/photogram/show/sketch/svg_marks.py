@@ -5,26 +5,22 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Iterator
 from html import escape
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.show.sketch import marks
-from photogram.show.sketch.layout import NAME, NUMBER, Placed
-from photogram.show.sketch.letters import Box, first_free, free_names, width
-from photogram.show.sketch.marks import Labelled, Shades, hexadecimal, rgb
-from photogram.show.style import need
+from photogram.show.sketch.layout import NAME, Placed
+from photogram.show.sketch.letters import Box, free_names
+from photogram.show.sketch.marks import Labelled, hexadecimal, rgb
 
 Attributes: TypeAlias = dict[str, str | float]
 COLOURS_OF_MAP = 48
-MIN_LABELLED_LENGTH = 30.0  # Least length of a line with a level text, points
-MIN_GAP = 4.0  # Points between level texts
 MAX_EXACT_PLACES = 300  # Longer lines have coordinates in tenths of a point, others in hundredths
-MAX_COORDINATE = 1e5  # Points
+MAX_COORDINATE = 1e4  # Points
 DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}  # Dashes and gaps in line widths
 _POINTS = np.pi / 5 * np.arange(10)
 # Corners of symbols in half sizes; a star has outer and inner corners in turn.
@@ -34,28 +30,26 @@ CORNERS = {
     "D": np.sqrt(2.0) * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]),
     "*": np.resize([1.0, 0.38], (10, 1)) * np.stack([np.sin(_POINTS), -np.cos(_POINTS)], axis=1),
 }
-# Text over other elements
-HALO: Attributes = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
 
 
 def element(name: str, content: str = "", /, **attributes: str | float) -> str:
-    """Return an element without empty attributes."""
+    """Return an element without empty attributes and full opacities."""
     written = "".join(
         f' {key.replace("_", "-")}="{escape(value) if isinstance(value, str) else number(value)}"'
         for key, value in attributes.items()
-        if value != ""
+        if value != "" and not (value == 1.0 and "opacity" in key)
     )
     return f"<{name}{written}>{content}</{name}>" if content else f"<{name}{written}/>"
 
 
 def number(value: float) -> str:
-    """Return a number with at most two decimals."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 
-def text(x: float, y: float, words: str, **attributes: str | float) -> str:
-    """Return text that begins at a point, or as in `text_anchor`."""
-    return element("text", escape(words), x=x, y=y, **attributes)
+def text(x: float, y: float, words: str, turned: bool = False, **attributes: str | float) -> str:
+    """Return text that begins at a point, or as in `text_anchor`; upwards if `turned`."""
+    rotation = f"rotate(-90 {number(x)} {number(y)})" if turned else ""
+    return element("text", escape(words), x=x, y=y, **attributes, transform=rotation)
 
 
 def path(data: str, **attributes: str | float) -> str:
@@ -64,19 +58,13 @@ def path(data: str, **attributes: str | float) -> str:
 
 
 def place(left: float, top: float, right: float, low: float) -> Attributes:
-    """Return the attributes of a rectangle."""
     return {"x": left, "y": top, "width": right - left, "height": low - top}
-
-
-def upwards(x: float, y: float) -> str:
-    """Return the rotation of upward text at a point."""
-    return f"rotate(-90 {number(x)} {number(y)})"
 
 
 def joined(places: Floats, end: str = "") -> str:
     """Return a line through (n, 2) points of the plot."""
     decimals = 1 if len(places) > MAX_EXACT_PLACES else 2
-    known = np.clip(places[np.isfinite(places).all(axis=1)], -MAX_COORDINATE, MAX_COORDINATE).round(decimals)
+    known = np.clip(places[~np.isnan(places).any(axis=1)], -MAX_COORDINATE, MAX_COORDINATE).round(decimals)
     return "M" + " ".join(f"{x:g} {y:g}" for x, y in known.tolist()) + end if len(known) > 1 else ""
 
 
@@ -92,12 +80,9 @@ def svg(mark: marks.Mark, placed: Placed) -> str:
         case marks.Markers():
             return _markers(mark, placed)
         case marks.Line():
-            at, look = placed.at(mark.places), {**_stroke(mark, mark.dash), "opacity": _opacity(mark)}
-            return path("".join(map(joined, at if at.ndim > 2 else [at])), **look, stroke_linejoin="round")
-        case marks.Level():
-            height = placed.at(np.array([placed.panel.limits[0, 0], mark.height]))[1]
-            data = f"M{number(placed.box[0])} {number(height)}H{number(placed.box[2])}"
-            return path(data, **_stroke(mark, mark.dash))
+            data = "".join(joined(placed.at(line)) for line in mark.lines)
+            join = "round" if any(len(line) > 2 for line in mark.lines) else ""
+            return path(data, **_stroke(mark, mark.dash), opacity=mark.opacity, stroke_linejoin=join)
         case marks.Arrows():
             return _arrows(mark, placed)
         case marks.Polygons():
@@ -106,8 +91,6 @@ def svg(mark: marks.Mark, placed: Placed) -> str:
             return _ellipses(mark, placed)
         case marks.Mesh():
             return _mesh(mark, placed)
-        case marks.Contours():
-            return _contours(mark, placed)
         case marks.Texts():
             rows = zip(placed.at(mark.places).tolist(), mark.texts, mark.colours, strict=True)
             found = [text(x, y + 0.36 * mark.size, words, fill=colour) for (x, y), words, colour in rows]
@@ -126,15 +109,15 @@ def _markers(mark: marks.Markers, placed: Placed) -> str:
     shades, values = mark.shades, mark.values[inside]
     levels = np.round((COLOURS_OF_MAP - 1) * np.clip(shades.parts(values), 0.0, 1.0))
     found = []
-    for level in np.unique(levels[np.isfinite(levels)])[:: 1 if mark.rising else -1].tolist():
-        colour = rgb(Shades(0.0, COLOURS_OF_MAP - 1.0, "", shades.map), np.array(level))
-        found.append(_signs(mark, at[levels == level], hexadecimal(colour)))
+    for level in np.unique(levels[np.isfinite(levels)])[:: 1 if mark.rising else -1]:
+        colour = hexadecimal(rgb(shades, shades.values(level / (COLOURS_OF_MAP - 1))))
+        found.append(_signs(mark, at[levels == level], colour))
     return "".join(found)
 
 
 def _signs(mark: marks.Markers, at: Floats, colour: str) -> str:
     size, half = number(mark.size), number(0.5 * mark.size)
-    look: Attributes = {"stroke": colour, "stroke_width": mark.edge, "opacity": _opacity(mark)}
+    look: Attributes = {"stroke": colour, "stroke_width": mark.edge, "opacity": mark.opacity}
     if mark.shape == "." or (mark.shape == "o" and not mark.face):
         # Half the size plus an outline, as for `.` in matplotlib.
         look["stroke_width"] = mark.size if mark.shape == "o" else 0.5 * mark.size + mark.edge
@@ -151,11 +134,7 @@ def _signs(mark: marks.Markers, at: Floats, colour: str) -> str:
     return path(_each(at + start, sign), fill=mark.face or colour, **look)
 
 
-def _opacity(mark: marks.Markers | marks.Line) -> str | float:
-    return mark.opacity if mark.opacity < 1 else ""
-
-
-def _stroke(mark: marks.Line | marks.Level | marks.Ellipses, dash: str = "") -> Attributes:
+def _stroke(mark: marks.Line | marks.Ellipses, dash: str = "") -> Attributes:
     dashes = " ".join(number(mark.width * each) for each in DASHES.get(dash, ()))
     return {"stroke": mark.colour, "stroke_width": mark.width, "stroke_dasharray": dashes}
 
@@ -172,8 +151,7 @@ def _arrows(mark: marks.Arrows, placed: Placed) -> str:
     aside = (head * 1.75 / 4.5)[:, np.newaxis] * np.column_stack([-along[:, 1], along[:, 0]])
     outlines = np.stack([ends, necks + aside, necks - aside], axis=1)
     long = lengths > 4.5 * thick
-    found = []
-    colours = np.array([mark.colours] * len(lengths) if isinstance(mark.colours, str) else mark.colours)
+    found, colours = [], np.broadcast_to(mark.colours, len(lengths))
     for colour in dict.fromkeys(colours.tolist()):
         own = (colours == colour) & (lengths > 0)
         shafts = "".join(joined(each) for each in np.stack([tails, necks], axis=1)[own & long])
@@ -183,7 +161,7 @@ def _arrows(mark: marks.Arrows, placed: Placed) -> str:
 
 
 def _polygons(mark: marks.Polygons, placed: Placed) -> str:
-    outlines = [joined(each, "z") for each in placed.at(mark.places)]
+    outlines = [joined(placed.at(outline), "z") for outline in mark.places]
     if not mark.edge:
         return path("".join(outlines), fill=mark.face, opacity=mark.face_opacity)
     inside: Attributes = {"fill": mark.face, "fill_opacity": f"{mark.face_opacity:.3g}"}
@@ -244,9 +222,12 @@ def names(placed: Placed, taken: list[Box]) -> str:
     for mark in placed.panel.marks:
         if isinstance(mark, marks.Names):
             at, avoid = (placed.at(each) * [1.0, -1.0] for each in (mark.places, mark.avoid))
-            for row, box in free_names(mark.texts, at, avoid, NAME, (left, -low, right, -top), taken):
+            for row, box in free_names(
+                mark.texts, at, avoid, NAME, (left, -low, right, -top), taken, mark.centred
+            ):
                 found.append(text(box[0] + 0.4, -box[1] - 1.8, mark.texts[row], fill=mark.colours[row]))
-    return element("g", "".join(found), font_size=NAME, stroke_width=1.6, **HALO) if found else ""
+    halo: Attributes = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
+    return element("g", "".join(found), font_size=NAME, stroke_width=1.6, **halo) if found else ""
 
 
 def sample(mark: Labelled) -> Labelled:
@@ -255,57 +236,8 @@ def sample(mark: Labelled) -> Labelled:
     if isinstance(mark, marks.Markers):
         return replace(mark, places=np.array([[8.0, 4.0]]), size=max(mark.size, 4.0), values=None)
     if isinstance(mark, marks.Line):
-        return replace(mark, places=line if mark.places.ndim == 2 else line[np.newaxis])
+        return replace(mark, places=line)
     if isinstance(mark, marks.Arrows):
         return replace(mark, places=line[:1], vectors=line[1:] - line[:1], width=1.3 / 16.0)
     assert isinstance(mark, marks.Polygons)
     return replace(mark, places=np.array([[[0.0, 1.0], [16.0, 1.0], [16.0, 7.0], [0.0, 7.0]]]))
-
-
-def _generator(mark: marks.Contours) -> Any:
-    need("contourpy", "contours", "report")
-    from contourpy import FillType, LineType, contour_generator  # part of matplotlib, fast to import
-
-    kinds: Any = {"fill_type": FillType.OuterOffset, "line_type": LineType.Separate}
-    return contour_generator(mark.across, mark.up, np.ma.masked_invalid(mark.values), **kinds)
-
-
-def _contours(mark: marks.Contours, placed: Placed) -> str:
-    made, bounds, found = _generator(mark), mark.bounds, []
-    below, beyond = np.nanmin(mark.values) - 1.0, max(np.nanmax(mark.values), bounds[-1]) + 1.0
-    middles = mark.shades.parts(bounds[:-1]) / 2 + mark.shades.parts(bounds[1:]) / 2
-    colours = rgb(Shades(0.0, 1.0, "", mark.shades.map), middles)
-    # Values below the first level have its colour as well; each area covers the previous ones, without seams.
-    for low, colour in zip([below, *bounds[1:-1].tolist()], colours, strict=True):
-        rings = [
-            placed.at(ring)
-            for outlines, ends in zip(*made.filled(low, beyond), strict=True)
-            for ring in np.split(outlines, ends[1:-1])
-        ]
-        data = "".join(joined(ring, "z") for ring in rings)
-        found.append(path(data, fill=hexadecimal(colour), fill_rule="evenodd"))
-    lines = (joined(placed.at(line)) for level in mark.levels.tolist() for line in made.lines(level))
-    return "".join(found) + path("".join(lines), stroke=mark.colour, stroke_width=mark.width)
-
-
-def levels_written(placed: Placed, taken: list[Box]) -> str:
-    """Return the levels of contours on their lines; their boxes are added to `taken`."""
-    found = []
-    for mark in (each for each in placed.panel.marks if isinstance(each, marks.Contours)):
-        made = _generator(mark)
-        for level in mark.levels.tolist():
-            written = f"{level:g}".replace("-", "−")
-            for line in made.lines(level):
-                boxes = _along(placed.at(line), width(written, NUMBER))
-                if box := first_free(boxes, placed.box, taken, gap=MIN_GAP):
-                    found.append(text(0.5 * (box[0] + box[2]), box[3] - 0.14 * NUMBER, written))
-    look: Attributes = {"font_size": NUMBER, "text_anchor": "middle", "stroke_width": 2.0, **HALO}
-    return element("g", "".join(found), **look) if found else ""
-
-
-def _along(line: Floats, wide: float) -> Iterator[Box]:
-    """Yield boxes along a line, middle first; none for a short line."""
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    for part in (0.5, 0.3, 0.7, 0.15, 0.85) if lengths[-1] >= MIN_LABELLED_LENGTH else ():
-        x, y = (float(np.interp(part * lengths[-1], lengths, own)) for own in line.T)
-        yield x - 0.5 * wide, y - 0.5 * NUMBER, x + 0.5 * wide, y + 0.5 * NUMBER
