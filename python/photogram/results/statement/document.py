@@ -13,8 +13,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.statement.budget import Budget, kind_of
-from photogram.results.statement.figures import Figures, Sized
-from photogram.results.statement.honest import Prediction
+from photogram.results.statement.figures import Figures, Prediction, Sized
 from photogram.results.statement.request import lengths_in
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.tables import removed_observations, test_lengths

@@ -20,17 +20,18 @@ from photogram.results.statement.budget import Budget, budgets
 from photogram.results.statement.comparison import (
     NOTHING,
     Compared,
+    LeftOut,
     Survey,
     System,
     compared,
     control_places,
+    leave_one_out,
     surveyed,
 )
 from photogram.results.statement.document import budget_member, figures_member, statement_members
 from photogram.results.statement.figures import Figures, figures
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
-from photogram.results.statement.leave_one_out import LeftOut, leave_one_out
 from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import (

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
 from photogram.results.statement.budget import Budget
-from photogram.results.statement.leave_one_out import LeftOut, limit_of
+from photogram.results.statement.comparison import LeftOut, limit_of
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Part, Section, decimals_of
