@@ -16,15 +16,24 @@ from photogram.io.structure import Stand
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, Undetermined
-from photogram.network import cameras as given_cameras
-from photogram.network import core_arrays, films, frame, geometry, lens, moving_photos, refraction, rigs
+from photogram.network import (
+    cameras,
+    core_arrays,
+    films,
+    frame,
+    geometry,
+    lens,
+    moving_photos,
+    refraction,
+    rigs,
+)
 from photogram.network import trajectories as motion
 from photogram.network.block import Block
 from photogram.network.motion import scanners
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Unknown
-from photogram.results import cameras, datum, features, iteration, observation_kinds, unknowns
+from photogram.results import datum, features, iteration, observation_kinds, unknowns
 from photogram.results.result import Result
 from photogram.results.result_files import (
     GIVEN_SD,
@@ -194,8 +203,8 @@ STANDS: dict[type, Callable[[Any], Stand]] = {motion.Trajectory: KeptTrajectory.
 
 
 MODULES = (
-    *(given_cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
-    *(refraction, rigs, cameras, datum, features, iteration, observation_kinds, unknowns),
+    *(cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
+    *(refraction, rigs, datum, features, iteration, observation_kinds, unknowns),
 )
 CLASSES = (KeptTrajectory, Message, Phrase, Removed, Undetermined)
 

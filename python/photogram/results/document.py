@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.network.structuring import structure
 from photogram.results.axes import point_axes
-from photogram.results.camera_sections import calibration_members, cameras_section, gains_section
+from photogram.results.calibration import calibration_members, cameras_section, gains_section
 from photogram.results.check_points import observed_control
 from photogram.results.features import features_document, features_section
 from photogram.results.film_report import film_table, films_section, mark_table, scanner_table

@@ -29,11 +29,11 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import by_name, unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
-from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
+from photogram.results.fixed_tests import quadratic, score
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
-from photogram.results.scores import quadratic, score
+from photogram.results.unknowns import AdjustedCamera
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each

@@ -27,14 +27,13 @@ from photogram.plots.picture_data import (
     Plan,
     VectorField,
 )
-from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
-from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
 from photogram.results.film_report import film_patterns, mean_mark_residuals
-from photogram.results.footprints import footprints
+from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.tests import Tests
+from photogram.results.unknowns import AdjustedCamera
 from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length

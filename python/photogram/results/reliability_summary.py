@@ -24,7 +24,7 @@ from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.results.robust import Downweighted
+    from photogram.results.reliability import Downweighted
 
 LISTED = 5  # Listed observations of each type
 PAIRS = 10  # Listed inseparable pairs

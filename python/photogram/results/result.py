@@ -18,7 +18,6 @@ from photogram.network.block import Block, refuse_trajectories
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import timed_photos
-from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.check_points import CheckPoints, check_points, point_kinds
 from photogram.results.covariance import Adjusted, Failure, adjusted
 from photogram.results.datum import (
@@ -39,17 +38,17 @@ from photogram.results.trajectories import (
     project,
     restarted_motion,
 )
-from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
+from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown, adjusted_cameras, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram import Features
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
     from photogram.results.axes import Determined, Terms
-    from photogram.results.features import Features
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
 from photogram.results.network_sections import fit_of_images
 from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import control_places, in_order
-from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import differences, overlap
 from photogram.results.statement.drawings import lengths as drawn_lengths
 from photogram.results.statement.figures import Figures
@@ -25,11 +23,13 @@ from photogram.results.statement.tables import (
     annex,
     check_points,
     decimals_for,
+    kinds_of,
     left_out_points,
     removed_observations,
     test_lengths,
 )
 from photogram.results.statement.texts import Texts
+from photogram.results.unknowns import AdjustedCamera, units
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, Table

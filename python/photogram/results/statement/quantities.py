@@ -14,9 +14,9 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.rays import local_axes
-from photogram.results.cameras import units
 from photogram.results.covariance import Item, adjusted
 from photogram.results.statement.request import invalid
+from photogram.results.unknowns import units
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

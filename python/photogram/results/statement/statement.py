@@ -28,7 +28,6 @@ from photogram.results.statement.comparison import (
     leave_one_out,
     surveyed,
 )
-from photogram.results.statement.document import budget_member, figures_member, statement_members
 from photogram.results.statement.figures import Figures, figures
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
@@ -41,7 +40,13 @@ from photogram.results.statement.standards import (
     nssda,
     tested_lengths,
 )
-from photogram.results.statement.tables import check_points, left_out_points
+from photogram.results.statement.tables import (
+    budget_member,
+    check_points,
+    figures_member,
+    left_out_points,
+    statement_members,
+)
 from photogram.results.statement.texts import Texts
 from photogram.show.methods import Brief, Rows
 from photogram.show.page import Document
