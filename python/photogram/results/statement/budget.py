@@ -29,7 +29,6 @@ from photogram.results.network_trial import (
     OBSERVATION,
     POSITION,
     BlockSuspects,
-    observations_of_core,
 )
 from photogram.results.statement.quantities import Wanted, component_of
 from photogram.results.statement.texts import Texts
@@ -190,13 +189,13 @@ class _Freedoms:
         known = math.isinf(result.freedom_of_scale)
         self._basis = "components" if components is not None else "given" if known else "unit variance"
         self._names: list[str] = []
-        self._of: Indices = np.full(len(rows), -1)
+        self._of: Indices = np.full(len(rows.sd), -1)
         self._covariance = np.zeros((0, 0))
-        if components is None and len(rows) > EXACT:
+        if components is None and len(rows.sd) > EXACT:
             return
         grouping = grouped(observables(result), "kind")
         self._of = rows.groups(grouping)
-        matrix = Left(result, grouping, Probing(exact=min(len(rows), EXACT))).matrix()
+        matrix = Left(result, grouping, Probing(exact=min(len(rows.sd), EXACT))).matrix()
         names = list(grouping.groups.names)
         estimated = [k for k in range(len(names)) if matrix[k, k] > 0]
         self._names = [kind_of(names[k]) for k in estimated]
@@ -223,66 +222,71 @@ class _Freedoms:
 
 
 PHOTOS = 100  # Listed photos with the largest contributions
-_PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", ATTITUDE: "photo attitudes"}
+UNKNOWN = KINDS.index("unknown")
+_PLURALS = dict(enumerate(("images", "control", "photo positions", "photo attitudes"))) | {5: "camera"}
 
 
-class Rows:
+class Rows(BlockSuspects):
     """All M observations in G groups, images or control points, with names."""
 
     def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
-        self.block = result.block
-        self.suspects, self.sd = BlockSuspects(result.block, core), core.deviations
-        self._starts: Indices = self.suspects.row_starts
-        self._sizes: Indices = np.diff(self._starts)
-        self._component = core.components
-        self._observed = observations_of_core(self.block)
-        self._kinds, self._of_kind = self._labels()
-        # Images are the first groups.
-        self._images = slice(0, int(np.count_nonzero(self.suspects.kinds == IMAGE)))
-        seen = observables(result)
-        self._cameras, self._camera_of_photo = list(seen.camera_names), seen.photo_cameras
-        self._strips = np.full(len(self.block.photo_ids), -1)
-        for number, photos in enumerate(seen.strips()):
-            self._strips[photos] = number
+        super().__init__(result.block, core)
+        self.sd, self._sizes = core.deviations, np.diff(self.row_starts)
+        block, seen, photo = result.block, observables(result), self.photos
+        image, control = self.kinds == IMAGE, self.kinds == CONTROL
+        strips, of_strip = seen.strips(), np.full(len(block.photo_ids), -1)
+        for number, photos in enumerate(strips):
+            of_strip[photos] = number
+        names = [str(number + 1) for number in range(len(strips))]
+        # Level, names, the name of each group or -1, number of listed names
+        self._levels: list[tuple[str, Sequence[str], Indices, float]] = [
+            ("kind", *self._types(), math.inf),
+            *([("strip", names, np.where(image, of_strip[photo], -1), math.inf)] if len(names) > 1 else []),
+            ("camera", list(seen.camera_names), np.where(image, seen.photo_cameras[photo], -1), math.inf),
+            ("photo", block.photo_ids, np.where(image, photo, -1), PHOTOS),
+            ("point", block.point_ids, np.where(control, self.points, -1), math.inf),
+        ]
 
-    def __len__(self) -> int:
-        return int(self._starts[-1])
-
-    def _labels(self) -> tuple[list[str], Indices]:
+    def _types(self) -> tuple[list[str], Indices]:
         """Return the names of types, and the (G,) types of groups."""
-        of_observation = [kind_of(each.label) for each in self._observed]
-        of_unknown = [each.KIND for each in self.block.unknowns]
+        labels = {
+            OBSERVATION: [kind_of(each.label) for each in self.observations],
+            UNKNOWN: [each.KIND for each in self.block.unknowns],
+        }
         found: dict[str, int] = {}
-        number = np.zeros(len(self.suspects), dtype=np.int64)
-        for kind in np.flatnonzero(np.bincount(self.suspects.kinds)).tolist():
-            own = np.flatnonzero(self.suspects.kinds == kind)
-            if kind in _PLURALS or KINDS[kind] == "camera":
-                number[own] = found.setdefault(_PLURALS.get(kind, "camera"), len(found))
-                continue
-            labels = of_observation if kind == OBSERVATION else of_unknown
-            each = np.array([found.setdefault(label, len(found)) for label in labels], dtype=np.int64)
-            number[own] = each[self.suspects.subjects[own]]
+        number = np.zeros(len(self), dtype=np.int64)
+        for kind in np.unique(self.kinds).tolist():
+            own, names = self.kinds == kind, labels.get(kind, _PLURALS.get(kind, ""))
+            if isinstance(names, str):
+                number[own] = found.setdefault(names, len(found))
+            else:
+                each = np.array([found.setdefault(name, len(found)) for name in names], dtype=np.int64)
+                number[own] = each[self.subjects[own]]
         return list(found), number
 
     def sources(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return level, name, row number and contribution of sources, from (M,) squares."""
-        sums, sizes = np.add.reduceat(squares, self._starts[:-1]), self._sizes
-        yield from _sums("kind", self._kinds, self._of_kind, sums, sizes)
-        own, rows, photo = sums[self._images], sizes[self._images], self.suspects.photos[self._images]
-        strips = [str(number + 1) for number in range(int(self._strips.max(initial=-1)) + 1)]
-        if len(strips) > 1:
-            yield from _sums("strip", strips, self._strips[photo], own, rows)
-        yield from _sums("camera", self._cameras, self._camera_of_photo[photo], own, rows)
-        yield from _sums("photo", self.block.photo_ids, photo, own, rows, PHOTOS)
-        control = self.suspects.kinds == CONTROL
-        points = self.suspects.points[control]
-        yield from _sums("point", self.block.point_ids, points, sums[control], sizes[control])
+        """Return level, name, row number and contribution of sources, from (M,) squares.
+
+        Sources without rows are omitted; the smallest ones of long levels are added.
+        """
+        sums = np.add.reduceat(squares, self.row_starts[:-1])
+        for level, names, of, most in self._levels:
+            own = of >= 0
+            numbers = np.bincount(of[own], self._sizes[own], len(names)).astype(np.int64)
+            totals = np.bincount(of[own], sums[own], len(names))
+            there = np.flatnonzero(numbers)
+            rest = there[:0]
+            if len(there) > most:
+                there, rest = np.split(there[np.argsort(-totals[there], kind="stable")], [int(most)])
+            yield from ((level, names[k], int(numbers[k]), float(totals[k])) for k in there.tolist())
+            if len(rest):
+                yield level, "others", int(numbers[rest].sum()), math.fsum(totals[rest].tolist())
         yield from self._parameters(squares)
 
     def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
         several = len(self.block.camera_names) > 1
-        for group in np.flatnonzero(self.suspects.kinds > OBSERVATION).tolist():
-            for row in self.suspects.rows(group).tolist():
+        for group in np.flatnonzero(self.kinds > OBSERVATION).tolist():
+            for row in self.rows(group).tolist():
                 kind, *of, component = self.named(row)
                 axis = Phrase(f"axis.{component}")
                 alone = kind == "camera" and not several
@@ -291,13 +295,12 @@ class Rows:
 
     def named(self, row: int) -> tuple[str, ...]:
         """Return the type of a row, its items, and its component."""
-        group = int(np.searchsorted(self._starts, row, "right")) - 1
-        kind, subject = int(self.suspects.kinds[group]), int(self.suspects.subjects[group])
-        component = int(self._component[row])
-        block = self.block
+        group = int(np.searchsorted(self.row_starts, row, "right")) - 1
+        kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        block, component = self.block, int(self.components[row])
         if kind == IMAGE:
             axes = ("column", "row") if block.image_unit == "px" else ("x", "y")
-            photo, point = block.image_photos[subject], block.image_points[subject]
+            photo, point = self.photos[group], self.points[group]
             return "image", block.photo_ids[photo], block.point_ids[point], axes[component]
         if kind == CONTROL:
             return "control", block.point_ids[subject], "xyz"[component]
@@ -305,7 +308,7 @@ class Rows:
             own = ("x", "y", "z") if kind == POSITION else ("omega", "phi", "kappa")
             return KINDS[kind], block.photo_ids[subject], own[component]
         if kind == OBSERVATION:
-            observation = self._observed[subject]
+            observation = self.observations[subject]
             names = observation.components(geographic=block.geographic)
             return kind_of(observation.label), *observation.of, names[component].lower()
         if KINDS[kind] == "camera":
@@ -316,11 +319,9 @@ class Rows:
 
     def groups(self, grouping: Grouping) -> Indices:
         """Return (M,) the group of each row in a grouping; -1 for none."""
-        kind, subject = (
-            np.repeat(each, self._sizes) for each in (self.suspects.kinds, self.suspects.subjects)
-        )
-        component = self._component.astype(np.int64)
-        found = np.full(len(self), -1)
+        kind, subject = (np.repeat(each, self._sizes) for each in (self.kinds, self.subjects))
+        component = self.components.astype(np.int64)
+        found = np.full(len(kind), -1)
         tables = {IMAGE: grouping.images, CONTROL: grouping.points, POSITION: grouping.photos}
         for own_kind, table in tables.items():
             own = kind == own_kind
@@ -328,35 +329,10 @@ class Rows:
         own = kind == ATTITUDE
         found[own] = grouping.photos[subject[own], 3 + component[own]]
         own = kind == OBSERVATION
-        if own.any():
-            numbers = {id(each): row for row, each in enumerate(self.block.observations)}
-            of = np.array([numbers[id(each)] for each in self._observed], dtype=np.int64)
-            found[own] = grouping.observations[of[subject[own]]]
+        of = [row for rows, _ in self.block.observation_groups for row in rows]
+        found[own] = grouping.observations[np.array(of, dtype=np.int64)[subject[own]]]
         return found
 
 
 def kind_of(label: str) -> str:
     return {"position": "gnss"}.get(label, label)
-
-
-def _sums(
-    level: str, names: Sequence[str], of: Indices, sums: Floats, sizes: Indices, most: int | None = None
-) -> Iterable[tuple[str, Phrase | str, int, float]]:
-    """Return sums over non-empty groups in order; or the largest, and the rest."""
-    if of.min(initial=0) < 0:
-        inside = of >= 0
-        of, sums, sizes = of[inside], sums[inside], sizes[inside]
-    numbers = np.bincount(of, weights=sizes, minlength=len(names)).astype(np.int64)
-    totals = np.bincount(of, weights=sums, minlength=len(names))
-    there = np.flatnonzero(numbers)
-    if most is not None and len(there) > most:
-        order = there[np.argsort(-totals[there], kind="stable")]
-        rest = order[most:]
-        others = ("others", int(numbers[rest].sum()), math.fsum(totals[rest].tolist()))
-        there = order[:most]
-    else:
-        others = None
-    values = zip(there.tolist(), numbers[there].tolist(), totals[there].tolist(), strict=True)
-    yield from ((level, names[k], number, total) for k, number, total in values)
-    if others is not None:
-        yield level, *others

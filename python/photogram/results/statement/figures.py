@@ -12,6 +12,7 @@ are tested by T_i = d_i' C_ii^-1 d_i, and given all others by y_i' (C^-1)_ii^-1 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.statement.comparison import LEVEL, PARTS, Compared
 from photogram.statistics.agreement import SINGULAR, quadratic, root_of, scale_of
-from photogram.statistics.distributions import critical_normal, critical_student
+from photogram.statistics.distributions import critical_normal, critical_student, log_chi_square
 from photogram.statistics.error_radii import (
     circular_error,
     mixture_circular,
@@ -154,21 +155,20 @@ def prediction(found: Compared, part: str) -> Prediction | None:
     product = found.product[np.ix_(rows, rows)]
     points = len(d) // len(PARTS[part])
     statistic, found_rank = quadratic(d, covariance)
-    rank = int(found_rank) if math.isfinite(found_rank) else 0
+    rank = 0 if math.isnan(statistic) else int(found_rank)
+    mean, scale = statistic / max(rank, 1), max(rank, 1)
     rmse = math.sqrt(float(d @ d) / points)
     freedom = effective_freedom(covariance)
-    low, high = (
-        _photocore.chi_square_quantile(LEVEL / 2, rank, upper=upper) if rank else math.nan
+    high, low = (
+        math.sqrt(statistic / _photocore.chi_square_quantile(LEVEL / 2, scale, upper=upper))
         for upper in (False, True)
     )
     variances = np.diag(covariance)
     with np.errstate(divide="ignore", invalid="ignore"):
         alone = float((d**2 / variances).sum())
-    p_high = _photocore.chi_square(statistic, rank, upper=True) if rank else math.nan
-    below, above = 1.0 - p_high, p_high
-    if math.isfinite(found.second) and rank:
-        above = _photocore.fisher(statistic / rank, rank, found.second)
-        below = 1.0 - above
+    p_high = p_high_f = _photocore.chi_square(statistic, scale)
+    if math.isfinite(found.second):
+        p_high_f = _photocore.fisher(mean, scale, found.second)
     return Prediction(
         rows=len(d),
         points=points,
@@ -180,12 +180,10 @@ def prediction(found: Compared, part: str) -> Prediction | None:
         rmse_interval=rmse_interval(rmse, freedom),
         T=statistic,
         p_high=p_high,
-        p_low=below,
-        p_high_f=above,
-        factor=math.sqrt(statistic / rank) if rank else math.nan,
-        factor_interval=(math.sqrt(statistic / high), math.sqrt(statistic / low))
-        if rank
-        else (math.nan,) * 2,
+        p_low=1.0 - p_high_f,
+        p_high_f=p_high_f,
+        factor=math.sqrt(mean),
+        factor_interval=(low, high),
         sum_of_squares_without_correlations=alone,
     )
 
@@ -271,9 +269,9 @@ def point_tests(found: Compared) -> PointTests:
         sd_adjusted=sd_adjusted,
         normalised=normalised,
         T=statistic,
-        p=_above(statistic, dimension),
+        p=np.exp(log_chi_square(statistic, dimension)),
         others=others,
-        p_others=_above(others, dimension),
+        p_others=np.exp(log_chi_square(others, dimension)),
         dimension=dimension,
         ce90=circular_error(adjusted[:, :2, :2], 0.9) if n else np.zeros(0),
         le90=sd_adjusted[:, 2] * critical_normal(0.1),
@@ -284,11 +282,6 @@ def _each(matrices: Floats, vectors: Floats) -> Floats:
     """Return v' M^+ v of each of (n, k, k) matrices and (n, k) vectors."""
     inverse = np.linalg.pinv(matrices, rcond=SINGULAR, hermitian=True)
     return np.asarray(np.einsum("ni,nij,nj->n", vectors, inverse, vectors))
-
-
-def _above(values: Floats, freedom: Floats) -> Floats:
-    both = zip(values.tolist(), freedom.tolist(), strict=True)
-    return np.array([_photocore.chi_square(v, f, upper=True) if f else math.nan for v, f in both])
 
 
 PROBABILITIES = (0.9, 0.95)
@@ -309,31 +302,20 @@ class Sized:
     point: str
 
 
-@dataclass(frozen=True)
-class Radius:
-    # k = ceil(p n), and the k-th smallest: NaN without points
-    order: int
-    sample: float
-    # Order statistic that exceeds the quantile with 95 percent probability if points are independent; None
-    # if there are too few
-    upper_order: int | None
-    upper: float | None
-
-
 @dataclass(frozen=True, eq=False)
 class Figures:
     n: int  # Number of points
     parts: dict[str, Sized | None]  # By `e`, `n`, `h`, `plan`, `all`
-    # In plan (radial) and height; 1: of differences, 2: of the survey
-    rmse_h1: float
-    rmse_v1: float
-    rmse_h2: float
-    rmse_v2: float
-    prediction: dict[str, Prediction | None]  # By part; see :mod:`photogram.results.statement.figures`
+    # `rmse_h1`, `rmse_v1` of the differences, radial in plan, and in height; `rmse_h2`, `rmse_v2` of the
+    # survey; `rmse_h`, `rmse_v`, `rmse_3d` of both: the roots of sums of squares
+    rmse: dict[str, float]
+    prediction: dict[str, Prediction | None]  # By part
     bias: dict[str, Bias | None]  # By component
     points: PointTests  # Tests of single points
     inside: dict[str, int]  # Number of points inside 95 percent in height, and in space
-    radii: dict[str, Radius | None]  # `ce90`, `le90`, `ce95`, `le95` of the sample
+    # `ce90`, `le90`, `ce95`, `le95` of the sample: the k-th smallest, `order` k = ceil(p n); `upper` and its
+    # order exceed the quantile with 95 percent probability if points are independent, None for too few points
+    radii: dict[str, dict[str, Any] | None]
     # (2, 2) `sum d d' / n` in plan, and the same radii from moments, the bias inside
     moments: Floats
     of_moments: dict[str, float]
@@ -341,24 +323,9 @@ class Figures:
     mixture: dict[str, float]
     surface: Surface | None  # Of the heights
 
-    @property
-    def rmse_h(self) -> float:
-        """`sqrt(RMSE_H1^2 + RMSE_H2^2)`."""
-        return math.hypot(self.rmse_h1, self.rmse_h2)
-
-    @property
-    def rmse_v(self) -> float:
-        """`sqrt(RMSE_V1^2 + RMSE_V2^2)`."""
-        return math.hypot(self.rmse_v1, self.rmse_v2)
-
-    @property
-    def rmse_3d(self) -> float:
-        """`sqrt(RMSE_H^2 + RMSE_V^2)`."""
-        return math.hypot(self.rmse_h, self.rmse_v)
-
     def without_survey(self, part: str) -> float:
         """Return `sqrt(RMSE_1^2 - RMSE_2^2)` of `h` or `v`; NaN below the survey."""
-        first, second = (self.rmse_h1, self.rmse_h2) if part == "h" else (self.rmse_v1, self.rmse_v2)
+        first, second = (self.rmse[f"rmse_{part}{k}"] for k in (1, 2))
         square = first**2 - second**2
         return math.sqrt(square) if square >= 0 else math.nan
 
@@ -383,17 +350,25 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
     blocks = found.blocks(found.product)
     ellipses, sd = blocks[in_plan, :2, :2], np.sqrt(blocks[in_height, 2, 2])
     tests = point_tests(found)
+    in_survey = (
+        np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan),
+        np.where(in_height, survey[:, 2], np.nan),
+    )
+    squares = {"h1": plan**2, "v1": heights**2, "h2": in_survey[0], "v2": in_survey[1]}
+    rmse = {f"rmse_{name}": root_mean(own) for name, own in squares.items()}
+    for name, parts in (("h", ("h1", "h2")), ("v", ("v1", "v2")), ("3d", ("h", "v"))):
+        rmse[f"rmse_{name}"] = math.hypot(*(rmse[f"rmse_{part}"] for part in parts))
     return Figures(
         n=len(found),
         parts={part: _sized(own, found.names, radial=part in ("plan", "all")) for part, own in sizes.items()},
-        rmse_h1=root_mean(plan**2),
-        rmse_v1=root_mean(heights**2),
-        rmse_h2=root_mean(np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan)),
-        rmse_v2=root_mean(np.where(in_height, survey[:, 2], np.nan)),
+        rmse=rmse,
         prediction={part: prediction(found, part) for part in PARTS},
         bias={part: bias(found, part, k) for part in ("e", "n", "h")},
         points=tests,
-        inside=_inside(tests, in_height),
+        inside={
+            "h": int((np.abs(tests.normalised[in_height, 2]) <= critical_normal(1 - INSIDE)).sum()),
+            "three": int((tests.p >= 1 - INSIDE).sum()),
+        },
         radii=_radii(plan[in_plan], np.abs(heights[in_height])),
         moments=moments,
         of_moments=of_moments,
@@ -422,26 +397,16 @@ def root_mean(squares: Floats) -> float:
     return math.sqrt(float(known.mean())) if known.size else math.nan
 
 
-def _inside(tests: PointTests, in_height: np.ndarray) -> dict[str, int]:
-    limits = {
-        k: _photocore.chi_square_quantile(1 - INSIDE, k, upper=True)
-        for k in np.unique(tests.dimension[tests.dimension > 0]).tolist()
-    }
-    of_points = np.array([limits.get(k, math.nan) for k in tests.dimension.tolist()])
-    one = math.sqrt(_photocore.chi_square_quantile(1 - INSIDE, 1, upper=True))
-    with np.errstate(invalid="ignore"):
-        return {
-            "h": int((np.abs(tests.normalised[:, 2]) <= one)[in_height].sum()),
-            "three": int((of_points >= tests.T).sum()),
-        }
-
-
-def _radii(plan: Floats, heights: Floats) -> dict[str, Radius | None]:
-    found: dict[str, Radius | None] = {}
+def _radii(plan: Floats, heights: Floats) -> dict[str, dict[str, Any] | None]:
+    found: dict[str, dict[str, Any] | None] = {}
     for p in PROBABILITIES:
         for name, values in (("ce", plan), ("le", heights)):
-            upper = upper_order(len(values), p) if len(values) else None
+            key = f"{name}{round(100 * p)}"
+            if not len(values):
+                found[key] = None
+                continue
+            order, sample = sample_radius(values, p)
+            upper = upper_order(len(values), p)
             largest = None if upper is None else float(np.sort(values)[upper - 1])
-            own = Radius(*sample_radius(values, p), upper, largest) if len(values) else None
-            found[f"{name}{round(100 * p)}"] = own
+            found[key] = {"order": order, "sample": sample, "upper_order": upper, "upper": largest}
     return found

@@ -67,10 +67,10 @@ def _radii(texts: Texts, own: Figures) -> Table:
     columns, decimals = Columns(texts), decimals_for(own.points.sd_adjusted)
     radii = {name: radius for name, radius in own.radii.items() if radius is not None}
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
-    upper = [math.nan if radius.upper is None else radius.upper for radius in radii.values()]
+    upper = [math.nan if radius["upper"] is None else radius["upper"] for radius in radii.values()]
     quantities = [
         columns.text(BLANK, [name.upper() for name in radii]),
-        number("sample", [radius.sample for radius in radii.values()]),
+        number("sample", [radius["sample"] for radius in radii.values()]),
         number("upper", upper),
         number("moments", [own.of_moments[name] for name in radii]),
         number("mixture", [own.mixture.get(name, math.nan) for name in radii]),
@@ -331,8 +331,9 @@ def _figures(statement: Statement) -> list[Part]:
         for *_, predicted in shown
     ]
     # Parts in standards: RMSE of the survey, and combined with the RMSE of the differences.
-    of_parts = {"plan": (own.rmse_h2, own.rmse_h), "h": (own.rmse_v2, own.rmse_v)}
-    of_parts["all"] = math.hypot(own.rmse_h2, own.rmse_v2), own.rmse_3d
+    rmse = own.rmse
+    of_parts = {"plan": (rmse["rmse_h2"], rmse["rmse_h"]), "h": (rmse["rmse_v2"], rmse["rmse_v"])}
+    of_parts["all"] = math.hypot(rmse["rmse_h2"], rmse["rmse_v2"]), rmse["rmse_3d"]
     surveys = [of_parts.get(part, (math.nan, math.nan)) for part, *_ in shown]
     quantities = [
         columns.text("component", [texts(f"component.{part}") for part, *_ in shown]),

@@ -336,9 +336,10 @@ def asprs_figures(
 def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[str, Accuracy | None]:
     found: dict[str, Accuracy | None] = dict.fromkeys(("h", "v", "3d", "vva"))
     for key, own, part in (("h", of_all, "plan"), ("v", of_all, "h"), ("vva", of_vegetated, "h")):
+        axis = key[0]
         predicted = None if own is None else own.prediction[part]
         if own is not None and predicted is not None:
-            pair = (own.rmse_h1, own.rmse_h2) if part == "plan" else (own.rmse_v1, own.rmse_v2)
+            pair = own.rmse[f"rmse_{axis}1"], own.rmse[f"rmse_{axis}2"]
             found[key] = accuracy(*pair, predicted.effective_dof, predicted.points)
     whole = None if of_all is None else of_all.prediction["all"]
     if found["h"] is not None and found["v"] is not None and whole is not None:
@@ -429,7 +430,7 @@ def iso_measures(
         values: dict[str, Any] = {
             "bias": [None if each is None else each.mean for each in (of_all.parts[part] for part in "enh")],
             "rmse": None if whole is None else whole.rmse,
-            "rmse_plan": of_all.rmse_h1,
+            "rmse_plan": of_all.rmse["rmse_h1"],
             **{name: of_all.of_moments[name] for name in ("ce90", "ce95", "le90", "le95")},
             "ellipse": _ellipse(of_all.moments),
         }

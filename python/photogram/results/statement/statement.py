@@ -340,7 +340,7 @@ def statement(
             asprs=asprs_figures(result, options, found, of_all, of_vegetated, left_out)
             if "asprs-2023" in options.standards
             else None,
-            nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse_v1, of_all.n),
+            nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse["rmse_v1"], of_all.n),
             lengths=lengths,
             iso_19157=iso_measures(result, options, of_all, lengths)
             if "iso-19157" in options.standards

@@ -313,11 +313,10 @@ def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None
         return None
     parts = [found.parts[each] for each in ("e", "n", "h")]
     names = {name: name for name in ("mean", "sd", "rmse", "largest")} | {"largest_point": "point"}
-    roots = ("rmse_h1", "rmse_v1", "rmse_h2", "rmse_v2", "rmse_h", "rmse_v", "rmse_3d")
     return {
         "n": found.n,
         **{name: [each and getattr(each, own) for each in parts] for name, own in names.items()},
-        **members(found, *roots),
+        **found.rmse,
         "horizontal": _radial(found.parts["plan"]),
         "spatial": _radial(found.parts["all"]),
         "without_survey": {part: found.without_survey(part) for part in ("h", "v")},
@@ -326,7 +325,7 @@ def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None
         "bias": {part: each and vars(each) for part, each in found.bias.items()},
         "inside_95": found.inside,
         "circular_linear": {
-            **{name: each and vars(each) for name, each in found.radii.items()},
+            **found.radii,
             "from_moments": {"matrix": found.moments, **found.of_moments},
             "predicted_mixture": found.mixture,
         },
