@@ -11,7 +11,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, names, value_field
-from photogram.arguments.types import Floats
+from photogram.arguments.objects import require_name
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
@@ -121,6 +122,16 @@ class Adjusted:
             what = kind.replace("step", "photo")
             raise InputError(phrase("error.absent", kind=what, name=missing[0]))
         return [index[name] for name in asked]
+
+
+def used_rows(result: Result, names: Sequence[str]) -> Indices:
+    """Return the rows of points; refuse unknown points, and points that were not used."""
+    places = {name: row for row, name in enumerate(result.block.point_ids)}
+    for name in names:
+        require_name("point", name, places)
+        if not result.used_points[places[name]]:
+            raise InputError(phrase("adjusted.unused-point", point=name))
+    return np.array([places[name] for name in names], dtype=np.int64)
 
 
 def photo_components(block: Block) -> tuple[str, ...]:

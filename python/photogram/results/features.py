@@ -14,11 +14,12 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, probability, value_field
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, message_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, by_name, unknown_name
-from photogram.results.covariance import Covariances
+from photogram.results.covariance import Covariances, used_rows
 from photogram.results.result import Result
 from photogram.show import quantity
 from photogram.show.page import Drawing, Part, Section, Text, about
@@ -378,17 +379,12 @@ def _fitted(
     if not (isinstance(definition, Sequence) and len(definition) == 2) or isinstance(definition, str):
         raise InputError(phrase("fit.definition", value=value_field(definition)))
     kind, wanted = definition
-    if kind not in KINDS:
-        raise InputError(unknown_name("kind of feature", str(kind), KINDS))
+    require_name("kind of feature", str(kind), KINDS)
     block = result.block
     points = named_points([wanted] if isinstance(wanted, str) else wanted, block.point_ids)
     if kind == "distance" and len(points) != 2:
         raise InputError(phrase("fit.two-points", count=len(points)))
-    places = {point: row for row, point in enumerate(block.point_ids)}
-    rows = np.array([places[point] for point in points], dtype=np.int64)
-    for point, used in zip(points, result.used_points[rows].tolist(), strict=True):
-        if not used:
-            raise InputError(phrase("adjusted.unused-point", point=point))
+    rows = used_rows(result, points)
     joint = covariances.covariance(("point", points))
     own, values, covariance, deviations, test = _photocore.measured_feature(
         kind, result.point_positions[rows], joint

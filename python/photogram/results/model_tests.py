@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, value_field
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -350,8 +351,7 @@ def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:
     if isinstance(names, str) or not names:
         raise argument_error("names", "kind", kind="a list of names", value=value_field(names))
     for name in names:
-        if name not in camera.names:
-            raise InputError(unknown_name("parameter", str(name), camera.names))
+        require_name("parameter", str(name), camera.names)
     return [camera.names.index(name) for name in names]
 
 

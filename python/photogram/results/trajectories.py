@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import freeze_fields, shaped, standard_deviations
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import unknown_name
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
@@ -175,8 +175,7 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
     """Return images of (n, 3) points on a photo; see :meth:`photogram.Result.project`."""
     block = result.block
     timed = {each.photo: row for row, each in enumerate(block.timed)}
-    if photo not in timed:
-        raise InputError(unknown_name("photo on a trajectory", photo, timed))
+    require_name("photo on a trajectory", photo, timed)
     row = timed[photo]
     adjusted = {id(each.given): (each.position, each.attitude) for each in result.unknowns}
     index = block.photo_ids.index(photo)

@@ -22,6 +22,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import natural_order
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -119,8 +120,7 @@ class Compared:
     def without(self, names: Sequence[str]) -> Compared:
         """Return all other points; refuse names that are not check points."""
         for name in names:
-            if name not in self.names:
-                raise InputError(unknown_name("check point", name, self.names))
+            require_name("check point", name, self.names)
         return self.some(~np.isin(np.array(self.names, dtype=object), list(names)))
 
     def in_vegetation(self) -> Compared:

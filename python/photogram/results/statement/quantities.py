@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.arrays import value_field
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.rays import local_axes
-from photogram.results.covariance import Item, adjusted
+from photogram.results.covariance import Item, adjusted, used_rows
 from photogram.results.statement.request import invalid
 from photogram.results.unknowns import units
 from photogram.words import Phrase, phrase
@@ -56,8 +57,7 @@ def wanted(result: Result, asked: Any) -> Wanted:
         raise InputError(unknown_name("kind of quantity", kind, kinds))
     name, component = " ".join(words[1:-1]), words[-1]
     things = kinds[kind]
-    if name not in things.ids:
-        raise InputError(unknown_name(kind, name, things.ids))
+    require_name(kind, name, things.ids)
     names = things.components[list(things.ids).index(name)]
     lower = [each.lower() for each in names]
     own = _AXES.get(component.lower()) if kind in ("point", "photo") and component not in names else None
@@ -65,7 +65,8 @@ def wanted(result: Result, asked: Any) -> Wanted:
         if component.lower() not in lower:
             raise InputError(unknown_name(f"component of {kind} {name}", component, names))
         own = names.index(component) if component in names else lower.index(component.lower())
-    _check(result, kind, [name])
+    if kind == "point":
+        used_rows(result, [name])
     subject = Phrase(f"quantity.{kind}", {"of": component_of(name, Phrase(f"axis.{component}"))})
     return Wanted(asked, subject, ((kind, name),), lambda x: x[own], _unit(result, kind, name, own))
 
@@ -124,7 +125,7 @@ def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
 
 
 def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
-    _check(result, "point", ends)
+    used_rows(result, ends)
     if ends[0] == ends[1]:
         raise InputError(phrase("request.distance", point=ends[0]))
     spheroid = result.block.spheroid
@@ -153,8 +154,9 @@ def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
         values = np.asarray(gradient, dtype=float)
         if not (isinstance(item, tuple) and len(item) == 2) or not np.isfinite(values).all():
             raise InputError(phrase("request.gradient", value=value_field((item, gradient))))
-        _check(result, str(item[0]), [str(item[1])])
         width = len(adjusted(result).selected(item).values)
+        if item[0] == "point":
+            used_rows(result, [str(item[1])])
         if values.shape != (width,):
             raise invalid(f"gradient of {item[0]} {item[1]}", "error.count", count=width, actual=values.size)
         items.append(item)
@@ -166,15 +168,6 @@ def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
     return Wanted(
         str(subject), subject, tuple(items), lambda *x: sum(g @ v for g, v in zip(parts, x, strict=True)), ""
     )
-
-
-def _check(result: Result, kind: str, names: Sequence[str]) -> None:
-    if kind != "point":
-        return
-    ids = result.block.point_ids
-    for name in names:
-        if name in ids and not result.used_points[ids.index(name)]:
-            raise InputError(phrase("adjusted.unused-point", point=name))
 
 
 def _unit(result: Result, kind: str, name: str, component: int) -> str:

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import counted, unknown_name
+from photogram.messages import counted
 from photogram.network.observations import Control
+from photogram.results.covariance import used_rows
 from photogram.results.statement.comparison import (
     Compared,
     LeftOut,
@@ -44,7 +44,6 @@ from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import rmse_interval
-from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -382,13 +381,7 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
     """Return calibrated lengths with their test; refuse unknown points."""
     block = result.block
     names = list(dict.fromkeys(end for each in asked.lengths for end in (each["from"], each["to"])))
-    places = {name: row for row, name in enumerate(block.point_ids)}
-    for name in names:
-        if name not in places:
-            raise InputError(unknown_name("point", name, block.point_ids))
-        if not result.used_points[places[name]]:
-            raise InputError(phrase("adjusted.unused-point", point=name))
-    rows = np.array([places[name] for name in names], dtype=np.int64)
+    rows = used_rows(result, names)
     positions, joint = result.point_positions[rows], result.covariance(("point", names))
     if block.geographic:
         joint = turned_jointly(turned_to_east(block, positions), joint)
