@@ -13,8 +13,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.results import tests
 from photogram.results.axes import component_axis, point_axes
 from photogram.results.features import Features, deviation_quantities, quantity_columns
-from photogram.results.group_sums import observables, sums_of
-from photogram.results.grouping import grouped
+from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.network_tables import (
     deviation,
     difference,

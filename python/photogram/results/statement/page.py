@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import replace
+from photogram.network.hull import hull, outside
 from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
+from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
 from photogram.results.statement.budget import Budget, budget_fields
-from photogram.results.statement.comparison import control_places, in_order
-from photogram.results.statement.drawings import differences, overlap
-from photogram.results.statement.drawings import lengths as drawn_lengths
+from photogram.results.statement.comparison import Compared, control_places, in_order
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.judgement import fixed_values
+from photogram.results.statement.standards import Lengths
 from photogram.results.statement.tables import (
     Columns,
     annex,
@@ -33,9 +36,28 @@ from photogram.results.unknowns import AdjustedCamera, units
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.sketch.marks import (
+    Arrows,
+    Ellipses,
+    Level,
+    Line,
+    Mark,
+    Markers,
+    Mesh,
+    Names,
+    Panel,
+    ScaleBar,
+    Shades,
+    around,
+    ellipse_axes,
+    error_bars,
+    spread,
+)
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import BLUE, SOFT, VERMILION, round_length
 
 if TYPE_CHECKING:
-    from photogram import Statement
+    from photogram import Result, Statement
 
 MAX_FINE_SOURCES = 12  # Sources of a budget in addition to the types of observations
 MAX_RADII = 11
@@ -232,11 +254,8 @@ def _files(statement: Statement) -> list[Part]:
 
 def _metrology(statement: Statement) -> list[Part]:
     texts, columns, parts = statement.texts, Columns(statement.texts), list[Part]()
-    features, lengths, measures = (
-        statement.result.features,
-        statement.standards.lengths,
-        statement.standards.iso_19157,
-    )
+    standards, features = statement.standards, statement.result.features
+    lengths, measures = standards.lengths, standards.iso_19157
     if features is not None and len(features):
         parts.append(_features(texts, features))
     if lengths is not None:
@@ -320,9 +339,11 @@ def _figures(statement: Statement) -> list[Part]:
     if own is None:
         return []
     columns = Columns(texts)
-    pairs = {part: (own.parts[part], own.prediction[part]) for part in own.parts}
-    rows = [(part, *pair) for part, pair in pairs.items()]
-    shown = [(part, sized, predicted) for part, sized, predicted in rows if sized and predicted]
+    shown = [
+        (part, sized, predicted)
+        for part, sized in own.parts.items()
+        if sized and (predicted := own.prediction[part])
+    ]
     known = [each.predicted_rmse_of_product for each in own.prediction.values() if each is not None]
     decimals = decimals_for(np.array(known))
     number = partial(columns.number, decimals=decimals)
@@ -373,3 +394,106 @@ def _notes(statement: Statement) -> list[Text]:
         own = math.nan if predicted is None else predicted.predicted_rmse_of_product
         fields[f"predicted_{name}"] = texts.length(own)
     return [Text(f"{texts('asprs.footnote')} {texts('asprs.product', **fields)}")]
+
+
+WIDTH = 6.3  # Inches
+REACH = 0.08  # Length of the largest arrow relative to the extent
+NINETY_FIVE = 2.4477  # Semi-axes of the ellipse of 95 percent, in standard deviations
+NAMED = 60
+CELLS = 120  # Along the longer side of the map of overlap
+
+
+def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
+    """Draw (k, 3) control, check points and differences, heights as colours."""
+    if not len(found) and not len(control):
+        return None
+    places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
+    extent = np.ptp(places, axis=0)
+    panel = _in_plan(around(places, 0.12), texts)
+    marks = list[Mark]()
+    if len(control):
+        marks.append(Markers(control[:, :2], "^", 6.0, SOFT, label=texts("use.control")))
+    if len(found):
+        panel = _points(panel, found, float(extent.max()), texts)
+    height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
+    return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="above")])
+
+
+def _in_plan(limits: Floats, texts: Texts) -> Panel:
+    across, up = (f"{texts(f'column.{axis}')}, {texts.unit}" for axis in ("east", "north"))
+    return Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
+
+
+def _points(panel: Panel, found: Compared, extent: float, texts: Texts) -> Panel:
+    plan, d = found.places[:, :2], found.differences
+    heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
+    most = max(float(np.abs(heights).max()), 1e-12)
+    shades = Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
+    marks: list[Mark] = [
+        Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
+        Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
+    ]
+    bars: list[ScaleBar] = []
+    both = np.isfinite(d[:, :2]).all(axis=1)
+    if both.any():
+        largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
+        scale = REACH * max(extent, 1e-9) / largest
+        semi_axes, angles = ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
+        marks += [
+            Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
+            Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
+        ]
+        length = round_length(largest)
+        sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
+        bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal"))))
+    if len(found) <= NAMED:
+        marks.append(Names(plan, found.names, [SOFT] * len(found)))
+    return replace(panel, marks=marks, bars=bars, shades=shades)
+
+
+def drawn_lengths(found: Lengths, texts: Texts) -> Plot:
+    """Draw errors of calibrated lengths by length, with sd and limits."""
+    test, order = found.test, np.argsort(found.calibrated, kind="stable")
+    places = np.column_stack([found.calibrated, test.errors])
+    ends = [test.errors - test.sd, test.errors + test.sd]
+    marks: list[Mark] = [
+        Line(error_bars(places, *ends), BLUE, 0.7),
+        Markers(places, "o", 3.0, BLUE),
+        Level(0.0, SOFT, 0.6),
+    ]
+    if test.limits is not None:
+        for limit in (test.limits, -test.limits):
+            ends.append(limit)
+            line = np.column_stack([found.calibrated, limit])[order]
+            marks.append(Line(line, VERMILION, 0.9, "--"))
+    limits = np.column_stack([spread(found.calibrated), spread(0.0, *ends)])
+    across, up = (f"{texts(f'column.{name}')}, {texts.unit}" for name in ("length", "error"))
+    return Plot(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=texts("number.decimal"))])
+
+
+def overlap(result: Result, texts: Texts) -> Plot | None:
+    """Draw the number of photos of ground positions; None without footprints."""
+    outlines = footprints(result).outlines[:, :, :2]
+    outlines = outlines[np.isfinite(outlines).all(axis=(1, 2))]
+    if not len(outlines):
+        return None
+    low, high = outlines.min(axis=(0, 1)), outlines.max(axis=(0, 1))
+    cell = float((high - low).max()) / CELLS
+    if not cell > 0:
+        return None
+    x, y = (np.arange(low[k] + cell / 2, high[k], cell) for k in (0, 1))
+    counts = np.zeros((len(y), len(x)))
+    for outline in outlines:
+        columns, rows = (
+            np.flatnonzero((centres >= side.min()) & (centres <= side.max()))
+            for centres, side in zip((x, y), outline.T, strict=True)
+        )
+        if len(columns) and len(rows):
+            grid = np.stack(np.meshgrid(x[columns], y[rows]), axis=-1)
+            inside = ~outside(grid.reshape(-1, 2), hull(outline))
+            counts[np.ix_(rows, columns)] += inside.reshape(grid.shape[:2])
+    shades = Shades(0.0, float(counts.max()) or 1.0, texts("column.photos"))
+    corners = np.array([low, low + cell * np.array([len(x), len(y)])])
+    cells = Mesh(corners, np.where(counts > 0, counts, np.nan), shades)
+    panel = replace(_in_plan(corners, texts), marks=[cells], shades=shades)
+    return Plot(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)), [panel])

@@ -16,7 +16,7 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.results.result import Result
-from photogram.results.statement.budget import Budget, budgets
+from photogram.results.statement.budget import Budget, budgets, chosen, wanted
 from photogram.results.statement.comparison import (
     NOTHING,
     Compared,
@@ -31,7 +31,6 @@ from photogram.results.statement.comparison import (
 from photogram.results.statement.figures import Figures, figures
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
-from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import (
     Standards,

@@ -12,8 +12,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.io.csv_text import csv_text
-from photogram.results.group_sums import observables, sums_of
-from photogram.results.grouping import grouped
+from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Prediction, Sized
