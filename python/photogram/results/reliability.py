@@ -232,8 +232,8 @@ class Reliability:
         The upper bound of the effect on any unknown is `external`. At most `count` rows are examined in
         descending order of this bound, until no other row can have a larger effect.
         """
-        testable = self.redundancy > TESTABLE
-        norm = np.where(testable & np.isfinite(self.external), self.external, -math.inf)
+        tested = (self.redundancy > TESTABLE) & np.isfinite(self.external)
+        norm = np.where(tested, self.external, -math.inf)
         group_of, best = self.row_groups(), 0.0
         found: list[Moved] = []
         for row in np.argsort(-norm, kind="stable")[:count].tolist():

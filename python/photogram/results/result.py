@@ -58,6 +58,9 @@ REJECTED = "all its image observations are rejected"
 """Reasons for excluding a point without image observations: without any, or none was used."""
 
 
+_OF_DATUM = ("photo_positions", "photo_attitudes", "photo_cofactors", "point_positions", "point_cofactors")
+
+
 def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str, str]:
     """Return the excluded points by name, with the reasons."""
     reasons = {block.point_ids[point]: reason for point, reason in solution.dropped}
@@ -313,11 +316,7 @@ class Result(OnFilm, AdjustedNetwork):
         kept = [message for message in self.messages if message not in before]
         return replace(
             self,
-            photo_positions=solution.photo_positions,
-            photo_attitudes=solution.photo_attitudes,
-            photo_cofactors=solution.photo_cofactors,
-            point_positions=solution.point_positions,
-            point_cofactors=solution.point_cofactors,
+            **{name: getattr(solution, name) for name in _OF_DATUM},
             cameras=adjusted_cameras(block, solution, self.covariance_scale),
             unknowns=adjusted_unknowns(block, solution, self.covariance_scale),
             datum=datum,
