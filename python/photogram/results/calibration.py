@@ -23,8 +23,7 @@ from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
-from photogram.results.fixed_tests import quadratic
-from photogram.results.model_tests import TermsTest, groups_of_terms, tail_probability, terms_test
+from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
 from photogram.results.unknowns import AdjustedCamera
 from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
@@ -32,7 +31,6 @@ from photogram.show.quantity import Axis, Quantity, Table, component, members, o
 if TYPE_CHECKING:
     from photogram import Result
 
-LEVEL = 0.05  # Significance level of terms
 CORRELATED = 0.95  # The report lists larger correlations
 ASKED = 20  # Largest number of cameras with correlations to the poses of photos
 INSEPARABLE = 0.9999  # Largest R^2 of a parameter that is separable from the others
@@ -89,24 +87,6 @@ class ParameterTest:
 
 
 @dataclass(frozen=True)
-class GroupTest:
-    """Distortion terms that are tested together."""
-
-    names: tuple[str, ...]  # The parameters
-    test_value: float  # p' Q^-1 p / (g sigma0^2)
-    probability: float  # Probability of a larger test value if all terms are zero
-
-    @property
-    def significant(self) -> bool:
-        """Whether the terms differ from zero at the 5 percent level."""
-        return self.probability < LEVEL
-
-    @property
-    def outcome(self) -> str:
-        return "significant" if self.significant else "not significant"
-
-
-@dataclass(frozen=True)
 class Correlation:
     first: str
     second: str
@@ -149,7 +129,7 @@ class Calibration:
 
     camera: AdjustedCamera
     parameters: tuple[ParameterTest, ...]
-    groups: tuple[GroupTest, ...]
+    groups: tuple[TermsTest, ...]
     correlations: tuple[Correlation, ...]
     poses: tuple[PoseCorrelation, ...]
     terms: tuple[TermsTest, ...]
@@ -188,7 +168,7 @@ def calibrations(result: Result) -> list[Calibration]:
             Calibration(
                 camera=each,
                 parameters=parameters,
-                groups=tuple(_group(result, each, names) for names in _families(each)),
+                groups=tuple(joint_test(result, each, names) for names in _families(each)),
                 correlations=_correlations(each),
                 poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
                 terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
@@ -219,12 +199,6 @@ def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
         redundancy=float(camera.redundancy[k]),
         gain=t * t * result.covariance_scale,
     )
-
-
-def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> GroupTest:
-    rows = [camera.names.index(name) for name in names]
-    value, k = quadratic(camera.covariance[np.ix_(rows, rows)], camera.values[rows]), len(rows)
-    return GroupTest(names, value / k, tail_probability(value, k, result.freedom_of_scale))
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
@@ -291,7 +265,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     shown, note = found[:LISTED], "the table of cameras has all"
     law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
     tables = [parameters_table(each, law) for each in shown]
-    groups = [(each.camera.name, group) for each in shown for group in each.groups]
+    groups = [group for each in shown for group in each.groups]
     parts: list[Part] = [*layered_tables("camera", tables), _terms_together(groups)]
     curves = [
         _curve_table(each.camera.name, curve, str(each.camera.camera.unit))
@@ -386,14 +360,13 @@ def outcome(each: ParameterTest) -> str:
     return ", ".join(words)
 
 
-def _terms_together(groups: Sequence[tuple[str, GroupTest]]) -> Table:
-    every = [group for _, group in groups]
+def _terms_together(groups: Sequence[TermsTest]) -> Table:
     columns = [
-        Quantity([camera for camera, _ in groups], kind="name", head="Camera"),
-        Quantity([", ".join(each.names) for each in every], kind="name", head="Terms together"),
-        of_each(every, "test_value", head="F", decimals=2),
-        of_each(every, "probability", head="p", figures=2),
-        of_each(every, "outcome", kind="name", head="Outcome"),
+        of_each(groups, "camera", kind="name", head="Camera"),
+        Quantity([", ".join(each.names) for each in groups], kind="name", head="Terms together"),
+        of_each(groups, "test_value", head="F", decimals=2),
+        of_each(groups, "probability", head="p", figures=2),
+        of_each(groups, "outcome", kind="name", head="Outcome"),
     ]
     return Table("camera-groups", "Terms of the lens tested together", columns)
 
