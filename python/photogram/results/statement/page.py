@@ -36,23 +36,7 @@ from photogram.results.unknowns import AdjustedCamera, units
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, Table
-from photogram.show.sketch.marks import (
-    Arrows,
-    Ellipses,
-    Level,
-    Line,
-    Mark,
-    Markers,
-    Mesh,
-    Names,
-    Panel,
-    ScaleBar,
-    Shades,
-    around,
-    ellipse_axes,
-    error_bars,
-    spread,
-)
+from photogram.show.sketch import marks as shapes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION, round_length
 
@@ -409,45 +393,45 @@ def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
         return None
     places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
     extent = np.ptp(places, axis=0)
-    panel = _in_plan(around(places, 0.12), texts)
-    marks = list[Mark]()
+    panel = _in_plan(shapes.around(places, 0.12), texts)
+    marks = list[shapes.Mark]()
     if len(control):
-        marks.append(Markers(control[:, :2], "^", 6.0, SOFT, label=texts("use.control")))
+        marks.append(shapes.Markers(control[:, :2], "^", 6.0, SOFT, label=texts("use.control")))
     if len(found):
         panel = _points(panel, found, float(extent.max()), texts)
     height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
     return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="above")])
 
 
-def _in_plan(limits: Floats, texts: Texts) -> Panel:
+def _in_plan(limits: Floats, texts: Texts) -> shapes.Panel:
     across, up = (f"{texts(f'column.{axis}')}, {texts.unit}" for axis in ("east", "north"))
-    return Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
+    return shapes.Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
 
 
-def _points(panel: Panel, found: Compared, extent: float, texts: Texts) -> Panel:
+def _points(panel: shapes.Panel, found: Compared, extent: float, texts: Texts) -> shapes.Panel:
     plan, d = found.places[:, :2], found.differences
     heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
     most = max(float(np.abs(heights).max()), 1e-12)
-    shades = Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
-    marks: list[Mark] = [
-        Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
-        Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
+    shades = shapes.Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
+    marks: list[shapes.Mark] = [
+        shapes.Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
+        shapes.Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
     ]
-    bars: list[ScaleBar] = []
+    bars: list[shapes.ScaleBar] = []
     both = np.isfinite(d[:, :2]).all(axis=1)
     if both.any():
         largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
         scale = REACH * max(extent, 1e-9) / largest
-        semi_axes, angles = ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
+        semi_axes, angles = shapes.ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
         marks += [
-            Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
-            Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
+            shapes.Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
+            shapes.Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
         ]
         length = round_length(largest)
         sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
         bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal"))))
     if len(found) <= NAMED:
-        marks.append(Names(plan, found.names, [SOFT] * len(found)))
+        marks.append(shapes.Names(plan, found.names, [SOFT] * len(found)))
     return replace(panel, marks=marks, bars=bars, shades=shades)
 
 
@@ -456,19 +440,19 @@ def drawn_lengths(found: Lengths, texts: Texts) -> Plot:
     test, order = found.test, np.argsort(found.calibrated, kind="stable")
     places = np.column_stack([found.calibrated, test.errors])
     ends = [test.errors - test.sd, test.errors + test.sd]
-    marks: list[Mark] = [
-        Line(error_bars(places, *ends), BLUE, 0.7),
-        Markers(places, "o", 3.0, BLUE),
-        Level(0.0, SOFT, 0.6),
+    marks: list[shapes.Mark] = [
+        shapes.Line(shapes.error_bars(places, *ends), BLUE, 0.7),
+        shapes.Markers(places, "o", 3.0, BLUE),
+        shapes.Level(0.0, SOFT, 0.6),
     ]
     if test.limits is not None:
         for limit in (test.limits, -test.limits):
             ends.append(limit)
             line = np.column_stack([found.calibrated, limit])[order]
-            marks.append(Line(line, VERMILION, 0.9, "--"))
-    limits = np.column_stack([spread(found.calibrated), spread(0.0, *ends)])
+            marks.append(shapes.Line(line, VERMILION, 0.9, "--"))
+    limits = np.column_stack([shapes.spread(found.calibrated), shapes.spread(0.0, *ends)])
     across, up = (f"{texts(f'column.{name}')}, {texts.unit}" for name in ("length", "error"))
-    return Plot(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=texts("number.decimal"))])
+    return Plot(WIDTH, 3.0, [shapes.Panel(limits, marks, "", across, up, decimal=texts("number.decimal"))])
 
 
 def overlap(result: Result, texts: Texts) -> Plot | None:
@@ -492,8 +476,8 @@ def overlap(result: Result, texts: Texts) -> Plot | None:
             grid = np.stack(np.meshgrid(x[columns], y[rows]), axis=-1)
             inside = ~outside(grid.reshape(-1, 2), hull(outline))
             counts[np.ix_(rows, columns)] += inside.reshape(grid.shape[:2])
-    shades = Shades(0.0, float(counts.max()) or 1.0, texts("column.photos"))
+    shades = shapes.Shades(0.0, float(counts.max()) or 1.0, texts("column.photos"))
     corners = np.array([low, low + cell * np.array([len(x), len(y)])])
-    cells = Mesh(corners, np.where(counts > 0, counts, np.nan), shades)
+    cells = shapes.Mesh(corners, np.where(counts > 0, counts, np.nan), shades)
     panel = replace(_in_plan(corners, texts), marks=[cells], shades=shades)
     return Plot(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)), [panel])
