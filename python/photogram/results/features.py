@@ -153,15 +153,11 @@ class Features:
 
     def table(self) -> pd.DataFrame:
         """Return the quantities as a data frame: value, sd, k and U = k sd of each."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns())
+        return Table("quantities", "", quantity_columns(self)).frame()
 
     def deviation_table(self) -> pd.DataFrame:
         """Return the deviations of the points from their features as a data frame."""
-        import pandas as pd
-
-        return pd.DataFrame(self.deviation_columns())
+        return Table("deviations", "", deviation_quantities(self)).frame()
 
 
 def quantity_columns(features: Features) -> list[quantity.Quantity]:

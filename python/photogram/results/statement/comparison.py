@@ -168,11 +168,8 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         scale=result.covariance_scale,
         second=result.freedom_of_scale,
         not_usable=tuple(
-            (name, "no images" if why == NOT_PHOTOGRAPHED else why)
-            for name, why in (
-                (name, result.dropped.get(name, "left out"))
-                for name in np.array(block.point_ids, dtype=object)[unused]
-            )
+            (name, "no images" if (why := result.dropped.get(name, "left out")) == NOT_PHOTOGRAPHED else why)
+            for name in np.array(block.point_ids, dtype=object)[unused]
         ),
         known=len(checks.rows),
         step=step,
