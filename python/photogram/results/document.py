@@ -39,6 +39,11 @@ if TYPE_CHECKING:
 @np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite
 def block_document(result: Result) -> Document:
     pictures, (head, figures) = drawings(result), bandwidths(result)
+    shown, note = notable(result.unknowns)
+    tables = [
+        Table("unknowns", "Common unknowns", declared.unknowns(shown), note),
+        trajectories_table(result),
+    ]
     given = [
         sections.control_section(result, declared.unheld(result)),
         sections.check_section(result),
@@ -46,7 +51,7 @@ def block_document(result: Result) -> Document:
         sections.stations_section(result),
         cameras_section(result, [pictures[name] for name in ("correlations", "distortion")]),
         films_section(result, pictures["films"]),
-        _unknowns_section(result),
+        Section("unknowns", "Common unknowns", tables, about("unknowns")),
     ]
     title, columns = "Redundancy by kind of observation", declared.redundancy_by_kind(result)
     redundancy, datum = Table("redundancy-by-kind", title, columns, about("redundancy-by-kind")), result.datum
@@ -111,15 +116,6 @@ def _size_section(result: Result) -> Section:
         if np.isfinite(differences).any():
             good.append(Fact(f"rms of {what}", ", ".join(_differences(result, values))))
     return size_section(result, size_of(result), more, good)
-
-
-def _unknowns_section(result: Result) -> Section:
-    shown, note = notable(result.unknowns)
-    tables = [
-        Table("unknowns", "Common unknowns", declared.unknowns(shown), note),
-        trajectories_table(result),
-    ]
-    return Section("unknowns", "Common unknowns", tables, about("unknowns"))
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:

@@ -63,8 +63,11 @@ def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ())
     rays = np.full((len(cameras), 4 * SIDE + 1, 3), np.nan)
     if result.cameras:
         cameras = camera_rows([each.camera for each in result.cameras])
+    steps = np.arange(4 * SIDE + 1) / SIDE
     for row, own in enumerate(cameras):
-        rays[row] = rays_of_row(own, _outline(frames[row]))
+        left, low, right, high = frames[row]
+        corners = (left, right, right, left, left), (low, low, high, high, low)
+        rays[row] = rays_of_row(own, np.column_stack([np.interp(steps, np.arange(5), c) for c in corners]))
     directions = np.einsum("pij,pvj->pvi", turns, rays[photo_cameras])
     horizontal = np.hypot(directions[..., 0], directions[..., 1])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -121,14 +124,6 @@ def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = (
         if len(own):
             found[row] = *own.min(axis=0), *own.max(axis=0)
     return found
-
-
-def _outline(frame: Floats) -> Floats:
-    """Return (17, 2) positions around a frame; the last one repeats the first."""
-    left, low, right, high = frame
-    corners = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
-    steps = np.arange(4 * SIDE + 1) / SIDE
-    return np.column_stack([np.interp(steps, np.arange(5), corner) for corner in corners.T])
 
 
 CONFIDENCE = 0.95  # Default probability of an ellipse

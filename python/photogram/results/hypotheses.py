@@ -392,21 +392,16 @@ def hypotheses(
         points=len(adjusted),
         point_ids=given.point_ids,
         axes=[axis.name for axis in axes],
-        units=_units(given.image_unit, timed=timed),
+        units={
+            **dict.fromkeys(("camera-f", "camera-point"), f" {given.image_unit}"),
+            **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
+            **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
+            **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
+        },
         length=f" {unit_written(axes[2].small)}",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         single_odds=float(np.nanmax(odds[sets:], initial=of_images)),
     )
-
-
-def _units(image: str, *, timed: bool) -> dict[str, str]:
-    """Return the units of errors that are no lengths; `image` is the unit of image coordinates."""
-    return {
-        **dict.fromkeys(("camera-f", "camera-point"), f" {image}"),
-        **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
-        **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
-        **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
-    }
 
 
 def _padded(rows: Sequence[Mapping[str, Any]], name: str, width: int) -> Floats:

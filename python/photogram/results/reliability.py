@@ -28,7 +28,7 @@ from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, Selection
-from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NamedSuspects, NetworkTrial
+from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial
 from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.quantity import Table, column, members, records
@@ -375,7 +375,13 @@ def downweighted(trial: NetworkTrial, terms: Terms, image_weights: Floats, used:
     `image_weights` and `used` are the (m,) weight factors of the images, and whether they were used.
     """
     suspects = trial.suspects
-    weights = _weights(suspects, terms, np.where(used, image_weights, np.nan))
+    weights = np.ones(len(suspects))  # (G,) of groups; NaN if not used
+    of_images, others = suspects.kinds == IMAGE, suspects.kinds == OBSERVATION
+    weights[of_images] = np.where(used, image_weights, np.nan)[suspects.subjects[of_images]]
+    factors = np.ones(len(terms.observation_rows))
+    for kind in terms.kinds:
+        factors[kind.rows] = kind.weights
+    weights[others] = factors[terms.observation_rows[suspects.subjects[others]]]
     removed = weights < REMOVED
     points, images = suspects.points, (suspects.kinds == IMAGE) & np.isfinite(weights)
     count = len(terms.points)
@@ -396,16 +402,3 @@ def downweighted(trial: NetworkTrial, terms: Terms, image_weights: Floats, used:
             for point, name in zip(alone.tolist(), terms.points[alone].tolist(), strict=True)
         ],
     )
-
-
-def _weights(suspects: NamedSuspects, terms: Terms, image_weights: Floats) -> Floats:
-    """Return (G,) weight factors of groups; NaN if not used."""
-    weights = np.ones(len(suspects))
-    images, others = suspects.kinds == IMAGE, suspects.kinds == OBSERVATION
-    weights[images] = image_weights[suspects.subjects[images]]
-    if others.any():
-        factors = np.ones(len(terms.observation_rows))
-        for kind in terms.kinds:
-            factors[kind.rows] = kind.weights
-        weights[others] = factors[terms.observation_rows[suspects.subjects[others]]]
-    return weights

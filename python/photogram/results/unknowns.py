@@ -216,7 +216,13 @@ def adjusted_cameras(
     if not block.cameras:
         return ()
     found = []
-    knots = _knots(block, solution)
+    knots = dict[int, Floats]()  # (ny, nx, 2) adjusted knots by `id` of the camera
+    if moving := [each for each in block.cameras if each.knots is not None and each.knot_unknowns]:
+        places = [position for _, position, *_ in solution.adjusted_unknowns]
+        rows = {id(each): row for row, each in enumerate(block.unknowns)}
+        for each in moving:
+            of_camera = np.array([places[rows[id(knot)]][:2] for knot in each.knot_unknowns])
+            knots[id(each)] = of_camera.reshape(np.asarray(each.knots).shape)
     for name, given, row in zip(block.camera_names, block.cameras, solution.cameras, strict=True):
         parameters, cofactors, redundancy, information, photos, images = row
         k = len(parameters)
@@ -238,21 +244,6 @@ def adjusted_cameras(
             )
         )
     return tuple(found)
-
-
-def _knots(block: Block, solution: _photocore.BlockSolution) -> dict[int, Floats]:
-    """Return (ny, nx, 2) adjusted knots of cameras with unknown knots, by `id`."""
-    if not any(each.knot_unknowns for each in block.cameras):
-        return {}
-    rows = {id(each): row for row, each in enumerate(block.unknowns)}
-    places = [position for _, position, *_ in solution.adjusted_unknowns]
-
-    found = {}
-    for each in block.cameras:
-        if each.knots is not None and each.knot_unknowns:
-            own = np.array([places[rows[id(knot)]][:2] for knot in each.knot_unknowns])
-            found[id(each)] = own.reshape(each.knots.shape)
-    return found
 
 
 def units(camera: Camera) -> list[str]:

@@ -23,18 +23,10 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.rays import local_axes
+from photogram.results import network_trial
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances, Item, adjusted, used_rows
 from photogram.results.group_sums import Grouping, Left, Probing, grouped, observables
-from photogram.results.network_trial import (
-    ATTITUDE,
-    CONTROL,
-    IMAGE,
-    KINDS,
-    OBSERVATION,
-    POSITION,
-    BlockSuspects,
-)
 from photogram.results.statement.request import invalid
 from photogram.results.statement.texts import Texts
 from photogram.results.unknowns import units
@@ -228,18 +220,18 @@ class _Freedoms:
 
 
 PHOTOS = 100  # Listed photos with the largest contributions
-UNKNOWN = KINDS.index("unknown")
+UNKNOWN = network_trial.KINDS.index("unknown")
 _PLURALS = dict(enumerate(("images", "control", "photo positions", "photo attitudes"))) | {5: "camera"}
 
 
-class Rows(BlockSuspects):
+class Rows(network_trial.BlockSuspects):
     """All M observations in G groups, images or control points, with names."""
 
     def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
         super().__init__(result.block, core)
         self.sd, self._sizes = core.deviations, np.diff(self.row_starts)
         block, seen, photo = result.block, observables(result), self.photos
-        image, control = self.kinds == IMAGE, self.kinds == CONTROL
+        image, control = self.kinds == network_trial.IMAGE, self.kinds == network_trial.CONTROL
         strips, of_strip = seen.strips(), np.full(len(block.photo_ids), -1)
         for number, photos in enumerate(strips):
             of_strip[photos] = number
@@ -256,7 +248,7 @@ class Rows(BlockSuspects):
     def _types(self) -> tuple[list[str], Indices]:
         """Return the names of types, and the (G,) types of groups."""
         labels = {
-            OBSERVATION: [kind_of(each.label) for each in self.observations],
+            network_trial.OBSERVATION: [kind_of(each.label) for each in self.observations],
             UNKNOWN: [each.KIND for each in self.block.unknowns],
         }
         found: dict[str, int] = {}
@@ -291,7 +283,7 @@ class Rows(BlockSuspects):
 
     def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
         several = len(self.block.camera_names) > 1
-        for group in np.flatnonzero(self.kinds > OBSERVATION).tolist():
+        for group in np.flatnonzero(self.kinds > network_trial.OBSERVATION).tolist():
             for row in self.rows(group).tolist():
                 kind, *of, component = self.named(row)
                 axis = Phrase(f"axis.{component}")
@@ -304,20 +296,20 @@ class Rows(BlockSuspects):
         group = int(np.searchsorted(self.row_starts, row, "right")) - 1
         kind, subject = int(self.kinds[group]), int(self.subjects[group])
         block, component = self.block, int(self.components[row])
-        if kind == IMAGE:
+        if kind == network_trial.IMAGE:
             axes = ("column", "row") if block.image_unit == "px" else ("x", "y")
             photo, point = self.photos[group], self.points[group]
             return "image", block.photo_ids[photo], block.point_ids[point], axes[component]
-        if kind == CONTROL:
+        if kind == network_trial.CONTROL:
             return "control", block.point_ids[subject], "xyz"[component]
-        if kind in (POSITION, ATTITUDE):
-            own = ("x", "y", "z") if kind == POSITION else ("omega", "phi", "kappa")
-            return KINDS[kind], block.photo_ids[subject], own[component]
-        if kind == OBSERVATION:
+        if kind in (network_trial.POSITION, network_trial.ATTITUDE):
+            own = ("x", "y", "z") if kind == network_trial.POSITION else ("omega", "phi", "kappa")
+            return network_trial.KINDS[kind], block.photo_ids[subject], own[component]
+        if kind == network_trial.OBSERVATION:
             observation = self.observations[subject]
             names = observation.components(geographic=block.geographic)
             return kind_of(observation.label), *observation.of, names[component].lower()
-        if KINDS[kind] == "camera":
+        if network_trial.KINDS[kind] == "camera":
             parameters = block.cameras[subject].names if block.cameras else ("c",)
             return "camera", block.camera_names[subject], parameters[component]
         unknown = block.unknowns[subject]
@@ -328,13 +320,17 @@ class Rows(BlockSuspects):
         kind, subject = (np.repeat(each, self._sizes) for each in (self.kinds, self.subjects))
         component = self.components.astype(np.int64)
         found = np.full(len(kind), -1)
-        tables = {IMAGE: grouping.images, CONTROL: grouping.points, POSITION: grouping.photos}
+        tables = {
+            network_trial.IMAGE: grouping.images,
+            network_trial.CONTROL: grouping.points,
+            network_trial.POSITION: grouping.photos,
+        }
         for own_kind, table in tables.items():
             own = kind == own_kind
             found[own] = table[subject[own], component[own]]
-        own = kind == ATTITUDE
+        own = kind == network_trial.ATTITUDE
         found[own] = grouping.photos[subject[own], 3 + component[own]]
-        own = kind == OBSERVATION
+        own = kind == network_trial.OBSERVATION
         of = [row for rows, _ in self.block.observation_groups for row in rows]
         found[own] = grouping.observations[np.array(of, dtype=np.int64)[subject[own]]]
         return found

@@ -20,15 +20,9 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.statement.comparison import LEVEL, PARTS, Compared
+from photogram.statistics import error_radii
 from photogram.statistics.agreement import SINGULAR, quadratic, root_of, scale_of
 from photogram.statistics.distributions import critical_normal, critical_student, log_chi_square
-from photogram.statistics.error_radii import (
-    circular_error,
-    mixture_circular,
-    mixture_linear,
-    sample_radius,
-    upper_order,
-)
 from photogram.statistics.freedom import effective_freedom, rmse_interval
 
 LEAST = 6  # Minimum number of heights for a surface
@@ -273,7 +267,7 @@ def point_tests(found: Compared) -> PointTests:
         others=others,
         p_others=np.exp(log_chi_square(others, dimension)),
         dimension=dimension,
-        ce90=circular_error(adjusted[:, :2, :2], 0.9) if n else np.zeros(0),
+        ce90=error_radii.circular_error(adjusted[:, :2, :2], 0.9) if n else np.zeros(0),
         le90=sd_adjusted[:, 2] * critical_normal(0.1),
     )
 
@@ -344,7 +338,7 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
     moments = own.T @ own / len(own) if len(own) else np.full((2, 2), np.nan)
     of_moments, finite = dict[str, float](), np.isfinite(moments).all()
     for p in PROBABILITIES:
-        circular = float(circular_error(moments[np.newaxis], p)[0]) if finite else math.nan
+        circular = float(error_radii.circular_error(moments[np.newaxis], p)[0]) if finite else math.nan
         linear = root_mean(heights**2) * critical_normal(1.0 - p)
         of_moments |= {f"ce{round(100 * p)}": circular, f"le{round(100 * p)}": linear}
     blocks = found.blocks(found.product)
@@ -373,8 +367,8 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
         moments=moments,
         of_moments=of_moments,
         mixture={
-            "ce90": mixture_circular(ellipses, 0.9) if len(ellipses) else math.nan,
-            "le90": mixture_linear(sd, 0.9) if len(sd) else math.nan,
+            "ce90": error_radii.mixture_circular(ellipses, 0.9) if len(ellipses) else math.nan,
+            "le90": error_radii.mixture_linear(sd, 0.9) if len(sd) else math.nan,
         },
         surface=surface(found),
     )
@@ -405,8 +399,8 @@ def _radii(plan: Floats, heights: Floats) -> dict[str, dict[str, Any] | None]:
             if not len(values):
                 found[key] = None
                 continue
-            order, sample = sample_radius(values, p)
-            upper = upper_order(len(values), p)
+            order, sample = error_radii.sample_radius(values, p)
+            upper = error_radii.upper_order(len(values), p)
             largest = None if upper is None else float(np.sort(values)[upper - 1])
             found[key] = {"order": order, "sample": sample, "upper_order": upper, "upper": largest}
     return found

@@ -16,21 +16,12 @@ from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
+from photogram.results.statement import tables as declared
 from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.judgement import fixed_values
 from photogram.results.statement.standards import Lengths
-from photogram.results.statement.tables import (
-    Columns,
-    annex,
-    check_points,
-    decimals_for,
-    kinds_of,
-    left_out_points,
-    removed_observations,
-    test_lengths,
-)
 from photogram.results.statement.texts import Texts
 from photogram.results.unknowns import AdjustedCamera, units
 from photogram.show.judgement import verdict_table
@@ -51,26 +42,26 @@ BLANK = " "  # Header of a column without a name
 def annexes(statement: Statement) -> list[Section]:
     texts, result = statement.texts, statement.result
     checks = [
-        check_points(statement),
+        declared.check_points(statement),
         *([] if statement.of_all is None else [_radii(texts, statement.of_all)]),
     ]
     held = fixed_values(texts, result) or texts("annex.c.nothing")
     budgets = [part for each in statement.taken_apart for part in _budget(texts, each)]
-    left_out = left_out_points(texts, statement.left_out)
+    left_out = declared.left_out_points(texts, statement.left_out)
     return [
-        annex(texts, "a", checks),
-        annex(texts, "b", [left_out], texts("annex.b.note")),
-        annex(texts, "c", budgets, texts("annex.c.note", held=held)),
-        annex(texts, "d", [part for each in result.cameras for part in _camera(statement, each)]),
-        annex(texts, "e", _adjustment(statement), texts.text(result.verdict.message)),
-        annex(texts, "f", _survey(statement)),
-        annex(texts, "h", _metrology(statement)),
-        annex(texts, "g", _files(statement)),
+        declared.annex(texts, "a", checks),
+        declared.annex(texts, "b", [left_out], texts("annex.b.note")),
+        declared.annex(texts, "c", budgets, texts("annex.c.note", held=held)),
+        declared.annex(texts, "d", [part for each in result.cameras for part in _camera(statement, each)]),
+        declared.annex(texts, "e", _adjustment(statement), texts.text(result.verdict.message)),
+        declared.annex(texts, "f", _survey(statement)),
+        declared.annex(texts, "h", _metrology(statement)),
+        declared.annex(texts, "g", _files(statement)),
     ]
 
 
 def _radii(texts: Texts, own: Figures) -> Table:
-    columns, decimals = Columns(texts), decimals_for(own.points.sd_adjusted)
+    columns, decimals = declared.Columns(texts), declared.decimals_for(own.points.sd_adjusted)
     radii = {name: radius for name, radius in own.radii.items() if radius is not None}
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
     upper = [math.nan if radius["upper"] is None else radius["upper"] for radius in radii.values()]
@@ -85,7 +76,7 @@ def _radii(texts: Texts, own: Figures) -> Table:
 
 
 def _budget(texts: Texts, own: Budget) -> list[Table]:
-    columns = Columns(texts)
+    columns = declared.Columns(texts)
     finer = [each for level in ("strip", "camera", "point", "parameter") for each in own.at(level)]
     if len(own.at("camera")) < 2:
         finer = [each for each in finer if each.level != "camera"]
@@ -125,7 +116,7 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
 
 
 def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
-    texts, columns, sd = statement.texts, Columns(statement.texts), camera.sd
+    texts, columns, sd = statement.texts, declared.Columns(statement.texts), camera.sd
     of, estimated = units(camera.camera), camera.estimated
     axes = tuple(Axis.of(name, unit) for name, unit in zip(camera.names, of, strict=True))
     names = [camera.names[k] for k in estimated]
@@ -153,7 +144,7 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
     if curve is not None:
         unit, inside = statement.result.block.image_unit, np.flatnonzero(curve.radii <= curve.observed)
         rows = inside[np.unique(np.linspace(0, len(inside) - 1, MAX_RADII).round().astype(int))]
-        decimals = decimals_for(curve.sd[rows])
+        decimals = declared.decimals_for(curve.sd[rows])
         distortion = [
             columns.number("radius", curve.radii[rows], unit=unit),
             columns.number("correction", curve.values[rows], decimals, unit),
@@ -164,8 +155,8 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
 
 
 def _adjustment(statement: Statement) -> list[Part]:
-    texts, columns = statement.texts, Columns(statement.texts)
-    kinds = kinds_of(statement.result)
+    texts, columns = statement.texts, declared.Columns(statement.texts)
+    kinds = declared.kinds_of(statement.result)
     counts, redundancy, squares = zip(*kinds.values(), strict=True)
     sums = [
         columns.text("kind", [texts.kind(name) for name in kinds]),
@@ -180,14 +171,14 @@ def _adjustment(statement: Statement) -> list[Part]:
     return [
         Table("kinds", texts("table.kinds"), sums),
         verdict_table(statement.result.verdict, texts),
-        removed_observations(statement),
+        declared.removed_observations(statement),
         _markers(statement),
         drawing,
     ]
 
 
 def _markers(statement: Statement) -> Table:
-    texts, columns, result = statement.texts, Columns(statement.texts), statement.result
+    texts, columns, result = statement.texts, declared.Columns(statement.texts), statement.result
     block, kinds = result.block, result.point_kinds
     fit = fit_of_images(result, result.image_points, len(kinds))
     rows = in_order(block, np.flatnonzero((kinds != "pass") & (fit[:, 5] > 0)))
@@ -203,10 +194,10 @@ def _markers(statement: Statement) -> Table:
 
 
 def _survey(statement: Statement) -> list[Table]:
-    texts, columns, own = statement.texts, Columns(statement.texts), statement.survey
+    texts, columns, own = statement.texts, declared.Columns(statement.texts), statement.survey
     if own.system is None:
         return []
-    decimals = max(3, decimals_for(own.sd))
+    decimals = max(3, declared.decimals_for(own.sd))
     coordinates = [
         columns.number(
             texts.word("axis", name), column, 8 if unit == "deg" else decimals, texts.word("unit", unit)
@@ -224,7 +215,7 @@ def _survey(statement: Statement) -> list[Table]:
 
 
 def _files(statement: Statement) -> list[Part]:
-    texts, columns, files = statement.texts, Columns(statement.texts), statement.inputs
+    texts, columns, files = statement.texts, declared.Columns(statement.texts), statement.inputs
     facts = [Fact(texts("page.program"), f"photogram {_photocore.__version__}")]
     if statement.command:
         facts.append(Fact(texts("page.command"), statement.command))
@@ -237,7 +228,7 @@ def _files(statement: Statement) -> list[Part]:
 
 
 def _metrology(statement: Statement) -> list[Part]:
-    texts, columns, parts = statement.texts, Columns(statement.texts), list[Part]()
+    texts, columns, parts = statement.texts, declared.Columns(statement.texts), list[Part]()
     standards, features = statement.standards, statement.result.features
     lengths, measures = standards.lengths, standards.iso_19157
     if features is not None and len(features):
@@ -245,7 +236,7 @@ def _metrology(statement: Statement) -> list[Part]:
     if lengths is not None:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
-        parts += [test_lengths(texts, lengths), drawing]
+        parts += [declared.test_lengths(texts, lengths), drawing]
     quantities = [
         columns.text("measure", [each["measure"] for each in measures]),
         columns.number("id", [each["measure_id"] for each in measures]),
@@ -262,7 +253,7 @@ def _measured(texts: Texts, value: Any) -> str:
 
 def _features(texts: Texts, features: Features) -> Table:
     """Return feature quantities with two figures of the least deviation per unit."""
-    columns = Columns(texts)
+    columns = declared.Columns(texts)
     every = [(feature, own) for feature in features for own in feature.quantities]
     names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
     axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
@@ -322,14 +313,14 @@ def _figures(statement: Statement) -> list[Part]:
     own, texts, rest = statement.of_all, statement.texts, statement.of_rest
     if own is None:
         return []
-    columns = Columns(texts)
+    columns = declared.Columns(texts)
     shown = [
         (part, sized, predicted)
         for part, sized in own.parts.items()
         if sized and (predicted := own.prediction[part])
     ]
     known = [each.predicted_rmse_of_product for each in own.prediction.values() if each is not None]
-    decimals = decimals_for(np.array(known))
+    decimals = declared.decimals_for(np.array(known))
     number = partial(columns.number, decimals=decimals)
     intervals = [
         " – ".join(texts.number(limit, decimals) for limit in predicted.rmse_interval)

@@ -23,23 +23,10 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
-from photogram.results.statement.comparison import (
-    Compared,
-    LeftOut,
-    plan_positions,
-    turned_jointly,
-    turned_to_east,
-)
+from photogram.results.statement import comparison
+from photogram.results.statement import lengths as length_tests
 from photogram.results.statement.figures import Figures, root_mean
 from photogram.results.statement.layout import area_in_plan
-from photogram.results.statement.lengths import (
-    LengthTest,
-    Limit,
-    angle_to_diagonal,
-    at_reference,
-    length_test,
-    measured_lengths,
-)
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
@@ -266,8 +253,8 @@ class Lengths:
     lines: Sequence[str]
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
-    limit: Limit | None
-    test: LengthTest
+    limit: length_tests.Limit | None
+    test: length_tests.LengthTest
     expansion: float | None
 
 
@@ -291,16 +278,18 @@ class Standards:
 def asprs_figures(
     result: Result,
     asked: Asked,
-    found: Compared,
+    found: comparison.Compared,
     of_all: Figures | None,
     of_vegetated: Figures | None,
-    left_out: Sequence[LeftOut],
+    left_out: Sequence[comparison.LeftOut],
 ) -> Asprs:
     """Return the figures of the ASPRS, and the verdicts on the requested classes."""
     metre = lengths_in(result.block.linear_unit)
     area = asked.area
     if area is None:
-        area = area_in_plan(plan_positions(result.block, result.point_positions[result.used_points]))
+        area = area_in_plan(
+            comparison.plan_positions(result.block, result.point_positions[result.used_points])
+        )
     km2 = area * metre**2 / 1e6
     figures = _accuracies(of_all, of_vegetated)
     classes = asked.classes
@@ -348,7 +337,7 @@ def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[st
 
 def _control_rmse(result: Result) -> tuple[float, float]:
     block, found = result.block, []
-    turns = turned_to_east(block, block.point_positions)
+    turns = comparison.turned_to_east(block, block.point_positions)
     for row in np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & result.used_points).tolist():
         known = np.isfinite(block.point_sd[row])
         own = np.abs(turns[row]) @ np.where(known, block.point_sd[row], 0.0)
@@ -384,20 +373,20 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
     rows = used_rows(result, names)
     positions, joint = result.point_positions[rows], result.covariance(("point", names))
     if block.geographic:
-        joint = turned_jointly(turned_to_east(block, positions), joint)
-        positions = plan_positions(block, positions)
+        joint = comparison.turned_jointly(comparison.turned_to_east(block, positions), joint)
+        positions = comparison.plan_positions(block, positions)
     pairs = np.array([[names.index(each["from"]), names.index(each["to"])] for each in asked.lengths])
-    measured, covariance = measured_lengths(positions, joint, pairs)
+    measured, covariance = length_tests.measured_lengths(positions, joint, pairs)
     temperatures = np.array([each.get("temperature", math.nan) for each in asked.lengths], dtype=float)
     turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
     if turned and asked.expansion is not None:
-        measured = at_reference(measured, temperatures, asked.expansion)
-    limit = None if asked.limit is None else Limit(*asked.limit)
-    extent = np.ptp(plan_positions(block, result.point_positions[result.used_points]), axis=0)
-    ends_in_plan = plan_positions(block, result.point_positions[rows])[pairs]
+        measured = length_tests.at_reference(measured, temperatures, asked.expansion)
+    limit = None if asked.limit is None else length_tests.Limit(*asked.limit)
+    extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
+    ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
     lines = [str(each["line"]) for each in asked.lengths]
     calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
-    test = length_test(
+    test = length_tests.length_test(
         measured,
         calibrated,
         covariance=covariance,
@@ -405,7 +394,7 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         lines=lines,
         limit=limit,
         diagonal=float(np.linalg.norm(extent)),
-        off_diagonal=angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
+        off_diagonal=length_tests.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
