@@ -28,7 +28,7 @@ from photogram import (
 )
 from photogram.giant import read_project
 from photogram.plots import Plot
-from photogram.results.fitting import with_features
+from photogram.results.features import with_features
 from photogram.show.page import Drawing
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from message_codes import rejected
 from photogram import InnerConstraints, Spheroid, adjust, features, formats, read_result, simulate
-from photogram.results.features import named_points
-from photogram.results.fitting import with_features
+from photogram.results.features import named_points, with_features
 
 
 @pytest.fixture(scope="module")

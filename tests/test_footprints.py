@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from photogram import Camera, Spheroid, adjust, network, simulate
-from photogram.results.ellipses import ellipses, fitting_scale, metric_covariances
-from photogram.results.footprints import footprints, grounds, picture_frames
+from photogram.results.footprints import (
+    ellipses,
+    fitting_scale,
+    footprints,
+    grounds,
+    metric_covariances,
+    picture_frames,
+)
 
 SPACES = {
     "rectangular": {},

@@ -57,11 +57,12 @@ from .network.unknowns import LeverArm as LeverArm
 from .planning.networks import Plan as Plan
 from .planning.networks import plan as plan
 from .results.components import VarianceComponents as VarianceComponents
+from .results.components import VarianceFunction as VarianceFunction
 from .results.differences import Differences as Differences
 from .results.differences import differences as differences
 from .results.features import Feature as Feature
 from .results.features import Features as Features
-from .results.fitting import features as features
+from .results.features import features as features
 from .results.group_sums import GroupSums as GroupSums
 from .results.group_sums import group_sums as group_sums
 from .results.iteration import Iteration as Iteration
@@ -72,5 +73,4 @@ from .results.result import Result as Result
 from .results.snooping_result import Snooped as Snooped
 from .results.statement.statement import Statement as Statement
 from .results.statement.statement import statement as statement
-from .results.variance_function import VarianceFunction as VarianceFunction
 from .stellar.cameras import camera_from as camera_from

@@ -29,7 +29,7 @@ from photogram import collection as collections
 from photogram.arguments.annotations import check_members
 from photogram.io.seals import seal
 from photogram.network import Level, OnLevel, Shift
-from photogram.results.cameras import AdjustedCamera
+from photogram.results.unknowns import AdjustedCamera
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 import photogram
 from message_codes import nested_codes
 from photogram import InputError
-from photogram.results.statement import asprs, standards
-from photogram.results.statement.asprs import accuracy, three_d, verdict
+from photogram.results.statement import standards
 from photogram.results.statement.lengths import (
     Limit,
     angle_to_diagonal,
@@ -22,7 +21,7 @@ from photogram.results.statement.lengths import (
     measured_lengths,
 )
 from photogram.results.statement.request import Asked
-from photogram.results.statement.standards import nssda
+from photogram.results.statement.standards import accuracy, nssda, three_d, verdict
 from photogram.show.cells import written
 from photogram.statistics import effective_freedom
 
@@ -57,7 +56,7 @@ def test_figures_of_the_asprs_are_those_of_the_golden_statement(figures):
         assert figure.upper == pytest.approx(verdicts[f"upper_{axis}"], rel=1e-6)
         limit = verdicts[f"class_{axis}_m"]
         good = verdicts["survey_good_enough"][axis]
-        assert asprs.survey_good_enough(figure.survey, limit) is good
+        assert standards.survey_good_enough(figure.survey, limit) is good
     assert verdict(horizontal, 0.05) == verdicts["horizontal"]
     assert verdict(vertical, 0.05) == verdicts["vertical"]
     assert space.rmse == pytest.approx(expected["rmse_3d"], rel=1e-6)
@@ -68,10 +67,10 @@ def test_figures_of_the_asprs_are_those_of_the_golden_statement(figures):
 
 def test_points_asked_for_by_area_are_those_of_the_golden_statement():
     for area, count in golden("statement.json")["asprs"]["points_asked_for"].items():
-        assert asprs.points_asked_for(float(area.removesuffix(" km2"))) == count
-    assert asprs.points_asked_for(0.0) == asprs.points_asked_for(1000.0) == 30
-    assert (asprs.points_asked_for(1000.1), asprs.points_asked_for(9000.0)) == (40, 110)
-    assert asprs.points_asked_for(9000.1) == asprs.points_asked_for(1e9) == 120
+        assert standards.points_asked_for(float(area.removesuffix(" km2"))) == count
+    assert standards.points_asked_for(0.0) == standards.points_asked_for(1000.0) == 30
+    assert (standards.points_asked_for(1000.1), standards.points_asked_for(9000.0)) == (40, 110)
+    assert standards.points_asked_for(9000.1) == standards.points_asked_for(1e9) == 120
 
 
 def test_the_survey_is_added_as_in_table_7_4_of_the_standard():
@@ -102,7 +101,7 @@ def test_a_verdict_says_how_sure_a_class_is_met(limit, with_thirty, with_fewer):
 
 
 def test_the_words_follow_the_number_of_check_points():
-    assert [asprs.wording(count) for count in (0, 1, 29, 30, 120)] == [
+    assert [standards.wording(count) for count in (0, 1, 29, 30, 120)] == [
         "none",
         "produced",
         "produced",
@@ -154,10 +153,10 @@ def test_page_and_document_have_one_verdict_for_each_class(result, count):
 
 def test_control_is_to_be_twice_as_accurate_as_the_class():
     # In height the horizontal class holds, unless heights are a product.
-    assert asprs.control_good_enough(0.025, 0.05, 0.05) == (True, True)
-    assert asprs.control_good_enough(0.026, 0.051, 0.05) == (False, False)
-    assert asprs.control_good_enough(0.01, 0.05, 0.05, 0.10) == (True, True)
-    assert asprs.control_good_enough(0.01, 0.051, 0.05, 0.10) == (True, False)
+    assert standards.control_good_enough(0.025, 0.05, 0.05) == (True, True)
+    assert standards.control_good_enough(0.026, 0.051, 0.05) == (False, False)
+    assert standards.control_good_enough(0.01, 0.05, 0.05, 0.10) == (True, True)
+    assert standards.control_good_enough(0.01, 0.051, 0.05, 0.10) == (True, False)
 
 
 def test_means_and_differences_beyond_the_class_are_remarks():
@@ -166,7 +165,7 @@ def test_means_and_differences_beyond_the_class_are_remarks():
     d[:, 0] = 0.26 * axis
     d[2, 1] = -3.01 * axis
     d[:, 2] = [0.299, -0.299, math.nan, 0.0]
-    found = asprs.remarks(d, 0.10, 0.10)
+    found = standards.remarks(d, 0.10, 0.10)
     assert [(each.kind, each.component, each.point) for each in found] == [
         ("mean", "e", None),
         ("mean", "n", None),
@@ -175,9 +174,9 @@ def test_means_and_differences_beyond_the_class_are_remarks():
     assert found[0].value == pytest.approx(0.26 * axis)
     assert found[0].limit == pytest.approx(0.25 * axis)
     assert found[2].limit == pytest.approx(3 * axis)
-    assert asprs.remarks(d, 0.10) == found
-    assert asprs.remarks(d) == ()
-    (height,) = asprs.remarks(np.array([[math.nan, math.nan, 0.031], [0.0, 0.0, 0.03]]), class_v=0.10)
+    assert standards.remarks(d, 0.10) == found
+    assert standards.remarks(d) == ()
+    (height,) = standards.remarks(np.array([[math.nan, math.nan, 0.031], [0.0, 0.0, 0.03]]), class_v=0.10)
     assert (height.kind, height.component) == ("mean", "h")
 
 

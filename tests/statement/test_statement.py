@@ -13,7 +13,7 @@ import photogram
 from message_codes import nested_codes
 from photogram.formats import read
 from photogram.results.statement.comparison import compared
-from photogram.results.statement.honest import bias, prediction
+from photogram.results.statement.figures import bias, prediction
 from photogram.results.statement.judgement import judged
 from photogram.results.statement.request import Asked
 from photogram.statistics import rmse_interval

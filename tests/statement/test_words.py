@@ -22,10 +22,9 @@ from photogram.results.features import through
 from photogram.results.group_sums import observables
 from photogram.results.observation_kinds import named_observation, parts_of
 from photogram.results.statement import budget
-from photogram.results.statement.quantities import component_of
 from photogram.results.statement.texts import LANGUAGES, Texts
 from photogram.statistics.verdict import RULES
-from photogram.words import Phrase, option_sd, table_of
+from photogram.words import Phrase, option_sd, phrase, table_of
 
 PACKAGE = Path(photogram.__file__).parent
 CRATE = Path(__file__).parents[2] / "crates" / "photocore" / "src"
@@ -125,9 +124,13 @@ def test_quantities_and_parameters_are_named_in_the_language(result):
     points = [Phrase("quantity.point", {"of": name}) for name in ("C01", "C02")]
     height, rotation = Phrase("axis.height"), Phrase("axis.rotation x")
     for name, english, german in (
-        (Phrase("quantity.point", {"of": component_of("C08", height)}), "point C08 height", "Punkt C08 Höhe"),
+        (
+            Phrase("quantity.point", {"of": phrase("named.component", name="C08", axis=height)}),
+            "point C08 height",
+            "Punkt C08 Höhe",
+        ),
         (Phrase("quantity.distance", {"of": "C01 C30"}), "distance C01 C30", "Strecke C01 C30"),
-        (component_of("rig 1", rotation), "rig 1 rotation x", "rig 1 Drehung x"),
+        (phrase("named.component", name="rig 1", axis=rotation), "rig 1 rotation x", "rig 1 Drehung x"),
         (
             Phrase("quantity.linear", {"quantities": points}),
             "linear function of point C01, point C02",

@@ -18,8 +18,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.components import VarianceComponents
-from photogram.results.group_sums import Probing, observables
-from photogram.results.grouping import Grouping, GroupsArgument, grouped
+from photogram.results.group_sums import Grouping, GroupsArgument, Probing, grouped, observables
 from photogram.results.network import AdjustedNetwork
 from photogram.results.snooping_result import Snooped
 from photogram.show.methods import Brief, Documented

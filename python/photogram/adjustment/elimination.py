@@ -11,9 +11,9 @@ from photogram.arguments.objects import kind_error
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.results.cameras import AdjustedCamera
 from photogram.results.model_tests import EFFECT, KEPT, TermsTest, groups_of_terms, terms_test
 from photogram.results.result import Result
+from photogram.results.unknowns import AdjustedCamera
 from photogram.words import phrase
 
 

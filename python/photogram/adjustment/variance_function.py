@@ -15,10 +15,9 @@ from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.motion import focal_images
-from photogram.results.group_sums import Probing, factored, group_sums, observables
-from photogram.results.grouping import Grouping
+from photogram.results.components import Bin, VarianceFunction
+from photogram.results.group_sums import Grouping, Probing, factored, group_sums, observables
 from photogram.results.network import AdjustedNetwork
-from photogram.results.variance_function import Bin, VarianceFunction
 from photogram.statistics.components import GroupsOf
 from photogram.statistics.variance_function import estimate_function
 from photogram.words import phrase

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TypeVar
 
 from photogram.arguments.arrays import argument_error
 from photogram.errors import InputError
+from photogram.messages import unknown_name
+from photogram.words import Phrase
 
 _Kind = TypeVar("_Kind")
 
@@ -36,3 +38,9 @@ def require(condition: object, name: str, code: str, /, **fields: object) -> Non
     """Reject an argument if a condition is false; see `argument_error`."""
     if not condition:
         raise argument_error(name, code, **fields)
+
+
+def require_name(kind: str | Phrase, name: str, names: Collection[str]) -> None:
+    """Reject a name that does not exist; the error has the nearest name, or all names."""
+    if name not in names:
+        raise InputError(unknown_name(kind, name, names))

@@ -196,7 +196,7 @@ def _snooped(
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
     from photogram.messages import Message
-    from photogram.results.fitting import with_features
+    from photogram.results.features import with_features
 
     aside: tuple[Phrase | str, ...] = ()
     if started is not None and (started.set_aside.any() or started.missing):
@@ -249,7 +249,7 @@ def adjusted_block(
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
     from photogram.formats.supplements import repeated_remarks
-    from photogram.results.fitting import with_features
+    from photogram.results.features import with_features
 
     chosen = choices.datum_of(project)
     with adjustment_status(job) as progress:

@@ -109,7 +109,7 @@ class PicturedCollection(PicturedNetwork):
         photo = int(chosen[middle])
         own = slice(len(POSE), None)
         covariance = result.photo_covariances[photo][own, own]
-        _, partials = radial_curve(self._camera(photo), result.photo_sd[photo, own], terms, radii)
+        _, partials = radial_curve(self._camera(photo), terms, radii)
         band = curve_deviations(covariance, terms, partials)
         return [
             Curves(

@@ -30,10 +30,9 @@ from photogram.network.moving_photos import Direction, Shutter
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.trajectories import Readout
-from photogram.results.fixed_tests import as_adjusted, is_suspected, lens_partials, station_partials
+from photogram.results.fixed_tests import Scores, as_adjusted, is_suspected, lens_partials, station_partials
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
-from photogram.results.scores import Scores
 from photogram.statistics.limits import externally_studentized
 from photogram.words import Phrase, phrase
 

@@ -19,7 +19,7 @@ from photogram.network.block import Block
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid, lengths_of_units
 from photogram.network.observations import Control
-from photogram.results.ellipses import metric_covariances
+from photogram.results.footprints import metric_covariances
 from photogram.results.result import Result
 from photogram.show.page import Section, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table

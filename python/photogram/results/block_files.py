@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,35 +16,25 @@ from photogram.io.structure import Stand
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, Undetermined
+from photogram.network import (
+    cameras,
+    core_arrays,
+    films,
+    frame,
+    geometry,
+    lens,
+    moving_photos,
+    refraction,
+    rigs,
+)
+from photogram.network import trajectories as motion
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
-from photogram.network.core_arrays import CoreOptions
-from photogram.network.films import Film, Pattern, Readings, Reseau
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
-from photogram.network.lens import Lens
 from photogram.network.motion import scanners
-from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
-from photogram.network.refraction import Refraction
-from photogram.network.rigs import Mount
-from photogram.network.trajectories import (
-    Angles,
-    Basis,
-    Coefficient,
-    Polynomial,
-    PositionAxes,
-    Spline,
-    Table,
-    Trajectory,
-)
 from photogram.network.unknowns import Unknown
-from photogram.results.cameras import AdjustedCamera
-from photogram.results.datum import ResultDatum
-from photogram.results.features import Feature, Features, Quantity
-from photogram.results.iteration import Iteration, Redundancies, SumsOfSquares
-from photogram.results.observation_kinds import ObservedKind
+from photogram.results import datum, features, iteration, observation_kinds, unknowns
+from photogram.results.result import Result
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -51,16 +42,14 @@ from photogram.results.result_files import (
     Part,
     image_parts,
     point_parts,
+    read_saved,
+    rows_of,
     sheet,
     written,
 )
 from photogram.results.tables import TABLES
-from photogram.results.unknowns import AdjustedUnknown
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase, phrase
-
-if TYPE_CHECKING:
-    from photogram import Result
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
@@ -183,23 +172,23 @@ class KeptTrajectory(Stand):
     """
 
     name: str
-    table: Table
-    position: Basis | None
-    rotation: Basis | None
+    table: motion.Table
+    position: motion.Basis | None
+    rotation: motion.Basis | None
     body: tuple[Floats, Floats] | None
-    position_axes: PositionAxes
-    angles: Angles
-    coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]]
+    position_axes: motion.PositionAxes
+    angles: motion.Angles
+    coefficients: tuple[tuple[motion.Coefficient, ...], tuple[motion.Coefficient, ...]]
 
     @classmethod
     def of(cls, given: Any) -> KeptTrajectory:
         own = (given.name, given.table, given.position, given.rotation, given.body)
         return cls(*own, given.position_axes, given.angles, given.coefficients)
 
-    def original(self) -> Trajectory:
+    def original(self) -> motion.Trajectory:
         """Return the trajectory; the stored coefficients must match its table and bases."""
         own_parts = (self.table, self.position, self.rotation, self.body)
-        made = Trajectory(self.name, *own_parts, self.position_axes, self.angles)
+        made = motion.Trajectory(self.name, *own_parts, self.position_axes, self.angles)
         own, kept = (
             [[each.title for each in part] for part in both]
             for both in (made.coefficients, self.coefficients)
@@ -210,42 +199,58 @@ class KeptTrajectory(Stand):
         return made
 
 
-STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
+STANDS: dict[type, Callable[[Any], Stand]] = {motion.Trajectory: KeptTrajectory.of}
 
 
-CLASSES = (
-    *(KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed),
-    AdjustedCamera,
-    AdjustedUnknown,
-    Film,
-    Pattern,
-    Readings,
-    Reseau,
-    Camera,
-    CoreOptions,
-    Feature,
-    Features,
-    Frame,
-    Iteration,
-    Message,
-    Mount,
-    ObservedKind,
-    Phrase,
-    Quantity,
-    Redundancies,
-    Refraction,
-    Removed,
-    ResultDatum,
-    Spheroid,
-    SumsOfSquares,
-    Undetermined,
+MODULES = (
+    *(cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
+    *(refraction, rigs, datum, features, iteration, observation_kinds, unknowns),
 )
+CLASSES = (KeptTrajectory, Message, Phrase, Removed, Undetermined)
 
 
 def saved_classes() -> list[type]:
-    """Return the classes that the document of a block may contain."""
+    """Return the classes that the document of a block may contain: those of modules, and subclasses."""
     found, bases = [*CLASSES], [Observation, Unknown, Passage]
+    for module in MODULES:
+        found += [
+            each
+            for each in vars(module).values()
+            if isinstance(each, type) and each.__module__ == module.__name__
+        ]
     while bases:
         own: list[Any] = bases.pop().__subclasses__()
         found, bases = [*found, *own], [*bases, *own]
     return found
+
+
+def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
+    """Return the result from a folder; refuse missing, damaged or wrong files."""
+    saved = read_saved(folder, saved_classes(), document)
+    given = saved.members("block", Block)
+    images, names = saved.sheets["images"], {}
+    for kind in ("photo", "point"):
+        sheet = saved.sheets[f"{kind}s"]
+        own = sheet.names(kind)
+        names[kind] = (
+            own.names if (own.rows == np.arange(len(own))).all() else [own.names[k] for k in own.rows]
+        )
+        given[f"{kind}_ids"] = names[kind]
+        given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
+    columns = saved.sheets["photos"].columns
+    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
+    parts = parts_of_block(
+        geographic=given["spheroid"] is not None,
+        unit=given["linear_unit"],
+        image_unit=str(document["image_unit"]),
+        distances="principal_distance" in columns,
+        observed=[name for name, own in first.items() if any(each in columns for each in own)],
+    )
+    own_arrays, block_arrays = saved.arrays(parts, "block")
+    block = Block(**given, **block_arrays)
+    members = saved.members("result", Result)
+    if block.timed or any(each.knot_unknowns for each in block.cameras):
+        # Coefficients of photos with their own trajectories, and knots, are created with their block.
+        pairs = zip(members["unknowns"], block.unknowns, strict=True)
+        members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
+    return Result(**members, **own_arrays, block=block, state=saved.state())

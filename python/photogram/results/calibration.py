@@ -1,4 +1,4 @@
-"""Results of self-calibrations: tests and correlations of camera parameters.
+"""Results of self-calibrations: tests and correlations of camera parameters, and their tables.
 
 A parameter p with cofactor q has the standard deviation s = sigma0 sqrt(q). Its test value is t = (p - p_ref)
 / s. Its distribution is Student's with the degrees of freedom of the adjustment, or normal if the unit weight
@@ -12,23 +12,25 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances, photo_components
-from photogram.results.distortion import INTERIOR
-from photogram.results.model_tests import TermsTest, groups_of_terms, tail_probability, terms_test
-from photogram.results.scores import quadratic
-from photogram.show.page import about
+from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
+from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
+from photogram.results.unknowns import AdjustedCamera
+from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
+from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
 if TYPE_CHECKING:
     from photogram import Result
 
-LEVEL = 0.05  # Significance level of terms
 CORRELATED = 0.95  # The report lists larger correlations
 ASKED = 20  # Largest number of cameras with correlations to the poses of photos
 INSEPARABLE = 0.9999  # Largest R^2 of a parameter that is separable from the others
@@ -85,24 +87,6 @@ class ParameterTest:
 
 
 @dataclass(frozen=True)
-class GroupTest:
-    """Distortion terms that are tested together."""
-
-    names: tuple[str, ...]  # The parameters
-    test_value: float  # p' Q^-1 p / (g sigma0^2)
-    probability: float  # Probability of a larger test value if all terms are zero
-
-    @property
-    def significant(self) -> bool:
-        """Whether the terms differ from zero at the 5 percent level."""
-        return self.probability < LEVEL
-
-    @property
-    def outcome(self) -> str:
-        return "significant" if self.significant else "not significant"
-
-
-@dataclass(frozen=True)
 class Correlation:
     first: str
     second: str
@@ -145,7 +129,7 @@ class Calibration:
 
     camera: AdjustedCamera
     parameters: tuple[ParameterTest, ...]
-    groups: tuple[GroupTest, ...]
+    groups: tuple[TermsTest, ...]
     correlations: tuple[Correlation, ...]
     poses: tuple[PoseCorrelation, ...]
     terms: tuple[TermsTest, ...]
@@ -184,7 +168,7 @@ def calibrations(result: Result) -> list[Calibration]:
             Calibration(
                 camera=each,
                 parameters=parameters,
-                groups=tuple(_group(result, each, names) for names in _families(each)),
+                groups=tuple(joint_test(result, each, names) for names in _families(each)),
                 correlations=_correlations(each),
                 poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
                 terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
@@ -215,12 +199,6 @@ def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
         redundancy=float(camera.redundancy[k]),
         gain=t * t * result.covariance_scale,
     )
-
-
-def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> GroupTest:
-    rows = [camera.names.index(name) for name in names]
-    value, k = quadratic(camera.covariance[np.ix_(rows, rows)], camera.values[rows]), len(rows)
-    return GroupTest(names, value / k, tail_probability(value, k, result.freedom_of_scale))
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
@@ -258,13 +236,13 @@ def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> 
     table = table.reshape(len(rows), -1, 6)
     pairs = []
     for row, k in zip(table, rows, strict=True):
-        for column, component in enumerate(photo_components(result.block)):
+        for column, name in enumerate(photo_components(result.block)):
             order = np.argsort(-np.nan_to_num(row[:, column]), kind="stable")
             above = order[np.nan_to_num(row[order, column]) > CORRELATED]
             if above.size:
                 photos = tuple(result.block.photo_ids[photo] for photo in above.tolist())
                 largest = float(row[above[0], column])
-                pairs.append(PoseCorrelation(camera.names[k], component, photos, largest))
+                pairs.append(PoseCorrelation(camera.names[k], name, photos, largest))
     return tuple(sorted(pairs, key=lambda pair: -pair.coefficient))
 
 
@@ -275,3 +253,182 @@ def _removable(parameters: tuple[ParameterTest, ...]) -> str | None:
     held_up = set(radial[:-1])
     candidates = [each for each in lens if not each.significant and each.name not in held_up]
     return max(candidates, key=lambda each: each.probability).name if candidates else None
+
+
+LISTED = 12  # Number of cameras with individual tables
+RADII = 9  # Rows of a distortion curve
+
+
+def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
+    """Return the section of adjusted and fixed cameras."""
+    found = calibrations(result)
+    shown, note = found[:LISTED], "the table of cameras has all"
+    law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
+    tables = [parameters_table(each, law) for each in shown]
+    groups = [group for each in shown for group in each.groups]
+    parts: list[Part] = [*layered_tables("camera", tables), _terms_together(groups)]
+    curves = [
+        _curve_table(each.camera.name, curve, str(each.camera.camera.unit))
+        for each in shown
+        if (curve := distortion_curve(result, each.camera)) is not None
+    ]
+    parts += [*drawings, *layered_tables("curve", curves)]
+    remarks = [
+        f"{each.camera.name}: {sentence}"
+        for each in shown
+        for sentence in (
+            *(about("correlated", **vars(pair)) for pair in each.correlations),
+            *(about("correlated.pose", **vars(pair)) for pair in each.poses),
+            *_field_remarks(result, each),
+            *each.remarks(),
+        )
+    ]
+    held = [each for each in result.cameras if each.given.is_held]
+    facts = [
+        Fact(
+            f"{each.name}: {each.camera.model}",
+            ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0),
+            each.camera.unit or "",
+            f"{each.photos} photos, {each.images} images",
+        )
+        for each in held[:LISTED]
+    ]
+    if len(held) > LISTED:
+        facts.append(Fact("Not shown here", f"{len(held) - LISTED}", note=note))
+    more = [Fact("Not shown here", f"{len(found) - LISTED}", note=note)] if len(found) > LISTED else []
+    parts += [Remarks(remarks), Facts("Cameras that are held", facts), Facts("More cameras", more)]
+    return Section("cameras", "Cameras", parts, about("cameras") if found else "")
+
+
+def parameters_table(found: Calibration, law: str = "") -> Table:
+    every, camera = found.parameters, found.camera
+    axes, of = tuple(Axis.of(each.name, each.unit) for each in every), np.arange(len(every))
+    names = replace(component(axes, of)[0], head="Parameter")
+    alike: dict[str, Any] = {"axes": axes, "of": of}
+    free = {math.inf: "free"}
+    columns = [
+        of_each(every, "name", member="name", kind="name"),
+        of_each(every, "unit", kind="name"),
+        names,
+        of_each(every, "given", kind="value", member="", head="Given", **alike),
+        of_each(every, "given_sd", kind="deviation", member="", head="sd given", words=free, **alike),
+        of_each(every, "value", kind="value", head="Adjusted", **alike),
+        of_each(every, "sd", kind="deviation", head="sd adjusted", **alike),
+        of_each(every, "change", kind="difference", head="Change", **alike),
+        of_each(every, "test_value", head=f"t {law}".strip(), decimals=2),
+        of_each(every, "probability", head="p", figures=2),
+        of_each(every, "significant"),
+        of_each(every, "multiple_correlation", head="R with all others", decimals=4),
+        of_each(every, "from_prior"),
+        of_each(every, "gain"),
+        Quantity(
+            [outcome(each) for each in every],
+            kind="name",
+            head="Outcome",
+            marked=np.array([not each.separable or each.contradicts for each in every], dtype=bool),
+        ),
+    ]
+    lens = {"model": camera.camera.model, "direction": camera.camera.direction}
+    note = about("camera", **lens, photos=camera.photos, images=camera.images)
+    deviations = np.array([each.sd for each in every])
+    return Table(f"parameters-{camera.name}", camera.name, columns, note, "", deviations)
+
+
+def gains_section(result: Result) -> Section:
+    """Return redundancy numbers and gains of parameters, for text reports."""
+    tables = []
+    for found in calibrations(result)[:LISTED]:
+        every, name = found.parameters, found.camera.name
+        weighted = np.array([0 < each.given_sd < math.inf for each in every], dtype=bool)
+        columns = [
+            of_each(every, "name", kind="name", head="Parameter"),
+            of_each(every, "redundancy", head="Redundancy", decimals=3, seen=weighted),
+            of_each(every, "gain", head="Gain"),
+        ]
+        tables.append(Table(f"gains-{name}", name, columns))
+    return Section("gains", "Redundancy numbers and gains of camera parameters", tables, about("gains"))
+
+
+def outcome(each: ParameterTest) -> str:
+    words = ["significant" if each.significant else "not significant"]
+    if not each.is_lens:
+        words = ["differs from the given value" if each.significant else "as given"]
+    if not each.separable:
+        words.append("not separable")
+    if each.from_prior:
+        words.append("from its prior")
+    return ", ".join(words)
+
+
+def _terms_together(groups: Sequence[TermsTest]) -> Table:
+    columns = [
+        of_each(groups, "camera", kind="name", head="Camera"),
+        Quantity([", ".join(each.names) for each in groups], kind="name", head="Terms together"),
+        of_each(groups, "test_value", head="F", decimals=2),
+        of_each(groups, "probability", head="p", figures=2),
+        of_each(groups, "outcome", kind="name", head="Outcome"),
+    ]
+    return Table("camera-groups", "Terms of the lens tested together", columns)
+
+
+def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
+    axes = (Axis("", unit, small="um", factor=1000.0) if unit == "mm" else Axis.of("", unit),)
+    inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
+    rows = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
+    added = "measured" if curve.direction == "backward" else "ideal"
+    column: Any = partial(Quantity, axes=axes, kind="deviation", decimals=3)
+    columns = [
+        Quantity(curve.radii, (Axis.of("", unit),), "deviation", head="Radius", decimals=4),
+        column(curve.values, head="Distortion"),
+        column(curve.sd, head="sd"),
+        column(curve.sd_mapping, head="sd of the mapping"),
+        column(curve.balanced, head="Balanced"),
+        column(curve.sd_balanced, head="sd of balanced"),
+    ]
+    sizes = {"observed": curve.observed, "zero": curve.balanced_at, "distance": curve.balanced_distance}
+    note = about("curve", added=added, unit=unit, **sizes)
+    return Table(f"distortion-{camera}", f"Radial distortion of {camera}", columns, note, shown=rows)
+
+
+def _field_remarks(result: Result, found: Calibration) -> list[str]:
+    field, unit = lens_field(result, found.camera), str(found.camera.camera.unit)
+    if field is None:
+        return []
+    factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
+    at = field.largest
+    x, y = field.positions[at]
+    (dx, dy), (sx, sy) = field.vectors[at], np.sqrt(np.diag(field.covariances[at]))
+    return [
+        f"{', '.join(field.names)}: at the most {factor * dx:.3f} and {factor * dy:.3f} {written} (sd"
+        f" {factor * sx:.3f} and {factor * sy:.3f}), at x {x:.4g}, y {y:.4g} {unit}"
+    ]
+
+
+def calibration_members(result: Result) -> list[dict[str, Any]]:
+    return [_member(result, each) for each in calibrations(result)]
+
+
+def _member(result: Result, found: Calibration) -> dict[str, Any]:
+    curve, field = distortion_curve(result, found.camera), lens_field(result, found.camera)
+    return {
+        "camera": found.camera.name,
+        "parameters": records(parameters_table(found).columns),
+        "groups": [
+            members(each, "names", "test_value", "probability", "significant") for each in found.groups
+        ],
+        "correlations": [vars(each) for each in found.correlations],
+        "pose_correlations": [vars(each) for each in found.poses],
+        "terms": [
+            members(each, "names", "statistic", "probability", "worth_keeping", largest_effect_sd="effect")
+            for each in found.terms
+        ],
+        "removable": found.removable,
+        "remarks": found.remarks(),
+        "distortion": curve
+        and members(curve, "direction", observed_radius="observed")
+        | members(curve, "balanced_at", "balanced_distance", radius="radii", distortion="values")
+        | members(curve, "sd", sd_of_mapping="sd_mapping")
+        | members(curve, "balanced", balanced_sd="sd_balanced"),
+        "field": field
+        and members(field, terms="names", position="positions", vector="vectors", covariance="covariances"),
+    }

@@ -11,7 +11,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, names, value_field
-from photogram.arguments.types import Floats
+from photogram.arguments.objects import require_name
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
@@ -72,10 +73,8 @@ class Adjusted:
     def selected(self, selection: Selection) -> Selected:
         """Return the unknowns of a selection; refuse unknown types and names."""
         items = [selection] if isinstance(selection, tuple) and isinstance(selection[0], str) else selection
-        rows: list[tuple[str, int]] = []
-        labels: list[tuple[str, str, str]] = []
-        values: list[Floats] = []
-        deviations: list[Floats] = []
+        rows, labels = list[tuple[str, int]](), list[tuple[str, str, str]]()
+        values, deviations = [np.empty(0)], [np.empty(0)]
         shapes: list[tuple[int, ...]] = []
         for item in items:
             if not (isinstance(item, tuple) and len(item) == 2) or item[0] not in self.things:
@@ -83,23 +82,15 @@ class Adjusted:
                     phrase("adjusted.selection", value=value_field(item), kinds=list(self.things))
                 )
             kind, wanted = str(item[0]), item[1]
-            own = self.things[kind]
-            chosen = self._indices(kind, wanted)
+            own, chosen = self.things[kind], self._indices(kind, wanted)
             rows += [(part, index) for index in chosen for part in own.parts or (kind,)]
-            for index in chosen:
-                labels += [(kind, own.ids[index], component) for component in own.components[index]]
-                values.append(np.asarray(own.values[index], dtype=float))
-                deviations.append(np.asarray(own.sd[index], dtype=float))
+            labels += [(kind, own.ids[index], name) for index in chosen for name in own.components[index]]
+            values += [np.asarray(own.values[index], dtype=float) for index in chosen]
+            deviations += [np.asarray(own.sd[index], dtype=float) for index in chosen]
             counts = [len(own.components[index]) for index in chosen]
-            widths = set(counts)
-            if self._is_one(wanted):
-                shapes.append((counts[0],))
-            elif len(widths) <= 1:
-                shapes.append((len(chosen), *widths) if widths else (0,))
-            else:
-                shapes.append((sum(counts),))
-        together = [np.concatenate(part) if part else np.empty(0) for part in (values, deviations)]
-        return Selected(rows, labels, together[0], together[1], shapes)
+            alike = len(set(counts)) == 1 and not self._is_one(wanted)
+            shapes.append((len(chosen), counts[0]) if alike else (sum(counts),))
+        return Selected(rows, labels, np.concatenate(values), np.concatenate(deviations), shapes)
 
     @cached_property
     def _places(self) -> dict[str, dict[str, int]]:
@@ -121,6 +112,16 @@ class Adjusted:
             what = kind.replace("step", "photo")
             raise InputError(phrase("error.absent", kind=what, name=missing[0]))
         return [index[name] for name in asked]
+
+
+def used_rows(result: Result, names: Sequence[str]) -> Indices:
+    """Return the rows of points; refuse unknown points, and points that were not used."""
+    places = {name: row for row, name in enumerate(result.block.point_ids)}
+    for name in names:
+        require_name("point", name, places)
+        if not result.used_points[places[name]]:
+            raise InputError(phrase("adjusted.unused-point", point=name))
+    return np.array([places[name] for name in names], dtype=np.int64)
 
 
 def photo_components(block: Block) -> tuple[str, ...]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, value_field
+from photogram.arguments.objects import require_name
 from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, unknown_name
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.datum import DatumRow, InnerConstraints
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
@@ -170,14 +171,12 @@ def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None
     if (photo is None) == (points is None):
         raise InputError(phrase("error.exclusive", first="photo", second="points"))
     if photo is not None:
-        if photo not in block.photo_ids:
-            raise InputError(unknown_name("photo", photo, block.photo_ids))
+        require_name("photo", photo, block.photo_ids)
         return "relative", [], [block.photo_ids.index(photo)], False, [], None
     index = {name: i for i, name in enumerate(block.point_ids)}
-    wanted = list(points or [])
-    if missing := [name for name in wanted if name not in index]:
-        raise InputError(unknown_name("point", missing[0], block.point_ids))
-    return "relative", [index[name] for name in wanted], [], False, [], None
+    for name in points or []:
+        require_name("point", name, index)
+    return "relative", [index[name] for name in points or []], [], False, [], None
 
 
 def refused(

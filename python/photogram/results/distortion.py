@@ -16,7 +16,7 @@ the vector has the covariance sigma0^2 J Q J'.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +26,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
-from photogram.results.cameras import AdjustedCamera
+from photogram.results.unknowns import AdjustedCamera
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -106,16 +106,19 @@ def _largest_radius(xy: Floats, camera: Camera) -> float:
     return camera.scale * float(np.max(ideal[np.isfinite(ideal)], initial=0.0))
 
 
-def partials_of(evaluate: Callable[[Camera], Floats], camera: Camera, steps: Mapping[str, float]) -> Floats:
-    """Return (k, ...) central differences by k parameters, divided by their steps."""
-
-    def at(name: str, value: float) -> Floats:
-        return evaluate(camera.replace(parameters={**camera.parameters, name: value}))
-
-    values = {name: camera.parameters[name] for name in steps}
-    return np.array(
-        [(at(k, values[k] + step) - at(k, values[k] - step)) / (2 * step) for k, step in steps.items()]
-    )
+def partials_of(
+    evaluate: Callable[[Camera], Floats], camera: Camera, names: Sequence[str], reach: float
+) -> Floats:
+    """Return (k, ...) central differences; steps move images within `reach` by about a millionth of it."""
+    found = []
+    for name in names:
+        value, step = camera.parameters[name], 1e-6 * reach ** camera.powers[name]
+        after, before = (
+            evaluate(camera.replace(parameters={**camera.parameters, name: value + sign * step}))
+            for sign in (1, -1)
+        )
+        found.append((after - before) / (2 * step))
+    return np.array(found)
 
 
 def distortion_curve(
@@ -141,7 +144,7 @@ def distortion_curve(
     at = np.linspace(0.0, BEYOND * observed, ROWS) if radii is None else np.asarray(radii, dtype=np.float64)
     r0 = BALANCED_AT * observed
     both = np.append(at, r0)
-    curve, partials = radial_curve(camera.camera, camera.sd, terms, both)
+    curve, partials = radial_curve(camera.camera, terms, both)
     covariance = camera.covariance
     distance = next(k for k, name in enumerate(camera.names) if name in DISTANCES)
     c = float(camera.values[distance])
@@ -171,18 +174,10 @@ def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> 
     return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
-def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
-    """Return the (r,) curve of the radial terms, and its partials by these terms.
-
-    `sd` are the (k,) standard deviations of all parameters, `terms` the indices of the radial ones.
-    """
-    own, steps = radial_part(camera), dict[str, float]()
-    for column, k in enumerate(terms):
-        # Without covariances there are no standard deviations.
-        own_sd = sd[k] if sd[k] > 0 else 0.0
-        size = own_sd or abs(camera.values[k]) or radii.max() ** -(2 * (column + 1))
-        steps[camera.names[k]] = 0.01 * float(size)
-    partials = partials_of(lambda changed: added_along(changed, radii), own, steps)
+def radial_curve(camera: Camera, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
+    """Return the (r,) curve of the radial terms with some indices, and its partials by these terms."""
+    own, names = radial_part(camera), [camera.names[k] for k in terms]
+    partials = partials_of(lambda changed: added_along(changed, radii), own, names, float(radii.max()))
     return added_along(own, radii), partials.reshape(-1, len(radii)).T
 
 
@@ -271,8 +266,8 @@ def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
         return changed.project(rays)
 
     rows = [camera.names.index(name) for name in names]
-    steps = {camera.names[k]: 0.01 * float(camera.sd[k] or abs(camera.values[k])) for k in rows}
-    partials, covariance = partials_of(images, own, steps), camera.covariance[np.ix_(rows, rows)]
+    reach = float(np.abs(positions).max())
+    partials, covariance = partials_of(images, own, names, reach), camera.covariance[np.ix_(rows, rows)]
     without = own.replace(parameters={**own.parameters, **dict.fromkeys(names, 0.0)})
     return LensField(
         names=names,

@@ -12,8 +12,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.structuring import structure
+from photogram.results import network_sections as sections
+from photogram.results import tables as declared
 from photogram.results.axes import point_axes
-from photogram.results.camera_sections import calibration_members, cameras_section, gains_section
+from photogram.results.calibration import calibration_members, cameras_section, gains_section
 from photogram.results.check_points import observed_control
 from photogram.results.features import features_document, features_section
 from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
@@ -24,21 +26,7 @@ from photogram.results.network_document import (
     problems_of,
     size_section,
 )
-from photogram.results.network_sections import (
-    beside_section,
-    check_section,
-    control_section,
-    stations_section,
-)
 from photogram.results.network_tables import control
-from photogram.results.tables import (
-    camera_parameters,
-    check_points,
-    observations,
-    redundancy_by_kind,
-    unheld,
-    unknowns,
-)
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, about, significant
@@ -51,16 +39,21 @@ if TYPE_CHECKING:
 @np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite
 def block_document(result: Result) -> Document:
     pictures, (head, figures) = drawings(result), bandwidths(result)
+    shown, note = notable(result.unknowns)
+    tables = [
+        Table("unknowns", "Common unknowns", declared.unknowns(shown), note),
+        trajectories_table(result),
+    ]
     given = [
-        control_section(result, unheld(result)),
-        check_section(result),
-        beside_section(result),
-        stations_section(result),
+        sections.control_section(result, declared.unheld(result)),
+        sections.check_section(result),
+        sections.beside_section(result),
+        sections.stations_section(result),
         cameras_section(result, [pictures[name] for name in ("correlations", "distortion")]),
         films_section(result, pictures["films"]),
-        _unknowns_section(result),
+        Section("unknowns", "Common unknowns", tables, about("unknowns")),
     ]
-    title, columns = "Redundancy by kind of observation", redundancy_by_kind(result)
+    title, columns = "Redundancy by kind of observation", declared.redundancy_by_kind(result)
     redundancy, datum = Table("redundancy-by-kind", title, columns, about("redundancy-by-kind")), result.datum
     return network_document(
         result,
@@ -112,19 +105,17 @@ def _size_section(result: Result) -> Section:
     groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
     groups["total"] = sums.total
     good += [Fact(f"Weighted sum of squares, {name}", f"{square:.6f}") for name, square in groups.items()]
-    tables = {"control points": control, "unheld components": unheld, "check points": check_points}
+    tables = {
+        "control points": control,
+        "unheld components": declared.unheld,
+        "check points": declared.check_points,
+    }
     for what, table in tables.items():
         differences = named(table(result), "d").values
         values = [rms_of(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
             good.append(Fact(f"rms of {what}", ", ".join(_differences(result, values))))
     return size_section(result, size_of(result), more, good)
-
-
-def _unknowns_section(result: Result) -> Section:
-    shown, note = notable(result.unknowns)
-    tables = [Table("unknowns", "Common unknowns", unknowns(shown), note), trajectories_table(result)]
-    return Section("unknowns", "Common unknowns", tables, about("unknowns"))
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:
@@ -212,7 +203,7 @@ def block_members(result: Result) -> dict[str, Any]:
         and members(test, "variance", "limits", "level", "probability") | {"rejected": side},
         **_of_some(result),
         "observations_beside_images": _beside_images(result),
-        "check_points": records(check_points(result)),
+        "check_points": records(declared.check_points(result)),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
     }
 
@@ -224,7 +215,7 @@ def _of_some(result: Result) -> dict[str, Any]:
         found["cameras"] = [
             members(each, "name", model="camera.model", image_unit="camera.unit")
             | members(each, "photos", "images")
-            | {"parameters": records(camera_parameters([each])), "covariance": each.covariance}
+            | {"parameters": records(declared.camera_parameters([each])), "covariance": each.covariance}
             for each in result.cameras
         ]
         found["calibrations"] = calibration_members(result)
@@ -280,5 +271,5 @@ def _beside_images(result: Result) -> list[dict[str, Any]]:
             Quantity([each.units] * len(rows), member="units"),
             *([Quantity(each.weights[rows], member="weight_factor")] if result.loss else []),
         ]
-        found += records([*chosen(observations(each), rows), *own])
+        found += records([*chosen(declared.observations(each), rows), *own])
     return found

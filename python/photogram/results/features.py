@@ -1,23 +1,30 @@
-"""Features through adjusted points and distances to cylinders (docs/features.md)."""
+"""Features that fit adjusted points, with their joint covariance (docs/features.md)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import argument_error, probability, value_field
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import AdjustmentError, InputError, message_of
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import by_name, unknown_name
+from photogram.messages import Message, by_name, unknown_name
+from photogram.results.covariance import Covariances, used_rows
+from photogram.results.result import Result
 from photogram.show import quantity
 from photogram.show.page import Drawing, Part, Section, Text, about
 from photogram.show.quantity import Axis, Table, members, of_each
-from photogram.statistics.distributions import LEVEL
+from photogram.statistics.distributions import LEVEL, critical_student, log_chi_square, log_fisher
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -146,15 +153,11 @@ class Features:
 
     def table(self) -> pd.DataFrame:
         """Return the quantities as a data frame: value, sd, k and U = k sd of each."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns())
+        return Table("quantities", "", quantity_columns(self)).frame()
 
     def deviation_table(self) -> pd.DataFrame:
         """Return the deviations of the points from their features as a data frame."""
-        import pandas as pd
-
-        return pd.DataFrame(self.deviation_columns())
+        return Table("deviations", "", deviation_quantities(self)).frame()
 
 
 def quantity_columns(features: Features) -> list[quantity.Quantity]:
@@ -284,3 +287,117 @@ def _member(feature: Feature) -> dict[str, Any]:
         ],
         "form": form if feature.statistic is not None else None,
     }
+
+
+def features(
+    result: Result, definitions: Mapping[str, Definition], *, k: float = 2.0, coverage: float | None = None
+) -> Features:
+    """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points.
+
+    A feature has the minimum sum of squared distances to its points (Gaussian associated feature). All
+    standard deviations follow from the joint covariance of the points (docs/features.md).
+
+    Parameters
+    ----------
+    result
+        An adjusted block with rectangular coordinates.
+    definitions
+        By the names of features a type (`distance`, `line`, `plane`, `circle`, `sphere`, `cylinder`) with
+        names of points, or patterns of names: `{"bore": ("circle", ["hole-*"])}`.
+    k
+        The coverage factor of U = k sd.
+    coverage
+        A probability, for example 0.95, instead of k: k is from Student's distribution with the degrees of
+        freedom of the variance of unit weight, or from the normal distribution if this variance is known.
+
+    Raises
+    ------
+    InputError
+        If a type or point does not exist, or the points are too few or do not determine a feature.
+    AdjustmentError, OutOfMemoryError, KeyboardInterrupt
+        As in :meth:`Result.covariances`.
+    """
+    fitted, empty = _fitting(result, k, coverage)
+    found = []
+    for name, each in definitions.items():
+        try:
+            found.append(fitted(name, each))
+        except InputError as error:
+            raise InputError(_of_feature(name, error)) from None
+    return replace(empty, features=tuple(found))
+
+
+def with_features(result: Result, definitions: Mapping[str, Definition]) -> Result:
+    """Return a result with features; its messages explain missing features."""
+    if not definitions:
+        return result
+    found, messages = [], []
+    try:
+        fitted, empty = _fitting(result, 2.0, None)
+    except (InputError, AdjustmentError) as error:
+        message = Message(phrase("fit.none", reason=message_of(error)))
+        return replace(result, messages=[*result.messages, message])
+    for name, each in definitions.items():
+        try:
+            found.append(fitted(name, each))
+        except (InputError, AdjustmentError) as error:
+            messages.append(Message(_of_feature(name, error)))
+    told = [*result.messages, *messages, *(Message(each) for each in empty.remarks)]
+    return replace(result, messages=told, features=replace(empty, features=tuple(found)))
+
+
+def _of_feature(name: str, error: Exception) -> Phrase:
+    return phrase("error.at", what=phrase("fit.named", name=name), message=message_of(error))
+
+
+def _fitting(
+    result: Result, k: float, coverage: float | None
+) -> tuple[Callable[[str, Definition], Feature], Features]:
+    """Return the fitting function, and the common data of all features."""
+    if result.geographic:
+        raise InputError(phrase("fit.geographic"))
+    freedom = result.freedom_of_scale
+    if coverage is not None:
+        k = critical_student(1.0 - probability("coverage", coverage), freedom)
+    if not 0 < k < math.inf:
+        raise argument_error("k", "positive", value=k)
+    remarks = (str(phrase("fit.scale")),) if result.datum.has_chosen_scale else ()
+    covariances = result.covariances()
+    return (
+        lambda name, definition: _fitted(result, covariances, name, definition, k, freedom),
+        Features((), k, coverage, freedom, remarks),
+    )
+
+
+def _fitted(
+    result: Result, covariances: Covariances, name: str, definition: Definition, k: float, freedom: float
+) -> Feature:
+    if not (isinstance(definition, Sequence) and len(definition) == 2) or isinstance(definition, str):
+        raise InputError(phrase("fit.definition", value=value_field(definition)))
+    kind, wanted = definition
+    require_name("kind of feature", str(kind), KINDS)
+    block = result.block
+    points = named_points([wanted] if isinstance(wanted, str) else wanted, block.point_ids)
+    if kind == "distance" and len(points) != 2:
+        raise InputError(phrase("fit.two-points", count=len(points)))
+    rows = used_rows(result, points)
+    joint = covariances.covariance(("point", points))
+    own, values, covariance, deviations, test = _photocore.measured_feature(
+        kind, result.point_positions[rows], joint
+    )
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    quantities = tuple(
+        Quantity(called, value, deviation, k * deviation, block.linear_unit if is_length else "")
+        for (called, is_length), value, deviation in zip(own, values.tolist(), sd.tolist(), strict=True)
+    )
+    apart, apart_sd = (deviations[:, first : 2 * len(directions(kind)) : 2] for first in (0, 1))
+    found = Feature(name, kind, tuple(points), quantities, covariance, apart, apart_sd)
+    if test is None:
+        return found
+    statistic, beyond = test
+    known = math.isinf(freedom)
+    log = log_chi_square(statistic, beyond) if known else log_fisher(statistic / beyond, beyond, freedom)
+    return replace(found, statistic=statistic, freedom=beyond, probability=math.exp(float(log)))
+
+
+check_arguments(globals(), ["features"])

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
+from photogram.arguments.types import Indices
 from photogram.messages import Undetermined
+from photogram.network.block import Block
 from photogram.results.axes import point_axes
-from photogram.results.duplicates import duplicates
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
 from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
@@ -21,7 +22,7 @@ from photogram.results.tests import Tests
 from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text, TypeFactor
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -201,3 +202,41 @@ def unseen(result: AdjustedNetwork) -> list[Phrase]:
         return []
     fields = {"hidden": hidden, "all": redundancy.size, "limit": TESTABLE}
     return [Phrase("line.unseen", fields)]
+
+
+FEWEST = 4  # Equal image observations of two photos
+SHARE = 0.5  # Share of equal observations of a photo
+FEWEST_OF_POINT = 2  # Equal image observations of two points
+
+
+def duplicates(block: Block) -> list[Phrase]:
+    """Return messages on photos, and on points, that have the same image observations."""
+    # Different observations have different sums and are not compared.
+    sums = np.sort(block.image_xy[:, 0] * np.pi + block.image_xy[:, 1])
+    if not (np.diff(sums) == 0).any():
+        return []
+    messages = []
+    for name, owners, others, ids, fewest in (
+        ("photos", block.image_photos, block.image_points, block.photo_ids, FEWEST),
+        ("points", block.image_points, block.image_photos, block.point_ids, FEWEST_OF_POINT),
+    ):
+        pairs = _equal_pairs(owners, others, block, fewest)
+        if pairs:
+            names = [phrase("part.pair", first=str(ids[i]), second=str(ids[j])) for i, j in pairs]
+            messages.append(phrase(f"duplicates.{name}", n=len(names), names=names))
+    return messages
+
+
+def _equal_pairs(owners: Indices, others: Indices, block: Block, fewest: int) -> list[tuple[int, int]]:
+    """Return pairs of owners with mostly equal image observations."""
+    xy = block.image_xy
+    order = np.lexsort((xy[:, 1], xy[:, 0], others))
+    first, second = order[:-1], order[1:]
+    equal = (others[first] == others[second]) & (xy[first] == xy[second]).all(axis=1)
+    if not equal.any():
+        return []
+    pairs = np.sort(np.column_stack([owners[first[equal]], owners[second[equal]]]), axis=1)
+    found, counts = np.unique(pairs, axis=0, return_counts=True)
+    sizes = np.bincount(owners, minlength=int(owners.max()) + 1)
+    most = counts >= np.maximum(fewest, SHARE * sizes[found].min(axis=1))
+    return [(int(i), int(j)) for i, j in found[most] if i != j]

@@ -161,7 +161,6 @@ class Hypotheses:
         return next(iter([*self.harmful, *rows]), None)
 
     def unchecked(self) -> list[Phrase]:
-        """Return messages on these errors, the worst first."""
         return [self.sentence(row) for row in self.harmful]
 
     def sentence(self, row: int) -> Phrase:
@@ -361,11 +360,9 @@ def hypotheses(
     numbers = Counter(kinds)
     count, statistic = np.array([numbers[kind] for kind in kinds]), of("statistic")
     k = np.maximum(np.count_nonzero(~np.isnan(estimate), axis=1), 1)
-    if estimated is None:
-        change = statistic
-    else:
-        omega, freedom = estimated
-        change = -freedom * np.log(np.maximum(1 - statistic / omega, 1e-300))
+    change = statistic
+    if estimated is not None:
+        change = -estimated[1] * np.log(np.maximum(1 - statistic / estimated[0], 1e-300))
     odds = _log_odds(change, k, np.maximum(of("observations"), k + 1), count)
     odds -= np.nansum(np.square(estimate / plausible), axis=1) / 2
     effects = {}
@@ -381,15 +378,11 @@ def hypotheses(
         code=np.array([code for code, _ in kinds], dtype=np.str_),
         index=index,
         group=_groups(suspects, kind, index),
-        component=of("component"),
-        rank=of("rank"),
+        **{name: of(name) for name in ("component", "rank", "probability", "redundancy", "bias_to_noise")},
         statistic=statistic,
-        probability=of("probability"),
         log_odds=odds,
         estimate=estimate,
-        redundancy=of("redundancy"),
         mdb=mdb,
-        bias_to_noise=of("bias_to_noise"),
         sets=rows[:sets],
         effects=effects,
         drawn=drawn,
@@ -399,21 +392,16 @@ def hypotheses(
         points=len(adjusted),
         point_ids=given.point_ids,
         axes=[axis.name for axis in axes],
-        units=_units(given.image_unit, timed=timed),
+        units={
+            **dict.fromkeys(("camera-f", "camera-point"), f" {given.image_unit}"),
+            **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
+            **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
+            **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
+        },
         length=f" {unit_written(axes[2].small)}",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         single_odds=float(np.nanmax(odds[sets:], initial=of_images)),
     )
-
-
-def _units(image: str, *, timed: bool) -> dict[str, str]:
-    """Return the units of errors that are no lengths; `image` is the unit of image coordinates."""
-    return {
-        **dict.fromkeys(("camera-f", "camera-point"), f" {image}"),
-        **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
-        **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
-        **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
-    }
 
 
 def _padded(rows: Sequence[Mapping[str, Any]], name: str, width: int) -> Floats:

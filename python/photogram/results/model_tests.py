@@ -23,17 +23,18 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, value_field
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import by_name, unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
-from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
+from photogram.results.fixed_tests import quadratic, score
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
-from photogram.results.scores import quadratic, score
+from photogram.results.unknowns import AdjustedCamera
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
     from photogram import Result
 
+LEVEL = 0.05  # Significance level of terms
 KEPT = 0.01  # Significance level of useful terms
 EFFECT = 0.2  # Smallest effect of useful terms on an image, in standard deviations
 DECISIVE, POSITIVE = 10.0, 2.0  # Differences of BIC with decisive and positive evidence
@@ -62,9 +64,24 @@ class TermsTest:
     # known
     dimension: int
     freedom: float
+    scale: float  # Variance of unit weight of the test: 1 if it is known
     probability: float  # Probability of a larger value under the null hypothesis
     # Their largest effect on an image, in its standard deviations; NaN for fixed terms
     effect: float
+
+    @property
+    def test_value(self) -> float:
+        """T over its dimension and the variance of unit weight."""
+        return self.statistic / self.scale / self.dimension
+
+    @property
+    def significant(self) -> bool:
+        """Whether the terms differ from zero at the 5 percent level."""
+        return self.probability < LEVEL
+
+    @property
+    def outcome(self) -> str:
+        return "significant" if self.significant else "not significant"
 
     @property
     def worth_keeping(self) -> bool:
@@ -163,14 +180,18 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
     rows = _rows(found, names)
     if not set(rows) <= set(found.estimated):
         raise InputError(phrase("models.fixed", names=list(names), camera=found.name))
-    q = found.cofactors[np.ix_(rows, rows)]
-    if not np.isfinite(q).all():
+    if not np.isfinite(found.cofactors[np.ix_(rows, rows)]).all():
         raise InputError(phrase("models.no-covariances"))
-    statistic = quadratic(q, found.values[rows])
+    return replace(joint_test(result, found, names), effect=_largest_effect(result, found, rows))
+
+
+def joint_test(result: Result, camera: AdjustedCamera, names: Sequence[str]) -> TermsTest:
+    """Return the joint test of estimated terms (Wald), without their effect."""
+    rows = [camera.names.index(name) for name in names]
+    statistic = quadratic(camera.cofactors[np.ix_(rows, rows)], camera.values[rows])
     freedom = result.freedom_of_scale
     scale = result.covariance_scale if math.isfinite(freedom) else 1.0
-    effect = _largest_effect(result, found, rows)
-    return _tested(found.name, names, statistic, freedom, scale, effect)
+    return _tested(camera.name, names, statistic, freedom, scale)
 
 
 def score_test(
@@ -222,7 +243,7 @@ def score_test(
     freedom = result.freedom_of_scale - k
     omega = result.covariance_scale * (freedom + k) - statistic
     scale = max(omega, 1e-12 * statistic) / freedom if 0 < freedom < math.inf else 1.0
-    return _tested(title, names, statistic, freedom, scale, math.nan)
+    return _tested(title, names, statistic, freedom, scale)
 
 
 def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comparison:
@@ -311,14 +332,11 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
     plain = camera.camera.replace(sd=0.0, covariance=None)
     measured, residuals = focal_images(result.block)[own], result.residuals[own]
     rays = None if plain.direction == "backward" else plain.rays(measured - residuals)
-    # Steps that move images by about a millionth of the frame.
-    reach = float(np.abs(measured).max(initial=1.0))
-    steps = {name: 1e-6 * reach ** plain.powers[name] for name in names}
 
     def compared(changed: Camera) -> Floats:
         return -_corrected(changed, measured) if rays is None else changed.project(rays)
 
-    columns[:, own] = partials_of(compared, plain, steps)
+    columns[:, own] = partials_of(compared, plain, names, float(np.abs(measured).max(initial=1.0)))
     if rays is None and "c" in names:
         columns[names.index("c"), own] += (_corrected(plain, measured) - residuals) / plain.parameters["c"]
     return np.nan_to_num(columns)
@@ -350,17 +368,14 @@ def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:
     if isinstance(names, str) or not names:
         raise argument_error("names", "kind", kind="a list of names", value=value_field(names))
     for name in names:
-        if name not in camera.names:
-            raise InputError(unknown_name("parameter", str(name), camera.names))
+        require_name("parameter", str(name), camera.names)
     return [camera.names.index(name) for name in names]
 
 
-def _tested(
-    camera: str, names: Sequence[str], statistic: float, freedom: float, scale: float, effect: float
-) -> TermsTest:
+def _tested(camera: str, names: Sequence[str], statistic: float, freedom: float, scale: float) -> TermsTest:
     k = len(names)
     probability = tail_probability(statistic / scale, k, freedom)
-    return TermsTest(camera, tuple(names), statistic, k, freedom, probability, effect)
+    return TermsTest(camera, tuple(names), statistic, k, freedom, scale, probability, math.nan)
 
 
 def tail_probability(value: float, k: int, freedom: float) -> float:

@@ -268,7 +268,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
         trial, lost = self._trial(), None
         if self.loss is not None:
-            from photogram.results.robust import downweighted
+            from photogram.results.reliability import downweighted
 
             weights = self.image_weights, self.used_images
             lost = downweighted(trial, self._terms(), *weights)

@@ -12,22 +12,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Indices
 from photogram.plots.accessor import sketch_of
+from photogram.results import network_sections as sections
+from photogram.results import network_tables as declared
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_sections import (
-    images_section,
-    photos_section,
-    points_section,
-    weakest_photos,
-    weakest_points,
-)
-from photogram.results.network_tables import (
-    control,
-    images,
-    iteration_table,
-    photos,
-    points,
-    stations,
-)
 from photogram.results.tests import Tests
 from photogram.show import quantity
 from photogram.show.cells import unit_written
@@ -66,14 +53,14 @@ def network_document(
     """
     pictures, tests = drawings(result), Tests(result)
     worst = tests.largest(WORST)
-    weakest = weakest_points(result), weakest_photos(result)
+    weakest = sections.weakest_points(result), sections.weakest_photos(result)
     images_of_worst = worst[worst[:, 0] == 0, 1]
     worst_photos = result.given.image_photos[images_of_worst].tolist()
     worst_points = result.image_points[images_of_worst].tolist()
     for rows, table in zip((worst_points, worst_photos), weakest, strict=True):
         link = table.columns[0].link
         rows += [] if link is None else link.rows.tolist()
-    history = iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
+    history = declared.iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
     course_table = quantity.Table("iterations", "Iterations", history, about("iterations"))
     course = [Fact("Status", result.status)]
     if result.loss is not None:
@@ -97,15 +84,15 @@ def network_document(
             Section("tests", "Tests", [pictures["tests"], verdict_table(result.verdict)], about("tests")),
             Section("worst", "Worst observations", [_worst_table(tests, worst)], about("worst")),
             *given,
-            photos_section(result, worst_photos, f"{datum} {poses}".strip()),
-            points_section(result, worst_points, datum),
+            sections.photos_section(result, worst_photos, f"{datum} {poses}".strip()),
+            sections.points_section(result, worst_points, datum),
             Section("weakest", "Weakest points and photos", weakest),
             Section("iterations", "Iterations", [course_table, Facts("Course", course)]),
         ],
         details=[
             Section("work", "Work", [Facts("Work", [*_work(result), *work])]),
             *details,
-            images_section(result),
+            sections.images_section(result),
         ],
         phases=result.seconds,
     )
@@ -142,13 +129,16 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
-        "iterations": records(iteration_table(result.iterations)),
-        "photos": records([*photos(result), *photo_members, of_photos]),
-        "points": records([*points(result), of_points]),
-        "observations": records([*images(result), *([weights] if result.loss else [])]),
-        "control": records(control(result)),
-        "stations": records(stations(result)),
-        "weakest": {"points": weakest_points(result).record(), "photos": weakest_photos(result).record()},
+        "iterations": records(declared.iteration_table(result.iterations)),
+        "photos": records([*declared.photos(result), *photo_members, of_photos]),
+        "points": records([*declared.points(result), of_points]),
+        "observations": records([*declared.images(result), *([weights] if result.loss else [])]),
+        "control": records(declared.control(result)),
+        "stations": records(declared.stations(result)),
+        "weakest": {
+            "points": sections.weakest_points(result).record(),
+            "photos": sections.weakest_photos(result).record(),
+        },
     }
 
 

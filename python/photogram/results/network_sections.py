@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.results import network_tables
 from photogram.results.axes import Determined, point_axes
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import (
-    control,
-    images,
-    names,
-    part,
-    photos,
-    plan_deviations,
-    points,
-    stations,
-)
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
 from photogram.show.page import Layers, Part, Section, Text, about, layered_tables
@@ -54,7 +45,7 @@ def weakest_points(result: AdjustedNetwork) -> Table:
     chosen = [*near[np.argsort(distance[near])].tolist(), *worst.tolist()]
     rows = np.array(list(dict.fromkeys(chosen))[:WORST], dtype=np.int64)
     columns = [
-        names(result._terms(), "point", rows, "point"),
+        network_tables.names(result._terms(), "point", rows, "point"),
         Quantity(ratio[rows], member="ratio", head="Largest over smallest sd", figures=4),
         Quantity(distance[rows], member="distance", head="Distance", figures=4),
         Quantity(result.point_rays[rows], member="rays", head="Rays", decimals=0),
@@ -79,7 +70,7 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
     order = np.argsort(-condition, kind="stable")[:WORST]
     rows = np.flatnonzero(known)[order]
     columns = [
-        names(result._terms(), "photo", rows, "photo"),
+        network_tables.names(result._terms(), "photo", rows, "photo"),
         Quantity(condition[order], member="condition", head="Condition", figures=4),
         Quantity(images[rows], member="images", head="Images", decimals=0),
     ]
@@ -143,7 +134,7 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
 
     `free` are the columns of free components of control.
     """
-    columns, own = control(result), result.control
+    columns, own = network_tables.control(result), result.control
     held = (own.sd == 0).all(axis=1)
     there, sd = np.isfinite(own.sd) & ~held[:, np.newaxis], result.point_sd[own.rows]
     parts: list[Part] = [component_table("control", "Control points", columns, there, own.standardized, sd)]
@@ -213,7 +204,10 @@ def stations_section(result: AdjustedNetwork) -> Section:
     layers, own = result._terms().layers, result.stations
     there, sd = np.isfinite(own.sd), result.photo_sd[own.rows]
     for caption, of in layers.items():
-        columns = [part(column, of) if column.axes else column for column in stations(result)]
+        columns = [
+            network_tables.part(column, of) if column.axes else column
+            for column in network_tables.stations(result)
+        ]
         key, title = f"stations-{caption.lower()}", f"{caption} of photos"
         tables.append(component_table(key, title, columns, there[:, of], own.standardized[:, of], sd[:, of]))
     *others, last = [caption.lower() for caption in layers]
@@ -234,7 +228,7 @@ def beside_section(result: Result) -> Section:
 
 
 def images_section(result: AdjustedNetwork) -> Section:
-    columns = images(result)
+    columns = network_tables.images(result)
     *_, residuals, redundancy, tests = columns
     sizes = np.nan_to_num(np.abs(tests.values)).max(axis=1, initial=0.0)
     rows = np.arange(len(sizes))
@@ -272,11 +266,11 @@ def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
     fit = fit_of_images(result, result.given.image_photos, len(terms.photos))
     orders = [np.argsort(-np.nan_to_num(column, nan=-1.0), kind="stable") for column in fit.T[[3, 4]]]
     rows, note = _chosen_rows("photos", np.arange(len(terms.photos)), others, orders)
-    own, *_, values, sd = photos(result)
+    own, *_, values, sd = network_tables.photos(result)
     tables = []
     for caption, of in terms.layers.items():
-        columns = [own, part(values, of), part(sd, of)]
-        columns += plan_deviations(terms, result.photo_sd) if of.start == 0 else []
+        columns = [own, network_tables.part(values, of), network_tables.part(sd, of)]
+        columns += network_tables.plan_deviations(terms, result.photo_sd) if of.start == 0 else []
         by = result.photo_sd[:, of] if terms.split else None
         tables.append(Table(f"photos-{caption.lower()}", caption, columns, note, "", by, rows))
         own = replace(own, link=None)  # each name has one link target
@@ -327,6 +321,6 @@ def points_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
     order = np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
     rows, note = _chosen_rows("points", used, others, [order])
     by = result.point_sd[used] if terms.split else None
-    columns = [*points(result), *plan_deviations(terms, result.point_sd[used])]
+    columns = [*network_tables.points(result), *network_tables.plan_deviations(terms, result.point_sd[used])]
     table = Table("points", "Points", columns, note, "", by, np.searchsorted(used, rows))
     return Section("points", "Points", [table], intro)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +11,7 @@ from photogram.arguments.arrays import freeze_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
+from photogram.network.observations import Observation
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
@@ -58,60 +59,37 @@ class ObservedKind:
 def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
     """Return the adjusted observations of a block by the names of their types."""
     found = iter(solution.adjusted_observations)
-    kinds: dict[str, ObservedKind] = {}
+    parts: dict[str, list[tuple[Observation, Sequence[int], tuple[Floats, ...]]]] = {}
     for rows, (*_, covariances) in block.observation_groups:
         first = block.observations[rows[0]]
-        kind = first.label
-        components = first.components(geographic=block.geographic)
-        observed = np.ones((len(rows), len(components)), dtype=bool)
+        observed = np.ones((len(rows), len(first.components(geographic=block.geographic))), dtype=bool)
         if first.MISSING:
             observed = ~np.isnan([block.observations[row].observed for row in rows])
         tables = np.full((3, *observed.shape), np.nan)
         single = np.full((2, len(rows)), np.nan)
         adjusted = [next(found) for _ in rows]
         taken = np.array([each is not None for each in adjusted])
-        some = [each for each in adjusted if each is not None]
-        if some:
-            parts = zip(*some, strict=True)
-            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(parts)) for _ in range(3)]
-            single[:, taken] = list(parts)
-        variances = np.diagonal(covariances, axis1=1, axis2=2)
-        own = ObservedKind(
-            kind=kind,
-            rows=np.array(rows, dtype=np.int64),
-            names=[" - ".join(block.observations[row].of) for row in rows],
-            components=components,
-            units=first.units(block.linear_unit),
-            sd=np.sqrt(np.where(observed, variances, np.nan)),
-            residuals=tables[0].copy(),
-            redundancy=tables[1].copy(),
-            standardized=tables[2].copy(),
-            squares=single[0].copy(),
-            weights=single[1].copy(),
+        if some := [each for each in adjusted if each is not None]:
+            columns = zip(*some, strict=True)
+            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(columns)) for _ in range(3)]
+            single[:, taken] = list(columns)
+        sd = np.sqrt(np.where(observed, np.diagonal(covariances, axis1=1, axis2=2), np.nan))
+        parts.setdefault(first.label, []).append((first, rows, (sd, *tables, *single)))
+    kinds = {}
+    for kind, groups in parts.items():  # Groups of one type have different numbers of unknowns
+        first = groups[0][0]
+        every = np.concatenate([own for _, own, _ in groups])
+        order = np.argsort(every, kind="stable")
+        arrays = zip(*(own for *_, own in groups), strict=True)
+        kinds[kind] = ObservedKind(
+            kind,
+            every[order],
+            [" - ".join(block.observations[row].of) for row in every[order].tolist()],
+            first.components(geographic=block.geographic),
+            first.units(block.linear_unit),
+            *(np.concatenate(each)[order] for each in arrays),
         )
-        kinds[kind] = _together(kinds[kind], own) if kind in kinds else own
     return kinds
-
-
-def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
-    """Return observations of one type with different numbers of unknowns, in order."""
-    rows = np.concatenate([first.rows, second.rows])
-    order = np.argsort(rows)
-    names = [*first.names, *second.names]
-
-    def joined(name: str) -> Floats:
-        found: Floats = np.concatenate([getattr(first, name), getattr(second, name)])[order]
-        return found
-
-    numbers = ("sd", "residuals", "redundancy", "standardized", "squares", "weights")
-    return ObservedKind(
-        kind=first.kind,
-        rows=rows[order],
-        names=[names[row] for row in order.tolist()],
-        components=first.components,
-        units=first.units,
-        **{name: joined(name) for name in numbers},
-    )
 
 
 def named_observation(kind: str, of: str) -> Phrase:

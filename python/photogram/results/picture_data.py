@@ -15,27 +15,15 @@ from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.motion import scanners
 from photogram.network.rays import LocalAxes, local_axes
+from photogram.plots import picture_data as plots
 from photogram.plots.distortion import side_by_side
-from photogram.plots.picture_data import (
-    Correlated,
-    Curve,
-    Curves,
-    Deviations,
-    Images,
-    Moved,
-    Pictured,
-    Plan,
-    VectorField,
-    enlarged,
-)
-from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
-from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
 from photogram.results.film_report import film_patterns, mean_mark_residuals
-from photogram.results.footprints import footprints
+from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.tests import Tests
+from photogram.results.unknowns import AdjustedCamera
 from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length
@@ -46,7 +34,7 @@ if TYPE_CHECKING:
     from photogram import Result
 
 
-class PicturedNetwork(Pictured):
+class PicturedNetwork(plots.Pictured):
     """The plot data of all adjusted networks."""
 
     result: AdjustedNetwork
@@ -57,10 +45,10 @@ class PicturedNetwork(Pictured):
         """(P,) cameras of photos, their names, and whether y is downwards."""
 
     @cached_property
-    def images(self) -> Images:
+    def images(self) -> plots.Images:
         result, given, used = self.result, self.result.given, self.result.used_images
         cameras, names, down = self.cameras
-        return Images(
+        return plots.Images(
             unit=given.image_unit,
             photos=given.image_photos[used],
             points=given.image_points[used],
@@ -92,7 +80,7 @@ class PicturedNetwork(Pictured):
         """Components that are outliers of the verdict."""
         return self._tests.outliers
 
-    def moved(self, error: int | None) -> Moved | None:
+    def moved(self, error: int | None) -> plots.Moved | None:
         summary, plan = self.result.reliability_summary, self.plan
         found = None if summary is None else summary.hypotheses
         row = error if error is not None or found is None else found.worst
@@ -105,7 +93,7 @@ class PicturedNetwork(Pictured):
         own, photos = found.suspects.touched(group) if group >= 0 else ([], [])
         suspects = np.concatenate([plan.points[own], plan.photos[photos]])
         sentence = str(found.sentence(row))
-        return Moved(sentence, points, changes, ratios.max(axis=1), found.limit, suspects, found.points)
+        return plots.Moved(sentence, points, changes, ratios.max(axis=1), found.limit, suspects, found.points)
 
     def lengths(self, points: Indices) -> Floats:
         """Return (k, 3) lengths of the units of coordinates of points."""
@@ -129,9 +117,9 @@ class PicturedBlock(PicturedNetwork):
         return self.result.block.title
 
     @cached_property
-    def plan(self) -> Plan:
+    def plan(self) -> plots.Plan:
         result, block = self.result, self.result.block
-        return Plan(
+        return plots.Plan(
             axes=("E", "N", "h") if block.geographic else ("X", "Y", "Z"),
             unit=block.linear_unit,
             photo_ids=block.photo_ids,
@@ -182,25 +170,25 @@ class PicturedBlock(PicturedNetwork):
         return scanners(self.result.block)
 
     @property
-    def correlations(self) -> list[Correlated]:
+    def correlations(self) -> list[plots.Correlated]:
         found = []
         for each in self.result.cameras:
             rows = each.estimated
             table = each.correlations[np.ix_(rows, rows)]
             if len(rows) > 1 and np.isfinite(table).all():
-                found.append(Correlated(each.name, [each.names[k] for k in rows], table))
+                found.append(plots.Correlated(each.name, [each.names[k] for k in rows], table))
         return found
 
     @property
-    def distortion(self) -> list[Curves]:
+    def distortion(self) -> list[plots.Curves]:
         curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
         return [curves_of(each, curve) for each, curve in curves if curve is not None]
 
     @property
-    def deviations(self) -> list[Deviations]:
+    def deviations(self) -> list[plots.Deviations]:
         found = self.result.features or Features(())
         return [
-            Deviations(
+            plots.Deviations(
                 f"{each.name}: {each.kind} through {len(each.points)} points",
                 self.result.block.linear_unit,
                 each.points,
@@ -213,7 +201,7 @@ class PicturedBlock(PicturedNetwork):
         ]
 
     @property
-    def films(self) -> list[VectorField]:
+    def films(self) -> list[plots.VectorField]:
         if not self.result.films:
             return []
         return [*mean_mark_residuals(self.result), *film_patterns(self.result)]
@@ -226,20 +214,20 @@ def _bands(**sds: Floats) -> dict[str, Floats]:
     }
 
 
-def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
+def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> plots.Curves:
     """Return the plotted distortion of a camera: the curve, and its balanced form."""
     unit = str(camera.camera.unit)
     balanced = (
         f"balanced at {curve.balanced_at:.4g} {unit}: principal distance {curve.balanced_distance:.6g} {unit}"
     )
-    return Curves(
+    return plots.Curves(
         camera=f"{camera.name} ({camera.camera.model}, {curve.direction})",
         unit=unit,
         radii=curve.radii,
         observed=curve.observed,
         curves=[
-            Curve("", curve.values, _bands(mapping=curve.sd_mapping, curve=curve.sd)),
-            Curve(balanced, curve.balanced, _bands(balanced_curve=curve.sd_balanced)),
+            plots.Curve("", curve.values, _bands(mapping=curve.sd_mapping, curve=curve.sd)),
+            plots.Curve(balanced, curve.balanced, _bands(balanced_curve=curve.sd_balanced)),
         ],
     )
 

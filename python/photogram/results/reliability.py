@@ -9,6 +9,10 @@ With R the cofactors of the residuals of unit weight, r = R_ii and lambda0 the n
 For a group (x and y of an image, a control point) the limit of detection of an error ~d is an ellipse, ~d'
 R_g ~d = lambda0 of its dimension. Its largest semi-axis is sqrt(lambda0 / mu); mu is the smallest redundancy
 of a redundant direction.
+
+A robust loss in effect removes observations with a weight factor below :data:`REMOVED`. The tests are then
+those of a least-squares adjustment of the others, which starts at the robust solution: the residuals of the
+latter have no exact distribution.
 """
 
 from __future__ import annotations
@@ -24,18 +28,21 @@ from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, Selection
-from photogram.results.network_trial import NetworkTrial
+from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial
 from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.quantity import Table, column, members, records
 from photogram.statistics.distributions import lambda0
+from photogram.statistics.findings import Removed
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
-from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
+from photogram.statistics.snooping.suspects import Out, Standing, Suspects, Tests
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.results.robust import Downweighted
+    from photogram.arguments.types import Bools, Floats
+    from photogram.results.axes import Terms
 
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
 SEARCHED = 100  # Number of examined observations: those of the largest norm
@@ -225,8 +232,8 @@ class Reliability:
         The upper bound of the effect on any unknown is `external`. At most `count` rows are examined in
         descending order of this bound, until no other row can have a larger effect.
         """
-        testable = self.redundancy > TESTABLE
-        norm = np.where(testable & np.isfinite(self.external), self.external, -math.inf)
+        tested = (self.redundancy > TESTABLE) & np.isfinite(self.external)
+        norm = np.where(tested, self.external, -math.inf)
         group_of, best = self.row_groups(), 0.0
         found: list[Moved] = []
         for row in np.argsort(-norm, kind="stable")[:count].tolist():
@@ -346,3 +353,52 @@ class Reliability:
 def _shown(redundancy: Floats) -> Floats:
     """Return redundancy numbers; zero if only rounding error."""
     return np.where(redundancy < 1e-9, 0.0, np.minimum(redundancy, 1.0))
+
+
+REMOVED = 0.1  # Weight factor below which an observation counts as removed
+SUPPORT = 2  # Smallest number of images of a point that are not removed
+NAMED = 100  # Largest number of removed observations in documents
+
+
+@dataclass(frozen=True, eq=False)
+class Downweighted:
+    """Observations and points that a robust loss excludes from the tests."""
+
+    out: Out
+    removed: Removed
+    unsupported: list[Phrase]  # names of points with too few images
+
+
+def downweighted(trial: NetworkTrial, terms: Terms, image_weights: Floats, used: Bools) -> Downweighted:
+    """Return the observations that the loss of an adjustment removes in effect.
+
+    `image_weights` and `used` are the (m,) weight factors of the images, and whether they were used.
+    """
+    suspects = trial.suspects
+    weights = np.ones(len(suspects))  # (G,) of groups; NaN if not used
+    of_images, others = suspects.kinds == IMAGE, suspects.kinds == OBSERVATION
+    weights[of_images] = np.where(used, image_weights, np.nan)[suspects.subjects[of_images]]
+    factors = np.ones(len(terms.observation_rows))
+    for kind in terms.kinds:
+        factors[kind.rows] = kind.weights
+    weights[others] = factors[terms.observation_rows[suspects.subjects[others]]]
+    removed = weights < REMOVED
+    points, images = suspects.points, (suspects.kinds == IMAGE) & np.isfinite(weights)
+    count = len(terms.points)
+    rays, left = (np.bincount(points[own], minlength=count) for own in (images, images & ~removed))
+    alone = np.flatnonzero((left < SUPPORT) & (rays > left))
+    rows = np.repeat(removed | np.isin(points, alone), np.diff(suspects.row_starts))
+    names = [suspects.name(int(group)) for group in np.flatnonzero(removed)[:NAMED]]
+    control = {int(point) for point in points[suspects.kinds == CONTROL]}
+    return Downweighted(
+        Out(rows, set(alone.tolist())),
+        Removed(
+            [{"name": str(name), "subject": name} for name in names],
+            suspects.counts(rows, np.isfinite(weights)),
+            int(removed.sum()),
+        ),
+        [
+            Phrase("named.control" if point in control else "named.object_point", {"point": str(name)})
+            for point, name in zip(alone.tolist(), terms.points[alone].tolist(), strict=True)
+        ],
+    )

@@ -24,7 +24,7 @@ from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.results.robust import Downweighted
+    from photogram.results.reliability import Downweighted
 
 LISTED = 5  # Listed observations of each type
 PAIRS = 10  # Listed inseparable pairs
@@ -76,11 +76,8 @@ class ReliabilitySummary:
 
     def parts(self, unit: str) -> list[Part]:
         """Return the parts of a section; `unit` is the unit of the object space."""
-        sentences = []
-        if self.two_rays:
-            sentences.append(
-                f"{self.two_rays} points have two images: a wrong one of these cannot be identified"
-            )
+        two = f"{self.two_rays} points have two images: a wrong one of these cannot be identified"
+        sentences = [two] if self.two_rays else []
         if self.pairs:
             more = self.pairs_found - len(self.pairs)
             sentences.append("on other points cannot be told apart:")
@@ -117,9 +114,7 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
     # Rounding does not define an order: equal values remain in the order of their numbers.
     pairs.sort(key=lambda pair: (-round(pair[2], 9), pair[:2]))
     return ReliabilitySummary(
-        level=found.level,
-        power=found.power,
-        known=found.known,
+        **{name: getattr(found, name) for name in ("level", "power", "known", "standing", "downweighted")},
         kinds=_kinds(found),
         weakest=_weakest(found, heights=heights),
         two_rays=two,
@@ -129,8 +124,6 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
         suspects=suspects,
         tests=tests,
         hypotheses=hypotheses,
-        standing=found.standing,
-        downweighted=found.downweighted,
     )
 
 

@@ -18,7 +18,6 @@ from photogram.network.block import Block, refuse_trajectories
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import timed_photos
-from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.check_points import CheckPoints, check_points, point_kinds
 from photogram.results.covariance import Adjusted, Failure, adjusted
 from photogram.results.datum import (
@@ -39,17 +38,17 @@ from photogram.results.trajectories import (
     project,
     restarted_motion,
 )
-from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
+from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown, adjusted_cameras, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram import Features
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
     from photogram.results.axes import Determined, Terms
-    from photogram.results.features import Features
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
@@ -57,6 +56,9 @@ if TYPE_CHECKING:
 NOT_PHOTOGRAPHED = "not photographed"
 REJECTED = "all its image observations are rejected"
 """Reasons for excluding a point without image observations: without any, or none was used."""
+
+
+_OF_DATUM = ("photo_positions", "photo_attitudes", "photo_cofactors", "point_positions", "point_cofactors")
 
 
 def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str, str]:
@@ -314,11 +316,7 @@ class Result(OnFilm, AdjustedNetwork):
         kept = [message for message in self.messages if message not in before]
         return replace(
             self,
-            photo_positions=solution.photo_positions,
-            photo_attitudes=solution.photo_attitudes,
-            photo_cofactors=solution.photo_cofactors,
-            point_positions=solution.point_positions,
-            point_cofactors=solution.point_cofactors,
+            **{name: getattr(solution, name) for name in _OF_DATUM},
             cameras=adjusted_cameras(block, solution, self.covariance_scale),
             unknowns=adjusted_unknowns(block, solution, self.covariance_scale),
             datum=datum,

@@ -60,8 +60,9 @@ class Part:
         if array is None:
             return []
         if self.form == "matrix":
-            triangles = packed(array) * result.covariance_scale
-            return [Column(self.prefix, triangles, _products(self.units), self.description, self.names)]
+            triangles, units = packed(array) * result.covariance_scale, " ".join(self.units)
+            unit = f"products of {units}" if len({*self.units}) > 1 else f"{self.units[0]}2"
+            return [Column(self.prefix, triangles, unit, self.description, self.names)]
         if self.form == "list":
             if not len(array):
                 return []
@@ -98,12 +99,6 @@ def _divided(products: np.ndarray, scale: float) -> np.ndarray:
         beside = np.nextafter(near, direction)
         found = np.where((found * scale != products) & (beside * scale == products), beside, found)
     return found
-
-
-def _products(units: Sequence[str]) -> str:
-    """Return the unit of covariances: a common one, or units of components."""
-    different = list(dict.fromkeys(units))
-    return f"{different[0]}2" if len(different) == 1 else "products of " + " ".join(units)
 
 
 def point_parts(given: str, names: tuple[str, ...], units: tuple[str, ...], *, last: bool) -> list[Part]:

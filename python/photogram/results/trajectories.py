@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import freeze_fields, shaped, standard_deviations
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import unknown_name
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
@@ -121,7 +121,7 @@ class AdjustedTrajectory:
         covariances = np.empty((len(times), 6, 6))
         shapes = axes.reshape(-1, 3, 3), jacobians.reshape(-1, 3, 3)
         for row in range(len(times)):
-            names, partials = [], []
+            names, partials = list[str](), [np.zeros((6, 0))]
             for part, (active, own) in enumerate(
                 zip((of_position[row], of_rotation[row]), shapes, strict=True)
             ):
@@ -131,7 +131,7 @@ class AdjustedTrajectory:
                     by[3 * part : 3 * part + 3] = value * own[row]
                     names.append(self.given.coefficients[part][first + k].name)
                     partials.append(by)
-            t = np.hstack(partials) if partials else np.zeros((6, 0))
+            t = np.hstack(partials)
             covariances[row] = t @ self.joint(names) @ t.T if names else 0.0
         return TrajectoryPoses(times, positions, attitudes.reshape(-1, 3, 3), covariances)
 
@@ -175,8 +175,7 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
     """Return images of (n, 3) points on a photo; see :meth:`photogram.Result.project`."""
     block = result.block
     timed = {each.photo: row for row, each in enumerate(block.timed)}
-    if photo not in timed:
-        raise InputError(unknown_name("photo on a trajectory", photo, timed))
+    require_name("photo on a trajectory", photo, timed)
     row = timed[photo]
     adjusted = {id(each.given): (each.position, each.attitude) for each in result.unknowns}
     index = block.photo_ids.index(photo)
@@ -206,23 +205,12 @@ def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
         return once().covariance([("unknown", name) for name in names])
 
     def adjusted(own: Trajectory) -> AdjustedTrajectory:
-        def arrays(of: Callable[[AdjustedUnknown], Floats]) -> list[Floats]:
-            return [
-                np.array([of(found[id(each)]) for each in part]).reshape(-1, 3) for part in own.coefficients
-            ]
-
-        values, sd = arrays(lambda each: each.position), arrays(lambda each: each.sd)
-        redundancy = arrays(lambda each: each.redundancy)
-        return AdjustedTrajectory(
-            given=own,
-            position=values[0],
-            rotation=values[1],
-            position_sd=sd[0],
-            rotation_sd=sd[1],
-            position_redundancy=redundancy[0],
-            rotation_redundancy=redundancy[1],
-            joint=joint,
-        )
+        values = {
+            f"{name}{suffix}": np.array([getattr(found[id(each)], what) for each in part]).reshape(-1, 3)
+            for suffix, what in (("", "position"), ("_sd", "sd"), ("_redundancy", "redundancy"))
+            for name, part in zip(("position", "rotation"), own.coefficients, strict=True)
+        }
+        return AdjustedTrajectory(own, **values, joint=joint)
 
     return {each.name: adjusted(each) for each in result.block.all_trajectories}
 

@@ -1,4 +1,4 @@
-"""Adjusted common unknowns of observations, in the order of the block."""
+"""Adjusted cameras, and common unknowns of observations, in the order of the block."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.arrays import freeze_fields, standard_deviations
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
+from photogram.network.cameras import Camera
 from photogram.network.unknowns import Unknown
+from photogram.show.methods import Brief
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
-
 
 # Types with components of `position` for values, and types whose values are the first of `position`.
 _PLACED = {"lever arm", "shift", "drift", "instrument", "level", "sensor", "position coefficient", "clock"}
@@ -122,3 +125,127 @@ def adjusted_unknowns(
             )
         )
     return tuple(found)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AdjustedCamera(Brief):
+    """A camera with k parameters after the adjustment; arrays are read-only."""
+
+    name: str
+    given: Camera  # initial values, observed if weighted
+    camera: Camera  # with the adjusted parameters
+    cofactors: Floats  # (k, k) for a priori unit weight; zero for fixed parameters, NaN without covariances
+    covariance: Floats  # (k, k) cofactors times the variance of unit weight
+    redundancy: Floats  # (k,) redundancy numbers of weighted parameters; 0 for others
+    # (k,) diagonal of the normal equations, weights counted: reciprocal cofactors that the parameters would
+    # have if all other unknowns were known; 0 for fixed ones
+    information: Floats
+    photos: int  # numbers of its photos, and of their images in the adjustment
+    images: int
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.camera.names
+
+    @property
+    def values(self) -> Floats:
+        """(k,) adjusted parameters."""
+        return self.camera.values
+
+    @property
+    def sd(self) -> Floats:
+        """(k,) standard deviations of the parameters; 0 if fixed."""
+        return np.asarray(standard_deviations(self.covariance[np.newaxis])[0])
+
+    @property
+    def correlations(self) -> Floats:
+        """(k, k) correlation coefficients; NaN for fixed parameters."""
+        sd = np.sqrt(np.diag(self.cofactors))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.cofactors / np.outer(sd, sd))
+
+    @property
+    def estimated(self) -> list[int]:
+        """Indices of free and weighted parameters."""
+        return np.flatnonzero(self.given.deviations > 0).tolist()
+
+    @property
+    def weighted(self) -> list[int]:
+        """Indices of weighted parameters."""
+        sd = self.given.deviations
+        return np.flatnonzero((sd > 0) & np.isfinite(sd)).tolist()
+
+    def observed(self) -> Camera:
+        """Return the camera as an observation of estimated parameters with covariances.
+
+        Raises
+        ------
+        InputError
+            If its knots were estimated: a camera cannot store their covariance.
+        """
+        if self.given.knot_unknowns:
+            raise InputError(phrase("adjusted.knots", camera=self.name))
+        rows = self.estimated
+        names = [self.names[k] for k in rows]
+        covariance = (names, self.covariance[np.ix_(rows, rows)]) if names else None
+        return self.camera.replace(sd=0.0, covariance=covariance)
+
+    def restarted(self) -> Camera:
+        """Return the given camera with adjusted values of free parameters."""
+        found = np.where(np.isinf(self.given.deviations), self.values, self.given.values)
+        parameters = dict(zip(self.names, found.tolist(), strict=True))
+        return self.given.replace(parameters=parameters, knots=self.camera.knots)
+
+    def value(self, name: str) -> float:
+        """Return an adjusted parameter."""
+        return self.camera.parameters[name]
+
+    def deviation(self, name: str) -> float:
+        """Return the standard deviation of a parameter."""
+        return float(self.sd[self.names.index(name)])
+
+
+def adjusted_cameras(
+    block: Block, solution: _photocore.BlockSolution, scale: float
+) -> tuple[AdjustedCamera, ...]:
+    """Return adjusted cameras with scaled covariances; none for principal distances."""
+    if not block.cameras:
+        return ()
+    found = []
+    knots = dict[int, Floats]()  # (ny, nx, 2) adjusted knots by `id` of the camera
+    if moving := [each for each in block.cameras if each.knots is not None and each.knot_unknowns]:
+        places = [position for _, position, *_ in solution.adjusted_unknowns]
+        rows = {id(each): row for row, each in enumerate(block.unknowns)}
+        for each in moving:
+            of_camera = np.array([places[rows[id(knot)]][:2] for knot in each.knot_unknowns])
+            knots[id(each)] = of_camera.reshape(np.asarray(each.knots).shape)
+    for name, given, row in zip(block.camera_names, block.cameras, solution.cameras, strict=True):
+        parameters, cofactors, redundancy, information, photos, images = row
+        k = len(parameters)
+        matrix = np.array(cofactors).reshape(k, k)
+        found.append(
+            AdjustedCamera(
+                name=name,
+                given=given,
+                camera=given.replace(
+                    parameters=dict(zip(given.names, parameters, strict=True)),
+                    knots=knots.get(id(given), given.knots),
+                ),
+                cofactors=matrix,
+                covariance=matrix * scale,
+                redundancy=np.array(redundancy),
+                information=np.array(information),
+                photos=photos,
+                images=images,
+            )
+        )
+    return tuple(found)
+
+
+def units(camera: Camera) -> list[str]:
+    """Return the unit of each parameter: `mm`, `mm^-2`, ..., empty for plain numbers."""
+    return [camera.unit_of(name) for name in camera.names]

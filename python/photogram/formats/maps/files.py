@@ -17,7 +17,7 @@ from photogram.errors import InputError
 from photogram.formats.crs_results import Placed
 from photogram.formats.maps.layers import Layer, chosen_crs, map_layers
 from photogram.network.rays import local_axes
-from photogram.results.ellipses import metric_covariances
+from photogram.results.footprints import metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.words import phrase

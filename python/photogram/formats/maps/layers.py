@@ -15,8 +15,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
 from photogram.network.moving_photos import Moment
 from photogram.results.axes import point_axes
-from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
-from photogram.results.footprints import footprints
+from photogram.results.footprints import CONFIDENCE, ellipses, fitting_scale, footprints
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
 from photogram.statistics.reliability import TESTABLE

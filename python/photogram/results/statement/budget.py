@@ -9,33 +9,30 @@ summed by type, strip, camera, photo, point and parameter.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import value_field
+from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.messages import unknown_name
+from photogram.network.block import Block
+from photogram.network.rays import local_axes
+from photogram.results import network_trial
 from photogram.results.components import VarianceComponents
-from photogram.results.covariance import Covariances
-from photogram.results.group_sums import Left, Probing, observables
-from photogram.results.grouping import Grouping, grouped
-from photogram.results.network_trial import (
-    ATTITUDE,
-    CONTROL,
-    IMAGE,
-    KINDS,
-    OBSERVATION,
-    POSITION,
-    BlockSuspects,
-    observations_of_core,
-)
-from photogram.results.statement.quantities import Wanted, component_of
+from photogram.results.covariance import Covariances, Item, adjusted, used_rows
+from photogram.results.group_sums import Grouping, Left, Probing, grouped, observables
+from photogram.results.statement.request import invalid
 from photogram.results.statement.texts import Texts
+from photogram.results.unknowns import units
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -190,13 +187,13 @@ class _Freedoms:
         known = math.isinf(result.freedom_of_scale)
         self._basis = "components" if components is not None else "given" if known else "unit variance"
         self._names: list[str] = []
-        self._of: Indices = np.full(len(rows), -1)
+        self._of: Indices = np.full(len(rows.sd), -1)
         self._covariance = np.zeros((0, 0))
-        if components is None and len(rows) > EXACT:
+        if components is None and len(rows.sd) > EXACT:
             return
         grouping = grouped(observables(result), "kind")
         self._of = rows.groups(grouping)
-        matrix = Left(result, grouping, Probing(exact=min(len(rows), EXACT))).matrix()
+        matrix = Left(result, grouping, Probing(exact=min(len(rows.sd), EXACT))).matrix()
         names = list(grouping.groups.names)
         estimated = [k for k in range(len(names)) if matrix[k, k] > 0]
         self._names = [kind_of(names[k]) for k in estimated]
@@ -223,92 +220,96 @@ class _Freedoms:
 
 
 PHOTOS = 100  # Listed photos with the largest contributions
-_PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", ATTITUDE: "photo attitudes"}
+UNKNOWN = network_trial.KINDS.index("unknown")
+_PLURALS = dict(enumerate(("images", "control", "photo positions", "photo attitudes"))) | {5: "camera"}
 
 
-class Rows:
+class Rows(network_trial.BlockSuspects):
     """All M observations in G groups, images or control points, with names."""
 
     def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
-        self.block = result.block
-        self.suspects, self.sd = BlockSuspects(result.block, core), core.deviations
-        self._starts: Indices = self.suspects.row_starts
-        self._sizes: Indices = np.diff(self._starts)
-        self._component = core.components
-        self._observed = observations_of_core(self.block)
-        self._kinds, self._of_kind = self._labels()
-        # Images are the first groups.
-        self._images = slice(0, int(np.count_nonzero(self.suspects.kinds == IMAGE)))
-        seen = observables(result)
-        self._cameras, self._camera_of_photo = list(seen.camera_names), seen.photo_cameras
-        self._strips = np.full(len(self.block.photo_ids), -1)
-        for number, photos in enumerate(seen.strips()):
-            self._strips[photos] = number
+        super().__init__(result.block, core)
+        self.sd, self._sizes = core.deviations, np.diff(self.row_starts)
+        block, seen, photo = result.block, observables(result), self.photos
+        image, control = self.kinds == network_trial.IMAGE, self.kinds == network_trial.CONTROL
+        strips, of_strip = seen.strips(), np.full(len(block.photo_ids), -1)
+        for number, photos in enumerate(strips):
+            of_strip[photos] = number
+        names = [str(number + 1) for number in range(len(strips))]
+        # Level, names, the name of each group or -1, number of listed names
+        self._levels: list[tuple[str, Sequence[str], Indices, float]] = [
+            ("kind", *self._types(), math.inf),
+            *([("strip", names, np.where(image, of_strip[photo], -1), math.inf)] if len(names) > 1 else []),
+            ("camera", list(seen.camera_names), np.where(image, seen.photo_cameras[photo], -1), math.inf),
+            ("photo", block.photo_ids, np.where(image, photo, -1), PHOTOS),
+            ("point", block.point_ids, np.where(control, self.points, -1), math.inf),
+        ]
 
-    def __len__(self) -> int:
-        return int(self._starts[-1])
-
-    def _labels(self) -> tuple[list[str], Indices]:
+    def _types(self) -> tuple[list[str], Indices]:
         """Return the names of types, and the (G,) types of groups."""
-        of_observation = [kind_of(each.label) for each in self._observed]
-        of_unknown = [each.KIND for each in self.block.unknowns]
+        labels = {
+            network_trial.OBSERVATION: [kind_of(each.label) for each in self.observations],
+            UNKNOWN: [each.KIND for each in self.block.unknowns],
+        }
         found: dict[str, int] = {}
-        number = np.zeros(len(self.suspects), dtype=np.int64)
-        for kind in np.flatnonzero(np.bincount(self.suspects.kinds)).tolist():
-            own = np.flatnonzero(self.suspects.kinds == kind)
-            if kind in _PLURALS or KINDS[kind] == "camera":
-                number[own] = found.setdefault(_PLURALS.get(kind, "camera"), len(found))
-                continue
-            labels = of_observation if kind == OBSERVATION else of_unknown
-            each = np.array([found.setdefault(label, len(found)) for label in labels], dtype=np.int64)
-            number[own] = each[self.suspects.subjects[own]]
+        number = np.zeros(len(self), dtype=np.int64)
+        for kind in np.unique(self.kinds).tolist():
+            own, names = self.kinds == kind, labels.get(kind, _PLURALS.get(kind, ""))
+            if isinstance(names, str):
+                number[own] = found.setdefault(names, len(found))
+            else:
+                each = np.array([found.setdefault(name, len(found)) for name in names], dtype=np.int64)
+                number[own] = each[self.subjects[own]]
         return list(found), number
 
     def sources(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return level, name, row number and contribution of sources, from (M,) squares."""
-        sums, sizes = np.add.reduceat(squares, self._starts[:-1]), self._sizes
-        yield from _sums("kind", self._kinds, self._of_kind, sums, sizes)
-        own, rows, photo = sums[self._images], sizes[self._images], self.suspects.photos[self._images]
-        strips = [str(number + 1) for number in range(int(self._strips.max(initial=-1)) + 1)]
-        if len(strips) > 1:
-            yield from _sums("strip", strips, self._strips[photo], own, rows)
-        yield from _sums("camera", self._cameras, self._camera_of_photo[photo], own, rows)
-        yield from _sums("photo", self.block.photo_ids, photo, own, rows, PHOTOS)
-        control = self.suspects.kinds == CONTROL
-        points = self.suspects.points[control]
-        yield from _sums("point", self.block.point_ids, points, sums[control], sizes[control])
+        """Return level, name, row number and contribution of sources, from (M,) squares.
+
+        Sources without rows are omitted; the smallest ones of long levels are added.
+        """
+        sums = np.add.reduceat(squares, self.row_starts[:-1])
+        for level, names, of, most in self._levels:
+            own = of >= 0
+            numbers = np.bincount(of[own], self._sizes[own], len(names)).astype(np.int64)
+            totals = np.bincount(of[own], sums[own], len(names))
+            there = np.flatnonzero(numbers)
+            rest = there[:0]
+            if len(there) > most:
+                there, rest = np.split(there[np.argsort(-totals[there], kind="stable")], [int(most)])
+            yield from ((level, names[k], int(numbers[k]), float(totals[k])) for k in there.tolist())
+            if len(rest):
+                yield level, "others", int(numbers[rest].sum()), math.fsum(totals[rest].tolist())
         yield from self._parameters(squares)
 
     def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
         several = len(self.block.camera_names) > 1
-        for group in np.flatnonzero(self.suspects.kinds > OBSERVATION).tolist():
-            for row in self.suspects.rows(group).tolist():
+        for group in np.flatnonzero(self.kinds > network_trial.OBSERVATION).tolist():
+            for row in self.rows(group).tolist():
                 kind, *of, component = self.named(row)
                 axis = Phrase(f"axis.{component}")
                 alone = kind == "camera" and not several
-                own = axis if alone else component_of(" ".join(of), axis)
+                own = axis if alone else phrase("named.component", name=" ".join(of), axis=axis)
                 yield "parameter", own, 1, float(squares[row])
 
     def named(self, row: int) -> tuple[str, ...]:
         """Return the type of a row, its items, and its component."""
-        group = int(np.searchsorted(self._starts, row, "right")) - 1
-        kind, subject = int(self.suspects.kinds[group]), int(self.suspects.subjects[group])
-        component = int(self._component[row])
-        block = self.block
-        if kind == IMAGE:
+        group = int(np.searchsorted(self.row_starts, row, "right")) - 1
+        kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        block, component = self.block, int(self.components[row])
+        if kind == network_trial.IMAGE:
             axes = ("column", "row") if block.image_unit == "px" else ("x", "y")
-            photo, point = block.image_photos[subject], block.image_points[subject]
+            photo, point = self.photos[group], self.points[group]
             return "image", block.photo_ids[photo], block.point_ids[point], axes[component]
-        if kind == CONTROL:
+        if kind == network_trial.CONTROL:
             return "control", block.point_ids[subject], "xyz"[component]
-        if kind in (POSITION, ATTITUDE):
-            own = ("x", "y", "z") if kind == POSITION else ("omega", "phi", "kappa")
-            return KINDS[kind], block.photo_ids[subject], own[component]
-        if kind == OBSERVATION:
-            observation = self._observed[subject]
+        if kind in (network_trial.POSITION, network_trial.ATTITUDE):
+            own = ("x", "y", "z") if kind == network_trial.POSITION else ("omega", "phi", "kappa")
+            return network_trial.KINDS[kind], block.photo_ids[subject], own[component]
+        if kind == network_trial.OBSERVATION:
+            observation = self.observations[subject]
             names = observation.components(geographic=block.geographic)
             return kind_of(observation.label), *observation.of, names[component].lower()
-        if KINDS[kind] == "camera":
+        if network_trial.KINDS[kind] == "camera":
             parameters = block.cameras[subject].names if block.cameras else ("c",)
             return "camera", block.camera_names[subject], parameters[component]
         unknown = block.unknowns[subject]
@@ -316,22 +317,22 @@ class Rows:
 
     def groups(self, grouping: Grouping) -> Indices:
         """Return (M,) the group of each row in a grouping; -1 for none."""
-        kind, subject = (
-            np.repeat(each, self._sizes) for each in (self.suspects.kinds, self.suspects.subjects)
-        )
-        component = self._component.astype(np.int64)
-        found = np.full(len(self), -1)
-        tables = {IMAGE: grouping.images, CONTROL: grouping.points, POSITION: grouping.photos}
+        kind, subject = (np.repeat(each, self._sizes) for each in (self.kinds, self.subjects))
+        component = self.components.astype(np.int64)
+        found = np.full(len(kind), -1)
+        tables = {
+            network_trial.IMAGE: grouping.images,
+            network_trial.CONTROL: grouping.points,
+            network_trial.POSITION: grouping.photos,
+        }
         for own_kind, table in tables.items():
             own = kind == own_kind
             found[own] = table[subject[own], component[own]]
-        own = kind == ATTITUDE
+        own = kind == network_trial.ATTITUDE
         found[own] = grouping.photos[subject[own], 3 + component[own]]
-        own = kind == OBSERVATION
-        if own.any():
-            numbers = {id(each): row for row, each in enumerate(self.block.observations)}
-            of = np.array([numbers[id(each)] for each in self._observed], dtype=np.int64)
-            found[own] = grouping.observations[of[subject[own]]]
+        own = kind == network_trial.OBSERVATION
+        of = [row for rows, _ in self.block.observation_groups for row in rows]
+        found[own] = grouping.observations[np.array(of, dtype=np.int64)[subject[own]]]
         return found
 
 
@@ -339,24 +340,156 @@ def kind_of(label: str) -> str:
     return {"position": "gnss"}.get(label, label)
 
 
-def _sums(
-    level: str, names: Sequence[str], of: Indices, sums: Floats, sizes: Indices, most: int | None = None
-) -> Iterable[tuple[str, Phrase | str, int, float]]:
-    """Return sums over non-empty groups in order; or the largest, and the rest."""
-    if of.min(initial=0) < 0:
-        inside = of >= 0
-        of, sums, sizes = of[inside], sums[inside], sizes[inside]
-    numbers = np.bincount(of, weights=sizes, minlength=len(names)).astype(np.int64)
-    totals = np.bincount(of, weights=sums, minlength=len(names))
-    there = np.flatnonzero(numbers)
-    if most is not None and len(there) > most:
-        order = there[np.argsort(-totals[there], kind="stable")]
-        rest = order[most:]
-        others = ("others", int(numbers[rest].sum()), math.fsum(totals[rest].tolist()))
-        there = order[:most]
-    else:
-        others = None
-    values = zip(there.tolist(), numbers[there].tolist(), totals[there].tolist(), strict=True)
-    yield from ((level, names[k], number, total) for k, number, total in values)
-    if others is not None:
-        yield level, *others
+_AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
+"""Alternative names of coordinates, in addition to those of the block."""
+PRINCIPAL = ("f", "fx", "c")  # Names of principal distances
+TOGETHER = 256  # Number of points in a block of distances
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    name: str  # The requested name: `point C08 z`
+    subject: Phrase  # Its name as a message
+    items: tuple[Item, ...]  # Its arguments: see :class:`photogram.results.Covariances`
+    function: Callable[..., Any]  # Its arguments are an array for each item, complex ones too
+    unit: str  # Unit of its value; empty for plain numbers
+
+
+def wanted(result: Result, asked: Any) -> Wanted:
+    """Return a requested quantity; refuse unknown items and unused points.
+
+    `point NAME z`, `distance NAME NAME`, `camera NAME f`, `photo NAME x`, `unknown NAME x`; or a mapping of
+    items to gradients of a linear function, `{("point", "C08"): [0, 0, 1]}`.
+    """
+    if isinstance(asked, Mapping):
+        return _linear(result, asked)
+    words = asked.split() if isinstance(asked, str) else []
+    if len(words) < 3:
+        raise InputError(phrase("request.quantity", value=value_field(asked)))
+    kind = words[0]
+    if kind == "distance":
+        return _distance(result, asked, _two(result.block, words[1:]))
+    kinds = adjusted(result).things
+    if kind not in kinds or kind == "step":
+        raise InputError(unknown_name("kind of quantity", kind, kinds))
+    name, component = " ".join(words[1:-1]), words[-1]
+    things = kinds[kind]
+    require_name(kind, name, things.ids)
+    names = things.components[list(things.ids).index(name)]
+    lower = [each.lower() for each in names]
+    own = _AXES.get(component.lower()) if kind in ("point", "photo") and component not in names else None
+    if own is None:
+        if component.lower() not in lower:
+            raise InputError(unknown_name(f"component of {kind} {name}", component, names))
+        own = names.index(component) if component in names else lower.index(component.lower())
+    if kind == "point":
+        used_rows(result, [name])
+    subject = Phrase(
+        f"quantity.{kind}", {"of": phrase("named.component", name=name, axis=Phrase(f"axis.{component}"))}
+    )
+    return Wanted(asked, subject, ((kind, name),), lambda x: x[own], _unit(result, kind, name, own))
+
+
+def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
+    """Return three quantities for the first page.
+
+    The check point, or tie point, with the median standard deviation of height; the longest distance between
+    these points; the principal distance if it was estimated.
+    """
+    block = result.block
+    own = set(checks)
+    rows = np.flatnonzero([name in own for name in block.point_ids])
+    if not len(rows):
+        rows = np.flatnonzero(result.used_points & (result.point_kinds == "pass"))
+    found = []
+    if len(rows):
+        order = rows[np.argsort(result.point_sd[rows, 2], kind="stable")]
+        found.append(wanted(result, f"point {block.point_ids[order[(len(order) - 1) // 2]]} z"))
+    if len(rows) > 1:
+        first, second = _farthest(result, rows)
+        found.append(_distance(result, f"distance {first} {second}", (first, second)))
+    for camera in result.cameras:
+        free = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if sd > 0]
+        for name in PRINCIPAL:
+            if name in free:
+                return [*found, wanted(result, f"camera {camera.name} {name}")]
+    return found
+
+
+def _farthest(result: Result, rows: Indices) -> tuple[str, str]:
+    places = local_axes(result.block).positions(result.point_positions[rows])
+    best, ends = -1.0, (0, 0)
+    for first in range(0, len(rows), TOGETHER):
+        squares = ((places[first : first + TOGETHER, np.newaxis] - places) ** 2).sum(axis=2)
+        own = np.unravel_index(int(np.argmax(squares)), squares.shape)
+        if squares[own] > best:
+            best, ends = float(squares[own]), (first + int(own[0]), int(own[1]))
+    names = result.block.point_ids
+    return names[rows[min(ends)]], names[rows[max(ends)]]
+
+
+def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
+    """Return the names of two points; names may contain blanks."""
+    known = set(block.point_ids)
+    for cut in range(1, len(words)):
+        names = " ".join(words[:cut]), " ".join(words[cut:])
+        if known.issuperset(names):
+            return names
+    lacking = next((word for word in words if word not in known), words[0])
+    raise InputError(unknown_name("point", lacking, block.point_ids))
+
+
+def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
+    used_rows(result, ends)
+    if ends[0] == ends[1]:
+        raise InputError(phrase("request.distance", point=ends[0]))
+    spheroid = result.block.spheroid
+
+    def between(x: Any, y: Any) -> Any:
+        if spheroid is not None:
+            x, y = (_geocentric(each, spheroid.a, spheroid.b) for each in (x, y))
+        return (((x - y) ** 2).sum()) ** 0.5
+
+    items = tuple(("point", each) for each in ends)
+    subject = Phrase("quantity.distance", {"of": " ".join(ends)})
+    return Wanted(name, subject, items, between, result.block.linear_unit)
+
+
+def _geocentric(x: Any, a: float, b: float) -> Any:
+    """Return geocentric coordinates of geographic ones; also complex numbers."""
+    sp, cp = np.sin(x[1]), np.cos(x[1])
+    across = a / (1 - (1 - (b / a) ** 2) * sp**2) ** 0.5
+    level = (across + x[2]) * cp
+    return np.array([level * np.cos(x[0]), level * np.sin(x[0]), ((b / a) ** 2 * across + x[2]) * sp])
+
+
+def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
+    items, parts = [], []
+    for item, gradient in gradients.items():
+        values = np.asarray(gradient, dtype=float)
+        if not (isinstance(item, tuple) and len(item) == 2) or not np.isfinite(values).all():
+            raise InputError(phrase("request.gradient", value=value_field((item, gradient))))
+        width = len(adjusted(result).selected(item).values)
+        if item[0] == "point":
+            used_rows(result, [str(item[1])])
+        if values.shape != (width,):
+            raise invalid(f"gradient of {item[0]} {item[1]}", "error.count", count=width, actual=values.size)
+        items.append(item)
+        parts.append(values)
+    if not items:
+        raise InputError(phrase("request.gradient", value=value_field(gradients)))
+    parts_of = [Phrase(f"quantity.{kind}", {"of": own}) for kind, own in items]
+    subject = Phrase("quantity.linear", {"quantities": parts_of})
+    return Wanted(
+        str(subject), subject, tuple(items), lambda *x: sum(g @ v for g, v in zip(parts, x, strict=True)), ""
+    )
+
+
+def _unit(result: Result, kind: str, name: str, component: int) -> str:
+    block = result.block
+    if kind in ("point", "photo"):
+        angle = component >= 3 or (block.geographic and component < 2)
+        return "rad" if angle else block.linear_unit
+    if kind == "camera":
+        return units(next(each.camera for each in result.cameras if each.name == name))[component]
+    return next(each.units[component] for each in result.unknowns if each.name == name)

@@ -10,12 +10,10 @@ import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
-from photogram.results.statement.asprs import wording
 from photogram.results.statement.budget import budget_fields
-from photogram.results.statement.figures import Figures, root_mean
-from photogram.results.statement.honest import LEVEL, Prediction, Surface
-from photogram.results.statement.leave_one_out import LeftOut, limit_of
-from photogram.results.statement.standards import Asprs, Lengths
+from photogram.results.statement.comparison import LEVEL, LeftOut, limit_of
+from photogram.results.statement.figures import Figures, Prediction, Surface, root_mean
+from photogram.results.statement.standards import Asprs, Lengths, wording
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.show.quantity import members

@@ -59,6 +59,8 @@ def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
     if not diagonal > 0:
         return None
     above = own > (low + high) / 2
+    heights, known = (each[np.isfinite(each)] for each in (extent[:, 2], points[:, 2]))
+    span = np.ptp(heights) if heights.size else 0.0
     quadrants = np.bincount(above[:, 0] + 2 * above[:, 1], minlength=4) / len(own)
     return Layout(
         len(own),
@@ -66,7 +68,7 @@ def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
         (float(quadrants[0]), float(quadrants[1]), float(quadrants[2]), float(quadrants[3])),
         _least_spacing(own) / diagonal,
         _far(own, block, FAR * diagonal),
-        _heights(points[:, 2], extent[:, 2]),
+        float(np.ptp(known) / span) if known.size and span > 0 else math.nan,
         int(outside(own, hull(control[:, :2])).sum()) if len(control) else len(own),
     )
 
@@ -95,9 +97,3 @@ def _far(plan: Floats, block: Floats, limit: float) -> float:
     if not inside.any():
         return math.nan
     return float(np.mean(_photocore.nearest_points(grid[inside], plan, limit) < 0))
-
-
-def _heights(own: Floats, block: Floats) -> float:
-    whole, known = block[np.isfinite(block)], own[np.isfinite(own)]
-    extent = np.ptp(whole) if whole.size else 0.0
-    return float(np.ptp(known) / extent) if known.size and extent > 0 else math.nan

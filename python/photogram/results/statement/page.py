@@ -9,33 +9,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.results.cameras import AdjustedCamera, units
+from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import replace
+from photogram.network.hull import hull, outside
 from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
+from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
+from photogram.results.statement import tables as declared
 from photogram.results.statement.budget import Budget, budget_fields
-from photogram.results.statement.comparison import control_places, in_order
-from photogram.results.statement.document import kinds_of
-from photogram.results.statement.drawings import differences, overlap
-from photogram.results.statement.drawings import lengths as drawn_lengths
+from photogram.results.statement.comparison import Compared, control_places, in_order
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.judgement import fixed_values
-from photogram.results.statement.tables import (
-    Columns,
-    annex,
-    check_points,
-    decimals_for,
-    left_out_points,
-    removed_observations,
-    test_lengths,
-)
+from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
+from photogram.results.unknowns import AdjustedCamera, units
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.sketch import marks as shapes
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import BLUE, SOFT, VERMILION, round_length
 
 if TYPE_CHECKING:
-    from photogram import Statement
+    from photogram import Result, Statement
 
 MAX_FINE_SOURCES = 12  # Sources of a budget in addition to the types of observations
 MAX_RADII = 11
@@ -45,32 +42,32 @@ BLANK = " "  # Header of a column without a name
 def annexes(statement: Statement) -> list[Section]:
     texts, result = statement.texts, statement.result
     checks = [
-        check_points(statement),
+        declared.check_points(statement),
         *([] if statement.of_all is None else [_radii(texts, statement.of_all)]),
     ]
     held = fixed_values(texts, result) or texts("annex.c.nothing")
     budgets = [part for each in statement.taken_apart for part in _budget(texts, each)]
-    left_out = left_out_points(texts, statement.left_out)
+    left_out = declared.left_out_points(texts, statement.left_out)
     return [
-        annex(texts, "a", checks),
-        annex(texts, "b", [left_out], texts("annex.b.note")),
-        annex(texts, "c", budgets, texts("annex.c.note", held=held)),
-        annex(texts, "d", [part for each in result.cameras for part in _camera(statement, each)]),
-        annex(texts, "e", _adjustment(statement), texts.text(result.verdict.message)),
-        annex(texts, "f", _survey(statement)),
-        annex(texts, "h", _metrology(statement)),
-        annex(texts, "g", _files(statement)),
+        declared.annex(texts, "a", checks),
+        declared.annex(texts, "b", [left_out], texts("annex.b.note")),
+        declared.annex(texts, "c", budgets, texts("annex.c.note", held=held)),
+        declared.annex(texts, "d", [part for each in result.cameras for part in _camera(statement, each)]),
+        declared.annex(texts, "e", _adjustment(statement), texts.text(result.verdict.message)),
+        declared.annex(texts, "f", _survey(statement)),
+        declared.annex(texts, "h", _metrology(statement)),
+        declared.annex(texts, "g", _files(statement)),
     ]
 
 
 def _radii(texts: Texts, own: Figures) -> Table:
-    columns, decimals = Columns(texts), decimals_for(own.points.sd_adjusted)
+    columns, decimals = declared.Columns(texts), declared.decimals_for(own.points.sd_adjusted)
     radii = {name: radius for name, radius in own.radii.items() if radius is not None}
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
-    upper = [math.nan if radius.upper is None else radius.upper for radius in radii.values()]
+    upper = [math.nan if radius["upper"] is None else radius["upper"] for radius in radii.values()]
     quantities = [
         columns.text(BLANK, [name.upper() for name in radii]),
-        number("sample", [radius.sample for radius in radii.values()]),
+        number("sample", [radius["sample"] for radius in radii.values()]),
         number("upper", upper),
         number("moments", [own.of_moments[name] for name in radii]),
         number("mixture", [own.mixture.get(name, math.nan) for name in radii]),
@@ -79,7 +76,7 @@ def _radii(texts: Texts, own: Figures) -> Table:
 
 
 def _budget(texts: Texts, own: Budget) -> list[Table]:
-    columns = Columns(texts)
+    columns = declared.Columns(texts)
     finer = [each for level in ("strip", "camera", "point", "parameter") for each in own.at(level)]
     if len(own.at("camera")) < 2:
         finer = [each for each in finer if each.level != "camera"]
@@ -119,7 +116,7 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
 
 
 def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
-    texts, columns, sd = statement.texts, Columns(statement.texts), camera.sd
+    texts, columns, sd = statement.texts, declared.Columns(statement.texts), camera.sd
     of, estimated = units(camera.camera), camera.estimated
     axes = tuple(Axis.of(name, unit) for name, unit in zip(camera.names, of, strict=True))
     names = [camera.names[k] for k in estimated]
@@ -147,7 +144,7 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
     if curve is not None:
         unit, inside = statement.result.block.image_unit, np.flatnonzero(curve.radii <= curve.observed)
         rows = inside[np.unique(np.linspace(0, len(inside) - 1, MAX_RADII).round().astype(int))]
-        decimals = decimals_for(curve.sd[rows])
+        decimals = declared.decimals_for(curve.sd[rows])
         distortion = [
             columns.number("radius", curve.radii[rows], unit=unit),
             columns.number("correction", curve.values[rows], decimals, unit),
@@ -158,8 +155,8 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
 
 
 def _adjustment(statement: Statement) -> list[Part]:
-    texts, columns = statement.texts, Columns(statement.texts)
-    kinds = kinds_of(statement.result)
+    texts, columns = statement.texts, declared.Columns(statement.texts)
+    kinds = declared.kinds_of(statement.result)
     counts, redundancy, squares = zip(*kinds.values(), strict=True)
     sums = [
         columns.text("kind", [texts.kind(name) for name in kinds]),
@@ -174,14 +171,14 @@ def _adjustment(statement: Statement) -> list[Part]:
     return [
         Table("kinds", texts("table.kinds"), sums),
         verdict_table(statement.result.verdict, texts),
-        removed_observations(statement),
+        declared.removed_observations(statement),
         _markers(statement),
         drawing,
     ]
 
 
 def _markers(statement: Statement) -> Table:
-    texts, columns, result = statement.texts, Columns(statement.texts), statement.result
+    texts, columns, result = statement.texts, declared.Columns(statement.texts), statement.result
     block, kinds = result.block, result.point_kinds
     fit = fit_of_images(result, result.image_points, len(kinds))
     rows = in_order(block, np.flatnonzero((kinds != "pass") & (fit[:, 5] > 0)))
@@ -197,10 +194,10 @@ def _markers(statement: Statement) -> Table:
 
 
 def _survey(statement: Statement) -> list[Table]:
-    texts, columns, own = statement.texts, Columns(statement.texts), statement.survey
+    texts, columns, own = statement.texts, declared.Columns(statement.texts), statement.survey
     if own.system is None:
         return []
-    decimals = max(3, decimals_for(own.sd))
+    decimals = max(3, declared.decimals_for(own.sd))
     coordinates = [
         columns.number(
             texts.word("axis", name), column, 8 if unit == "deg" else decimals, texts.word("unit", unit)
@@ -218,7 +215,7 @@ def _survey(statement: Statement) -> list[Table]:
 
 
 def _files(statement: Statement) -> list[Part]:
-    texts, columns, files = statement.texts, Columns(statement.texts), statement.inputs
+    texts, columns, files = statement.texts, declared.Columns(statement.texts), statement.inputs
     facts = [Fact(texts("page.program"), f"photogram {_photocore.__version__}")]
     if statement.command:
         facts.append(Fact(texts("page.command"), statement.command))
@@ -231,18 +228,15 @@ def _files(statement: Statement) -> list[Part]:
 
 
 def _metrology(statement: Statement) -> list[Part]:
-    texts, columns, parts = statement.texts, Columns(statement.texts), list[Part]()
-    features, lengths, measures = (
-        statement.result.features,
-        statement.standards.lengths,
-        statement.standards.iso_19157,
-    )
+    texts, columns, parts = statement.texts, declared.Columns(statement.texts), list[Part]()
+    standards, features = statement.standards, statement.result.features
+    lengths, measures = standards.lengths, standards.iso_19157
     if features is not None and len(features):
         parts.append(_features(texts, features))
     if lengths is not None:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
-        parts += [test_lengths(texts, lengths), drawing]
+        parts += [declared.test_lengths(texts, lengths), drawing]
     quantities = [
         columns.text("measure", [each["measure"] for each in measures]),
         columns.number("id", [each["measure_id"] for each in measures]),
@@ -259,7 +253,7 @@ def _measured(texts: Texts, value: Any) -> str:
 
 def _features(texts: Texts, features: Features) -> Table:
     """Return feature quantities with two figures of the least deviation per unit."""
-    columns = Columns(texts)
+    columns = declared.Columns(texts)
     every = [(feature, own) for feature in features for own in feature.quantities]
     names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
     axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
@@ -319,20 +313,23 @@ def _figures(statement: Statement) -> list[Part]:
     own, texts, rest = statement.of_all, statement.texts, statement.of_rest
     if own is None:
         return []
-    columns = Columns(texts)
-    pairs = {part: (own.parts[part], own.prediction[part]) for part in own.parts}
-    rows = [(part, *pair) for part, pair in pairs.items()]
-    shown = [(part, sized, predicted) for part, sized, predicted in rows if sized and predicted]
+    columns = declared.Columns(texts)
+    shown = [
+        (part, sized, predicted)
+        for part, sized in own.parts.items()
+        if sized and (predicted := own.prediction[part])
+    ]
     known = [each.predicted_rmse_of_product for each in own.prediction.values() if each is not None]
-    decimals = decimals_for(np.array(known))
+    decimals = declared.decimals_for(np.array(known))
     number = partial(columns.number, decimals=decimals)
     intervals = [
         " – ".join(texts.number(limit, decimals) for limit in predicted.rmse_interval)
         for *_, predicted in shown
     ]
     # Parts in standards: RMSE of the survey, and combined with the RMSE of the differences.
-    of_parts = {"plan": (own.rmse_h2, own.rmse_h), "h": (own.rmse_v2, own.rmse_v)}
-    of_parts["all"] = math.hypot(own.rmse_h2, own.rmse_v2), own.rmse_3d
+    rmse = own.rmse
+    of_parts = {"plan": (rmse["rmse_h2"], rmse["rmse_h"]), "h": (rmse["rmse_v2"], rmse["rmse_v"])}
+    of_parts["all"] = math.hypot(rmse["rmse_h2"], rmse["rmse_v2"]), rmse["rmse_3d"]
     surveys = [of_parts.get(part, (math.nan, math.nan)) for part, *_ in shown]
     quantities = [
         columns.text("component", [texts(f"component.{part}") for part, *_ in shown]),
@@ -372,3 +369,106 @@ def _notes(statement: Statement) -> list[Text]:
         own = math.nan if predicted is None else predicted.predicted_rmse_of_product
         fields[f"predicted_{name}"] = texts.length(own)
     return [Text(f"{texts('asprs.footnote')} {texts('asprs.product', **fields)}")]
+
+
+WIDTH = 6.3  # Inches
+REACH = 0.08  # Length of the largest arrow relative to the extent
+NINETY_FIVE = 2.4477  # Semi-axes of the ellipse of 95 percent, in standard deviations
+NAMED = 60
+CELLS = 120  # Along the longer side of the map of overlap
+
+
+def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
+    """Draw (k, 3) control, check points and differences, heights as colours."""
+    if not len(found) and not len(control):
+        return None
+    places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
+    extent = np.ptp(places, axis=0)
+    panel = _in_plan(shapes.around(places, 0.12), texts)
+    marks = list[shapes.Mark]()
+    if len(control):
+        marks.append(shapes.Markers(control[:, :2], "^", 6.0, SOFT, label=texts("use.control")))
+    if len(found):
+        panel = _points(panel, found, float(extent.max()), texts)
+    height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
+    return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="beside")])
+
+
+def _in_plan(limits: Floats, texts: Texts) -> shapes.Panel:
+    across, up = (f"{texts(f'column.{axis}')}, {texts.unit}" for axis in ("east", "north"))
+    return shapes.Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
+
+
+def _points(panel: shapes.Panel, found: Compared, extent: float, texts: Texts) -> shapes.Panel:
+    plan, d = found.places[:, :2], found.differences
+    heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
+    most = max(float(np.abs(heights).max()), 1e-12)
+    shades = shapes.Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
+    marks: list[shapes.Mark] = [
+        shapes.Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
+        shapes.Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
+    ]
+    bars: list[shapes.ScaleBar] = []
+    both = np.isfinite(d[:, :2]).all(axis=1)
+    if both.any():
+        largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
+        scale = REACH * max(extent, 1e-9) / largest
+        semi_axes, angles = shapes.ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
+        marks += [
+            shapes.Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
+            shapes.Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
+        ]
+        length = round_length(largest)
+        sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
+        bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal"))))
+    if len(found) <= NAMED:
+        marks.append(shapes.Names(plan, found.names, [SOFT] * len(found)))
+    return replace(panel, marks=marks, bars=bars, shades=shades)
+
+
+def drawn_lengths(found: Lengths, texts: Texts) -> Plot:
+    """Draw errors of calibrated lengths by length, with sd and limits."""
+    test, order = found.test, np.argsort(found.calibrated, kind="stable")
+    places = np.column_stack([found.calibrated, test.errors])
+    ends = [test.errors - test.sd, test.errors + test.sd]
+    marks: list[shapes.Mark] = [
+        shapes.Line(shapes.error_bars(places, *ends), BLUE, 0.7),
+        shapes.Markers(places, "o", 3.0, BLUE),
+        shapes.level(0.0, SOFT, 0.6),
+    ]
+    if test.limits is not None:
+        for limit in (test.limits, -test.limits):
+            ends.append(limit)
+            line = np.column_stack([found.calibrated, limit])[order]
+            marks.append(shapes.Line(line, VERMILION, 0.9, "--"))
+    limits = np.column_stack([shapes.spread(found.calibrated), shapes.spread(0.0, *ends)])
+    across, up = (f"{texts(f'column.{name}')}, {texts.unit}" for name in ("length", "error"))
+    return Plot(WIDTH, 3.0, [shapes.Panel(limits, marks, "", across, up, decimal=texts("number.decimal"))])
+
+
+def overlap(result: Result, texts: Texts) -> Plot | None:
+    """Draw the number of photos of ground positions; None without footprints."""
+    outlines = footprints(result).outlines[:, :, :2]
+    outlines = outlines[np.isfinite(outlines).all(axis=(1, 2))]
+    if not len(outlines):
+        return None
+    low, high = outlines.min(axis=(0, 1)), outlines.max(axis=(0, 1))
+    cell = float((high - low).max()) / CELLS
+    if not cell > 0:
+        return None
+    x, y = (np.arange(low[k] + cell / 2, high[k], cell) for k in (0, 1))
+    counts = np.zeros((len(y), len(x)))
+    for outline in outlines:
+        columns, rows = (
+            np.flatnonzero((centres >= side.min()) & (centres <= side.max()))
+            for centres, side in zip((x, y), outline.T, strict=True)
+        )
+        if len(columns) and len(rows):
+            grid = np.stack(np.meshgrid(x[columns], y[rows]), axis=-1)
+            inside = ~outside(grid.reshape(-1, 2), hull(outline))
+            counts[np.ix_(rows, columns)] += inside.reshape(grid.shape[:2])
+    shades = shapes.Shades(0.0, float(counts.max()) or 1.0, texts("column.photos"))
+    corners = np.array([low, low + cell * np.array([len(x), len(y)])])
+    cells = shapes.Mesh(corners, np.where(counts > 0, counts, np.nan), shades)
+    panel = replace(_in_plan(corners, texts), marks=[cells], shades=shades)
+    return Plot(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)), [panel])

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.arrays import names, number, numbers, one_of, truth_value, value_field
+from photogram.arguments.objects import require_name
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, fields
-from photogram.messages import unknown_name
 from photogram.results.components import VarianceComponents
 from photogram.words import phrase
 
@@ -195,8 +195,7 @@ class Asked:
         """
         known = {each.name: each for each in fields(cls)}
         for name in options:
-            if name not in known:
-                raise InputError(unknown_name("option of a statement", name, known))
+            require_name("option of a statement", name, known)
         values = {name: value for name, value in options.items() if value is not None}
         checks = {name: known[name].metadata.get("check", _text) for name in values}
         asked = cls(**{name: checks[name](name, value) for name, value in values.items()})
@@ -205,8 +204,7 @@ class Asked:
 
     def _check(self) -> None:
         for standard in self.standards:
-            if standard not in STANDARDS:
-                raise InputError(unknown_name("standard", standard, STANDARDS))
+            require_name("standard", standard, STANDARDS)
         for name, size in self.classes.items():
             one_of("a class", name, ("h", "v", "3d"))
             _positive(f"class {name}", size)
@@ -233,8 +231,7 @@ def lengths_in(unit: str) -> float:
     InputError
         If the unit is unknown.
     """
-    if unit not in METRES:
-        raise InputError(unknown_name("unit of length", unit, METRES))
+    require_name("unit of length", unit, METRES)
     return METRES[unit]
 
 

@@ -4,41 +4,171 @@ See sections 2.3 and 2.6 of the specification of the statement. The factors of t
 Spatial Data Accuracy (FGDC-STD-007.3-1998) are valid for axes of nearly equal RMSE. In all cases the
 statement gives the radius of 95 % of errors with the matrix of mean products. Numbers of measures of ISO
 19157 are from annex D of the edition of 2013; names are from the same table in GeoAPI.
+
+For the ASPRS standards, Edition 2 (2023; Version 2, 2024), section 2.2 lists confirmations by other texts and
+open checks against the standard. Differences contain the errors of the product and of the check survey. The
+standard adds the errors of the survey again: correct for common errors, otherwise conservative.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import counted, unknown_name
+from photogram.messages import counted
 from photogram.network.observations import Control
-from photogram.results.statement import asprs
-from photogram.results.statement.comparison import Compared, plan_positions, turned_jointly, turned_to_east
+from photogram.results.covariance import used_rows
+from photogram.results.statement import comparison
+from photogram.results.statement import lengths as length_tests
 from photogram.results.statement.figures import Figures, root_mean
 from photogram.results.statement.layout import area_in_plan
-from photogram.results.statement.leave_one_out import LeftOut
-from photogram.results.statement.lengths import (
-    LengthTest,
-    Limit,
-    angle_to_diagonal,
-    at_reference,
-    length_test,
-    measured_lengths,
-)
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
-from photogram.words import phrase
+from photogram.statistics.freedom import rmse_interval
 
 if TYPE_CHECKING:
     from photogram import Result
+
+ASPRS_POINTS = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
+MOST_STEPS = 10  # Number of steps of 1,000 km2, after which the number of check points is constant
+MEAN_SHARE, MOST_TIMES = 0.25, 3.0
+"""Limits for means and differences that require an investigation, relative to a class (7.2)."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """A figure of the standard with its components, in the linear unit."""
+
+    count: int  # Check points
+    # RMSE of the differences (RMSE_1), and of the check survey by its standard deviations (RMSE_2)
+    found: float
+    survey: float
+    rmse: float  # The figure: the root of the sum of both squares
+    # Its upper limit, from the interval of the found RMSE, with the survey's; NaN if missing
+    upper: float
+    # Estimate for the product only, the root of the difference of both squares; None if differences are
+    # smaller than the survey's standard deviations
+    product: float | None
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A mean or difference that requires an investigation first."""
+
+    kind: str  # `mean` or `difference`
+    component: str  # `e`, `n` or `h`
+    value: float  # In the linear unit
+    limit: float
+    point: int | None = None  # Row of the difference; None for a mean
+
+
+def points_asked_for(area: float) -> int:
+    """Return required check points of an area (km2), for NVA and VVA (7.13, table C.1).
+
+    Ten more for every 1,000 km2. Minimum and maximum are confirmed, the steps between are not.
+    """
+    return ASPRS_POINTS + 10 * (math.ceil(min(max(area / 1000.0, 1.0), MOST_STEPS)) - 1)
+
+
+def accuracy(found: float, survey: float, freedom: float, count: int) -> Accuracy:
+    """Return a figure of the standard: RMSE_H (7.11), RMSE_V of NVA or VVA, RMSE_3D.
+
+    `found` and `survey` are RMSE_1 of the differences and RMSE_2 of the check survey in the linear unit:
+    horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
+    the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
+    """
+    rest, upper = (found - survey) * (found + survey), rmse_interval(found, freedom)[1]
+    product = math.sqrt(rest) if rest >= 0 else None
+    return Accuracy(count, found, survey, math.hypot(found, survey), math.hypot(upper, survey), product)
+
+
+def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accuracy:
+    """Return RMSE_3D, the root of RMSE_H^2 + RMSE_V^2, of the NVA or the VVA area.
+
+    `freedom` are effective degrees of freedom of all rows together.
+    """
+    found = math.hypot(horizontal.found, vertical.found)
+    survey = math.hypot(horizontal.survey, vertical.survey)
+    return accuracy(found, survey, freedom, min(horizontal.count, vertical.count))
+
+
+def verdict(figure: Accuracy | None, limit: float) -> str:
+    """Return the verdict on a class in the linear unit.
+
+    `missed` if the figure is larger. Otherwise, by the upper limit of its interval, `met with confidence` or
+    `met`; with fewer than 30 points `produced to meet` or `not decided` instead. `not tested` without a
+    figure.
+    """
+    if figure is None:
+        return "not tested"
+    if figure.rmse > limit:
+        return "missed"
+    sure = figure.upper <= limit
+    if figure.count < ASPRS_POINTS:
+        return "produced to meet" if sure else "not decided"
+    return "met with confidence" if sure else "met"
+
+
+def wording(count: int) -> str:
+    if count >= ASPRS_POINTS:
+        return "tested"
+    return "produced" if count else "none"
+
+
+def survey_good_enough(survey: float, limit: float) -> bool:
+    """Return whether a check survey has RMSE_2 <= N/2, half of the class (7.12).
+
+    RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
+    """
+    return survey <= limit / 2
+
+
+def control_good_enough(
+    plan: float, height: float, class_h: float, class_v: float | None = None
+) -> tuple[bool, bool]:
+    """Return whether control is accurate enough in plan and in height (7.9).
+
+    `plan` and `height` are root mean squares of its standard deviations, radial in plan, in the linear unit.
+    The limits are half of the horizontal and vertical classes; the full horizontal class for height without a
+    vertical class.
+    """
+    return plan <= class_h / 2, height <= (class_h if class_v is None else class_v / 2)
+
+
+def remarks(
+    differences: Floats, class_h: float | None = None, class_v: float | None = None
+) -> tuple[Remark, ...]:
+    """Return necessary investigations before a class is stated (7.2).
+
+    Limits are a quarter of the class for means and three times the class for differences; in plan by axis,
+    with the class divided by the root of 2. `differences` are (n, 3) east, north, height: adjusted minus
+    given, in the linear unit; NaN if not given. Classes are None unless requested.
+    """
+    axis = None if class_h is None else class_h / math.sqrt(2)
+    limits = {"e": axis, "n": axis, "h": class_v}
+    return tuple(
+        remark
+        for (component, limit), column in zip(limits.items(), differences.T, strict=True)
+        if limit is not None
+        for remark in _beyond(component, limit, column)
+    )
+
+
+def _beyond(component: str, limit: float, values: Floats) -> Iterator[Remark]:
+    """Yield values above the limits of an axis: the mean, then single differences."""
+    known = np.flatnonzero(np.isfinite(values))
+    mean = float(values[known].mean()) if known.size else 0.0
+    if abs(mean) > MEAN_SHARE * limit:
+        yield Remark("mean", component, mean, MEAN_SHARE * limit)
+    for row in known[np.abs(values[known]) > MOST_TIMES * limit].tolist():
+        yield Remark("difference", component, float(values[row]), MOST_TIMES * limit, row)
+
 
 ENOUGH = 20  # Required check points
 VERTICAL, RADIAL, EITHER = 1.9600, 1.7308, 2.4477
@@ -64,7 +194,7 @@ _NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
 class Asprs:
     """ASPRS Positional Accuracy Standards, Edition 2."""
 
-    figures: Mapping[str, asprs.Accuracy | None]  # By `h`, `v`, `3d`, `vva`; None without points
+    figures: Mapping[str, Accuracy | None]  # By `h`, `v`, `3d`, `vva`; None without points
     # Verdicts on the requested classes, for sentences, headline, table and JSON
     verdicts: Mapping[str, str]
     words: str  # `tested`, `produced` or `none`, by the component with the fewest check points
@@ -76,7 +206,7 @@ class Asprs:
     control: Mapping[str, bool]
     # Root mean squares of the standard deviations of control, radial in plan, and in height; linear unit
     control_rmse: tuple[float, float]
-    remarks: tuple[asprs.Remark, ...]  # Means and differences to investigate first
+    remarks: tuple[Remark, ...]  # Means and differences to investigate first
     left_out: Mapping[str, float]  # RMSE of control predicted by the others, `h` and `v`; NaN without
 
     def member(self, asked: Asked, metre: float) -> dict[str, Any]:
@@ -123,8 +253,8 @@ class Lengths:
     lines: Sequence[str]
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
-    limit: Limit | None
-    test: LengthTest
+    limit: length_tests.Limit | None
+    test: length_tests.LengthTest
     expansion: float | None
 
 
@@ -148,35 +278,37 @@ class Standards:
 def asprs_figures(
     result: Result,
     asked: Asked,
-    found: Compared,
+    found: comparison.Compared,
     of_all: Figures | None,
     of_vegetated: Figures | None,
-    left_out: Sequence[LeftOut],
+    left_out: Sequence[comparison.LeftOut],
 ) -> Asprs:
     """Return the figures of the ASPRS, and the verdicts on the requested classes."""
     metre = lengths_in(result.block.linear_unit)
     area = asked.area
     if area is None:
-        area = area_in_plan(plan_positions(result.block, result.point_positions[result.used_points]))
+        area = area_in_plan(
+            comparison.plan_positions(result.block, result.point_positions[result.used_points])
+        )
     km2 = area * metre**2 / 1e6
     figures = _accuracies(of_all, of_vegetated)
     classes = asked.classes
-    verdicts = {name: asprs.verdict(figures[name], size) for name, size in classes.items()}
+    verdicts = {name: verdict(figures[name], size) for name, size in classes.items()}
     counts = [0 if own is None else own.count for own in (figures["h"], figures["v"])]
     plan, height = _control_rmse(result)
     d = np.array([each.difference for each in left_out]).reshape(-1, 3)
     control: dict[str, bool] = {}
     if "h" in classes:
-        good = asprs.control_good_enough(plan, height, classes["h"], classes.get("v"))
+        good = control_good_enough(plan, height, classes["h"], classes.get("v"))
         control = dict(zip(("h", "v"), good, strict=True))
     return Asprs(
         figures=figures,
         verdicts=verdicts,
-        words=asprs.wording(min(filter(None, counts), default=0)),
+        words=wording(min(filter(None, counts), default=0)),
         area=km2,
-        points_asked=asprs.points_asked_for(km2),
+        points_asked=points_asked_for(km2),
         survey={
-            name: asprs.survey_good_enough(own.survey, size)
+            name: survey_good_enough(own.survey, size)
             for name, size in classes.items()
             if name != "3d" and (own := figures[name])
         },
@@ -184,29 +316,28 @@ def asprs_figures(
         control_rmse=(plan, height),
         remarks=()
         if of_all is None
-        else asprs.remarks(
-            np.where(found.counted, found.differences, np.nan), classes.get("h"), classes.get("v")
-        ),
+        else remarks(np.where(found.counted, found.differences, np.nan), classes.get("h"), classes.get("v")),
         left_out={"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)},
     )
 
 
-def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[str, asprs.Accuracy | None]:
-    found: dict[str, asprs.Accuracy | None] = dict.fromkeys(("h", "v", "3d", "vva"))
+def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[str, Accuracy | None]:
+    found: dict[str, Accuracy | None] = dict.fromkeys(("h", "v", "3d", "vva"))
     for key, own, part in (("h", of_all, "plan"), ("v", of_all, "h"), ("vva", of_vegetated, "h")):
+        axis = key[0]
         predicted = None if own is None else own.prediction[part]
         if own is not None and predicted is not None:
-            pair = (own.rmse_h1, own.rmse_h2) if part == "plan" else (own.rmse_v1, own.rmse_v2)
-            found[key] = asprs.accuracy(*pair, predicted.effective_dof, predicted.points)
+            pair = own.rmse[f"rmse_{axis}1"], own.rmse[f"rmse_{axis}2"]
+            found[key] = accuracy(*pair, predicted.effective_dof, predicted.points)
     whole = None if of_all is None else of_all.prediction["all"]
     if found["h"] is not None and found["v"] is not None and whole is not None:
-        found["3d"] = asprs.three_d(found["h"], found["v"], whole.effective_dof)
+        found["3d"] = three_d(found["h"], found["v"], whole.effective_dof)
     return found
 
 
 def _control_rmse(result: Result) -> tuple[float, float]:
     block, found = result.block, []
-    turns = turned_to_east(block, block.point_positions)
+    turns = comparison.turned_to_east(block, block.point_positions)
     for row in np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & result.used_points).tolist():
         known = np.isfinite(block.point_sd[row])
         own = np.abs(turns[row]) @ np.where(known, block.point_sd[row], 0.0)
@@ -239,29 +370,23 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
     """Return calibrated lengths with their test; refuse unknown points."""
     block = result.block
     names = list(dict.fromkeys(end for each in asked.lengths for end in (each["from"], each["to"])))
-    places = {name: row for row, name in enumerate(block.point_ids)}
-    for name in names:
-        if name not in places:
-            raise InputError(unknown_name("point", name, block.point_ids))
-        if not result.used_points[places[name]]:
-            raise InputError(phrase("adjusted.unused-point", point=name))
-    rows = np.array([places[name] for name in names], dtype=np.int64)
+    rows = used_rows(result, names)
     positions, joint = result.point_positions[rows], result.covariance(("point", names))
     if block.geographic:
-        joint = turned_jointly(turned_to_east(block, positions), joint)
-        positions = plan_positions(block, positions)
+        joint = comparison.turned_jointly(comparison.turned_to_east(block, positions), joint)
+        positions = comparison.plan_positions(block, positions)
     pairs = np.array([[names.index(each["from"]), names.index(each["to"])] for each in asked.lengths])
-    measured, covariance = measured_lengths(positions, joint, pairs)
+    measured, covariance = length_tests.measured_lengths(positions, joint, pairs)
     temperatures = np.array([each.get("temperature", math.nan) for each in asked.lengths], dtype=float)
     turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
     if turned and asked.expansion is not None:
-        measured = at_reference(measured, temperatures, asked.expansion)
-    limit = None if asked.limit is None else Limit(*asked.limit)
-    extent = np.ptp(plan_positions(block, result.point_positions[result.used_points]), axis=0)
-    ends_in_plan = plan_positions(block, result.point_positions[rows])[pairs]
+        measured = length_tests.at_reference(measured, temperatures, asked.expansion)
+    limit = None if asked.limit is None else length_tests.Limit(*asked.limit)
+    extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
+    ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
     lines = [str(each["line"]) for each in asked.lengths]
     calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
-    test = length_test(
+    test = length_tests.length_test(
         measured,
         calibrated,
         covariance=covariance,
@@ -269,7 +394,7 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         lines=lines,
         limit=limit,
         diagonal=float(np.linalg.norm(extent)),
-        off_diagonal=angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
+        off_diagonal=length_tests.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
@@ -287,7 +412,7 @@ def iso_measures(
         values: dict[str, Any] = {
             "bias": [None if each is None else each.mean for each in (of_all.parts[part] for part in "enh")],
             "rmse": None if whole is None else whole.rmse,
-            "rmse_plan": of_all.rmse_h1,
+            "rmse_plan": of_all.rmse["rmse_h1"],
             **{name: of_all.of_moments[name] for name in ("ce90", "ce95", "le90", "le95")},
             "ellipse": _ellipse(of_all.moments),
         }

@@ -16,31 +16,13 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.results.result import Result
-from photogram.results.statement.budget import Budget, budgets
-from photogram.results.statement.comparison import (
-    NOTHING,
-    Compared,
-    Survey,
-    System,
-    compared,
-    control_places,
-    surveyed,
-)
-from photogram.results.statement.document import budget_member, figures_member, statement_members
+from photogram.results.statement import comparison, tables
+from photogram.results.statement import standards as by_standard
+from photogram.results.statement.budget import Budget, budgets, chosen, wanted
 from photogram.results.statement.figures import Figures, figures
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
-from photogram.results.statement.leave_one_out import LeftOut, leave_one_out
-from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
-from photogram.results.statement.standards import (
-    Standards,
-    asprs_figures,
-    iso_measures,
-    nssda,
-    tested_lengths,
-)
-from photogram.results.statement.tables import check_points, left_out_points
 from photogram.results.statement.texts import Texts
 from photogram.show.methods import Brief, Rows
 from photogram.show.page import Document
@@ -108,16 +90,16 @@ class Statement(Brief):
     result: Result
     asked: Asked
     texts: Texts
-    compared: Compared
+    compared: comparison.Compared
     of_all: Figures | None
     of_rest: Figures | None
     of_vegetated: Figures | None
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[comparison.LeftOut, ...]
     taken_apart: tuple[Budget, ...]
-    standards: Standards
+    standards: by_standard.Standards
     layout: Layout | None
     removed: tuple[RemovedObservation, ...]
-    survey: Survey = NOTHING
+    survey: comparison.Survey = comparison.NOTHING
     inputs: tuple[InputFile, ...] = ()
     command: str = ""
     assumed: Sequence[Phrase | str] = ()
@@ -147,7 +129,7 @@ class Statement(Brief):
     @property
     def figures(self) -> dict[str, Any] | None:
         """All figures by their names in the JSON document; None without check points."""
-        return figures_member(self.of_all, self.standards.nssda_member)
+        return tables.figures_member(self.of_all, self.standards.nssda_member)
 
     @property
     def sentences(self) -> list[dict[str, str]]:
@@ -162,12 +144,12 @@ class Statement(Brief):
     @property
     def check_points(self) -> list[dict[str, Any]]:
         """The check points, as in the JSON document."""
-        return records(check_points(self).columns)
+        return records(tables.check_points(self).columns)
 
     @property
     def leave_one_out(self) -> list[dict[str, Any]]:
         """Control points predicted by the others, as in the JSON document."""
-        return records(left_out_points(self.texts, self.left_out).columns)
+        return records(tables.left_out_points(self.texts, self.left_out).columns)
 
     def budget(self, quantity: str | Mapping[Any, Sequence[float]]) -> dict[str, Any]:
         """Return the budget of a quantity of the page, or of any other.
@@ -187,20 +169,20 @@ class Statement(Brief):
         """
         for each in self.taken_apart:
             if each.quantity == quantity:
-                return budget_member(each)
+                return tables.budget_member(each)
         made = budgets(
             self.result,
             [wanted(self.result, quantity)],
             self.result.covariances(),
             coverage=self.asked.coverage,
         )
-        return budget_member(made[0])
+        return tables.budget_member(made[0])
 
     def __getitem__(self, name: str) -> dict[str, Any]:
         """Return a budget of the page by the name of its quantity."""
         for each in self.taken_apart:
             if each.quantity == name:
-                return budget_member(each)
+                return tables.budget_member(each)
         names = [each.quantity for each in self.taken_apart]
         raise InputError(unknown_name("budget", name, names))
 
@@ -240,7 +222,7 @@ class Statement(Brief):
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return all data as a JSON document (UTF-8); optionally write it to a path."""
-        return _written(json.to_json(statement_members(self)), path)
+        return _written(json.to_json(tables.statement_members(self)), path)
 
 
 def _written(content: bytes, path: str | PathLike[str] | None) -> bytes:
@@ -257,7 +239,7 @@ def statement(
     strict: bool = False,
     assumed: Sequence[Phrase | str] = (),
     removed: Sequence[Phrase | str] = (),
-    system: System | None = None,
+    system: comparison.System | None = None,
     inputs: Sequence[InputFile] = (),
     command: str = "",
     **asked: Any,
@@ -303,11 +285,11 @@ def statement(
         raise AdjustmentError(phrase("request.covariances"))
     texts = Texts(options.language, options.text, result.block.linear_unit)
     covariances = result.covariances()
-    found = compared(result, options, covariances)
+    found = comparison.compared(result, options, covariances)
     rest = found.without(list(options.without)) if options.without else None
     of_all = figures(found, options.coverage)
     of_vegetated = figures(found.in_vegetation(), options.coverage)
-    left_out = leave_one_out(result)
+    left_out = comparison.leave_one_out(result)
     quantities = (
         chosen(result, found.names)
         if options.budgets is None
@@ -316,10 +298,10 @@ def statement(
     taken_apart = budgets(
         result, quantities, covariances, coverage=options.coverage, components=options.components
     )
-    lengths = tested_lengths(result, options) if options.lengths else None
+    lengths = by_standard.tested_lengths(result, options) if options.lengths else None
     # Given positions with both plan coordinates.
     checks = found.given_places[np.isfinite(found.given[:, :2]).all(axis=1)]
-    control = control_places(result.block)
+    control = comparison.control_places(result.block)
     return Statement(
         result=result,
         asked=options,
@@ -330,19 +312,21 @@ def statement(
         of_vegetated=of_vegetated,
         left_out=tuple(left_out),
         taken_apart=tuple(taken_apart),
-        standards=Standards(
-            asprs=asprs_figures(result, options, found, of_all, of_vegetated, left_out)
+        standards=by_standard.Standards(
+            asprs=by_standard.asprs_figures(result, options, found, of_all, of_vegetated, left_out)
             if "asprs-2023" in options.standards
             else None,
-            nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse_v1, of_all.n),
+            nssda=None
+            if of_all is None
+            else by_standard.nssda(of_all.moments, of_all.rmse["rmse_v1"], of_all.n),
             lengths=lengths,
-            iso_19157=iso_measures(result, options, of_all, lengths)
+            iso_19157=by_standard.iso_measures(result, options, of_all, lengths)
             if "iso-19157" in options.standards
             else [],
         ),
         layout=layout(checks, np.concatenate([checks, control]), control) if len(checks) else None,
         removed=removed_observations(result, removed),
-        survey=surveyed(result, found, system),
+        survey=comparison.surveyed(result, found, system),
         inputs=tuple(inputs),
         command=command,
         assumed=assumed,
