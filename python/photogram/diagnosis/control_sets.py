@@ -19,12 +19,12 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.blunders import tests
+from photogram.diagnosis.blunders import limit_of, tests
 from photogram.diagnosis.findings import Explained, likely
 from photogram.diagnosis.hypotheses import FOOT
 from photogram.diagnosis.predictions import freed
 from photogram.diagnosis.regression import spread
-from photogram.diagnosis.robust import critical, mad_sd
+from photogram.diagnosis.robust import mad_sd
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
@@ -245,7 +245,7 @@ def doubtful(first: Result | None, *kinds: str) -> bool:
         return True
     values = tests(first)
     size = max(mad_sd(first.standardized), np.finfo(np.float64).tiny)
-    limit = critical(sum(int((each > 0).sum()) for each in values.values())) * size
+    limit = limit_of(values) * size
     beyond = sum(int((values[kind] > limit).any(axis=1).sum()) for kind in kinds if kind in values)
     fixed = "control" in kinds and bool((first.block.point_sd == 0).any())
     return beyond >= MANY or (fixed and size > MANY)
