@@ -228,7 +228,7 @@ def test_standard_deviations_that_are_wrong():
     assert good.findings == []
     assert good.verdict.code == "accepted"
     (small,) = weights_of(right.replace(image_sd=right.image_sd / 3))
-    assert nested_codes(small) == ["weighting.small", "weighting.images"]
+    assert nested_codes(small) == ["weighting.small", "test.images"]
     assert small.fields["factor"] == pytest.approx(3, rel=0.1)
     (large,) = weights_of(right.replace(image_sd=right.image_sd * 4))
     assert large.code == "weighting.large"
@@ -238,7 +238,7 @@ def test_standard_deviations_that_are_wrong():
     wrong = explained(right.replace(image_xy=xy))
     assert [finding.kind for finding in wrong.grave] == [wrong.verdict.code] == ["gross-errors"]
     told = explained(right.replace(image_sd=right.image_sd / 8)).result.messages
-    assert nested_codes(told[0]) == ["weighting.small", "weighting.images"]
+    assert nested_codes(told[0]) == ["weighting.small", "test.images"]
 
 
 def test_longitude_and_latitude():

@@ -41,19 +41,22 @@ class Suspect:
 
 def tests(result: Result) -> dict[str, Floats]:
     """Return test values by type, in standard deviations of the residuals; 0 without redundancy."""
-    images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
-    others = {
+    values = {
+        "image": (result.redundancy, result.standardized),
         "control": (result.point_redundancy, result.point_standardized),
         "station": (result.photo_redundancy, result.photo_standardized),
         **{f"{BESIDE}{name}": (each.redundancy, each.standardized) for name, each in result.kinds.items()},
     }
+    least = {"image": TESTABLE}
     return {
-        "image": np.nan_to_num(images),
-        **{
-            name: np.where(redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(values)), 0.0)
-            for name, (redundancy, values) in others.items()
-        },
+        kind: np.where(redundancy > least.get(kind, TESTABLE_PRIOR), np.nan_to_num(np.abs(own)), 0.0)
+        for kind, (redundancy, own) in values.items()
     }
+
+
+def limit_of(values: dict[str, Floats], chance: float = 0.01) -> float:
+    """Return the critical value of the largest of all test values."""
+    return critical(sum(int((each > 0).sum()) for each in values.values()), chance)
 
 
 def kind_of(result: Result, suspect: Suspect) -> ObservedKind:

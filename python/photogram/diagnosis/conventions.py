@@ -9,7 +9,7 @@ The criterion is the ratio of the misfit m under a hypothesis to the misfit of t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -23,8 +23,7 @@ from photogram.diagnosis.hypotheses import (
     Hypothesis,
     attitude_readings,
     hypotheses,
-    images_turned,
-    turn_of,
+    turns,
 )
 from photogram.diagnosis.regression import (
     LEAST,
@@ -65,8 +64,8 @@ BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
 class Verdict:
     """Hypotheses that pass, best first; several if the data do not decide.
 
-    `photos` lists the photos with the mistake; empty for all photos. `change` and `exact` belong to the first
-    hypothesis.
+    `photos` lists the photos with the mistake, empty for all photos; `distance` is their principal distance,
+    if they are all photos with it. `change` and `exact` belong to the first hypothesis.
     """
 
     def __init__(
@@ -75,6 +74,7 @@ class Verdict:
         given: float,
         photos: Sequence[str] = (),
         what: str = "images",
+        distance: float | None = None,
     ) -> None:
         found.sort(key=lambda each: each[0])
         least = found[0][0]
@@ -83,7 +83,9 @@ class Verdict:
         best = list({str(each.message): each for each in reversed(best)}.values())[::-1]
         self.names = [each.name for each in best]
         self.change, self.exact = best[0].change, best[0].exact
-        self.photos = photos
+        self.rivals = [each.message for each in best[1:]]
+        self.photos, self.distance = photos, distance
+        self.before, self.after = given, least
         self.message = phrase(
             f"convention.{'likely' if len(best) == 1 else 'one-of'}",
             causes=[each.message for each in best],
@@ -116,15 +118,31 @@ def verdicts(block: Block) -> list[Verdict]:
     if not len(photos):
         return []
     seen = misfits(view(block, photos), photos)
-    if np.median(seen) <= SUSPICION:
-        worst = photos[np.argsort(-seen)][:MOST]
-        single = list(_single(block, np.sort(worst[np.sort(-seen)[:MOST] < -SUSPICION])))
-        return single or _of_control(view(block, spread(photos, MOST)), spread(photos, MOST))
     chosen = spread(photos, MOST)
     looked = view(block, chosen)
-    fits = regressions(looked, chosen)
-    found = passing(hypotheses(looked, fits), looked, fits.misfit, partial(misfits, photos=chosen))
-    return [Verdict(found, float(np.median(fits.misfit)))] if found else []
+    if np.median(seen) > SUSPICION:
+        fits = regressions(looked, chosen)
+        found = passing(hypotheses(looked, fits), looked, fits.misfit, partial(misfits, photos=chosen))
+        if found:
+            return [Verdict(found, float(np.median(fits.misfit)))]
+    worst = photos[np.argsort(-seen)][:MOST]
+    some = _of_groups(block, photos) or _single(block, np.sort(worst[np.sort(-seen)[:MOST] < -SUSPICION]))
+    return some or (_of_control(looked, chosen) if np.median(seen) <= SUSPICION else [])
+
+
+def _of_groups(block: Block, photos: Indices) -> list[Verdict]:
+    """Try turned images of all photos with the same principal distance."""
+    distances, found = block.known_distances("hints"), []
+    for distance in np.unique(distances) if np.ptp(distances) else ():
+        own = spread(photos[distances[photos] == distance], MOST)
+        looked = view(block, own)
+        given = misfits(looked, own)
+        if len(own) and np.median(given) > SUSPICION:
+            fitting = passing(turns(distances == distance), looked, given, partial(misfits, photos=own))
+            names = [block.photo_ids[photo] for photo in np.flatnonzero(distances == distance).tolist()]
+            if fitting:
+                found.append(Verdict(fitting, float(np.median(given)), names, distance=float(distance)))
+    return found
 
 
 def passing(
@@ -164,24 +182,22 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
     return [Verdict(fitting, given)] if fitting else []
 
 
-def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
+def _single(block: Block, photos: Indices) -> list[Verdict]:
     """Try photos one by one, with the other photos unchanged."""
     by_names: dict[tuple[str, ...], tuple[list[tuple[float, Hypothesis]], float, list[str]]] = {}
     for photo in photos.tolist():
-        own, alone = np.array([photo]), np.arange(len(block.photo_ids)) == photo
+        own = np.array([photo])
         looked = view(block, own)
         given = float(misfits(looked, own)[0])
-        fitting = []
-        for name in TURNS:
-            change = partial(images_turned, photos=alone, turn=turn_of(name))
-            left = float(misfits(change(looked), own)[0])
-            if left < PASSES * given and left < SUSPICION:
-                fitting.append((left, Hypothesis(name, phrase(f"mistake.{name}"), change)))
+        left = [
+            (float(misfits(each.change(looked), own)[0]), each)
+            for each in turns(np.arange(len(block.photo_ids)) == photo)
+        ]
+        fitting = [each for each in left if each[0] < min(PASSES * given, SUSPICION)]
         if fitting:
             names = tuple(sorted(each.name for _, each in fitting))
             by_names.setdefault(names, (fitting, given, []))[2].append(block.photo_ids[photo])
-    for fitting, given, photo_ids in by_names.values():
-        yield Verdict(fitting, given, photo_ids)
+    return [Verdict(*each) for each in by_names.values()]
 
 
 def _latitudes(block: Block) -> list[Message]:

@@ -208,7 +208,7 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, misleading, words)
     if edited.last is not None and edited.last.converged:
-        sets.findings += half_pixel(edited.last, adjusted)
+        sets.findings += half_pixel(edited.last)
         if not any(each.level == "grave" for section in sections for each in section.findings):
             edited.section.findings += disagreeing(edited.last)
     if not exact:

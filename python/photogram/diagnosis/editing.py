@@ -20,6 +20,7 @@ from photogram.diagnosis.blunders import (
     control_finding,
     finding_of,
     kind_of,
+    limit_of,
     tests,
     with_rivals,
 )
@@ -274,8 +275,7 @@ def _snoop(
 def _largest(result: Result, spread: float) -> list[Suspect]:
     """Return the largest observations of neighbourhoods beyond the critical value."""
     values = tests(result)
-    count = sum(int((each > 0).sum()) for each in values.values())
-    limit = critical(count) * spread
+    limit = limit_of(values) * spread
     beyond = [
         Suspect(kind, int(row), int(axis), float(each[row, axis]))
         for kind, each in values.items()
@@ -353,7 +353,7 @@ def _returned(result: Result, whole: Block, section: Section, spread: float, adj
         if tried is None or not tried.used_images[-1]:
             continue
         values = tests(tried)
-        limit = critical(sum(int((each > 0).sum()) for each in values.values())) * spread
+        limit = limit_of(values) * spread
         others = values["image"][block.image_points.size :]
         on_point = values["image"][tried.block.image_points == point]
         if others.any() and on_point.max() < limit:
@@ -370,7 +370,7 @@ def _grave(result: Result, spread: float) -> float:
     values = tests(result)
     images = values["image"][values["image"] > 0]
     tail = float(np.quantile(images, 0.95)) / TWENTIETH if images.size else spread
-    return critical(sum(int((each > 0).sum()) for each in values.values()), SURE) * max(spread, tail)
+    return limit_of(values, SURE) * max(spread, tail)
 
 
 def _graded(findings: list[Finding], limit: float) -> list[Finding]:

@@ -172,8 +172,8 @@ def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
         if len(own) < FEWEST:
             continue
         adjusted = [marks[residuals.marks[k]] for k in own]
-        sd = film.readings.pitch * np.concatenate([_sd_of(read[k]) for k in own])
-        covariance = _certificate(known, [each.given for each in adjusted]) + np.diag(sd**2)
+        variances = film.readings.pitch**2 * np.concatenate([np.diag(read[k].precision) for k in own])
+        covariance = _certificate(known, [each.given for each in adjusted]) + np.diag(variances)
         places = np.array([each.given.position[:2] for each in adjusted])
         away = residuals.xy[own] + np.array([each.position[:2] for each in adjusted]) - places
         whole, gain, b = _fitted(places, away.ravel(), covariance)
@@ -183,27 +183,15 @@ def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
             yield _Axis(result.block.photo_ids[photo], longer, angle, longer * far)
 
 
-def _sd_of(read: object) -> Floats:
-    assert isinstance(read, Fiducial)
-    own = read.sd if read.covariance is None else np.sqrt(np.diag(np.asarray(read.covariance)))
-    return np.broadcast_to(np.asarray(own, dtype=float), (2,))
-
-
 def _certificate(known: list[KnownTogether], marks: list[Unknown]) -> Floats:
     """Return the (2 n, 2 n) prior covariance of marks; 0 for errorless marks."""
     first = {id(mark): 2 * k for k, mark in enumerate(marks)}
     found = np.zeros((2 * len(marks),) * 2)
     for each in known:
         rows = [(k, first[id(mark)]) for k, mark in enumerate(each.joined) if id(mark) in first]
-        width = 2 * len(each.joined)
-        whole = (
-            np.diag(np.broadcast_to(np.asarray(each.sd, dtype=float), (width,)) ** 2)
-            if each.covariance is None
-            else np.asarray(each.covariance)
-        )
         here = [at + axis for _, at in rows for axis in (0, 1)]
         there = [2 * k + axis for k, _ in rows for axis in (0, 1)]
-        found[np.ix_(here, here)] = whole[np.ix_(there, there)]
+        found[np.ix_(here, here)] = each.precision[np.ix_(there, there)]
     return found
 
 

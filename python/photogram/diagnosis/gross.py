@@ -15,6 +15,8 @@ from photogram.diagnosis.robust import fit, mad_sd
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays, meet
+from photogram.network.subset import kept_images
+from photogram.results.exchanged_names import exchanged_names
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -37,7 +39,7 @@ PARTED, FEWEST_OF_TWO = 0.1, 2
 """Largest part of the residuals, and least rays per group, if one name belongs to two points."""
 AS_WELL = 3.0  # Least ratio to the remaining residual without one ray
 MOST_PHOTOS = 20
-MOST_ON_PHOTO = 30
+MEDIAN_SIZE = 1.18  # Median length of a residual vector, in standard deviations of its components
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,10 +184,10 @@ def _broken(rays: Rays) -> tuple[list[Finding], Bools]:
     rows_of = _rows_of(rays, points)
     gross = np.zeros(len(block.image_xy), dtype=bool)
     solver = _Solver(rays)
-    findings, exchanged = _exchanged(solver, rows_of)
+    findings, exchanged = _exchanged(rays, rows_of) if rows_of else ([], {})
     for point, rows in rows_of.items():
         if point in exchanged:
-            gross[rows[np.isin(block.image_photos[rows], exchanged[point])]] = True
+            gross[rows[block.image_photos[rows] == exchanged[point]]] = True
             continue
         explained, wrong = _explained(solver, point, rows, float(departure[rows].max()))
         findings.append(explained)
@@ -197,7 +199,7 @@ def _broken(rays: Rays) -> tuple[list[Finding], Bools]:
 def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> tuple[Finding, Indices]:
     """Find the wrong observation of a point; return the finding and the doubtful rows."""
     block = solver.rays.block
-    before = solver.largest(rows, solver.changed(point, [], []))
+    before = solver.largest(rows, solver.met(point, []))
     left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
     unit = solver.rays.unit
     name, values = block.point_ids[point], {f"residual_{unit}": before, "departure_sd": departure}
@@ -227,7 +229,7 @@ def _parted(
     """Return two groups of a point's rays that intersect well, and their residual."""
     best, found = PARTED * before, None
     for pair in combinations(rows.tolist(), 2):
-        position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
+        position = solver.met(point, rows[~np.isin(rows, pair)].tolist())
         residuals, in_front = solver.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
         # Rays of two points may meet anywhere, even behind the cameras, with any residual.
         sizes = np.linalg.norm(residuals, axis=1)
@@ -236,8 +238,8 @@ def _parted(
         if min(len(one), len(other)) < FEWEST_OF_TWO:
             continue
         left = max(
-            solver.largest(one, solver.changed(point, other.tolist(), [])),
-            solver.largest(other, solver.changed(point, one.tolist(), [])),
+            solver.largest(one, solver.met(point, other.tolist())),
+            solver.largest(other, solver.met(point, one.tolist())),
         )
         if left < best:
             best, found = left, (one, other, left)
@@ -280,7 +282,7 @@ def _rows_of(rays: Rays, points: Indices) -> dict[int, Indices]:
 
 
 class _Solver:
-    """Intersections with a ray omitted or replaced."""
+    """Intersections with rays omitted."""
 
     def __init__(self, rays: Rays) -> None:
         self.rays = rays
@@ -292,56 +294,34 @@ class _Solver:
         residuals, _ = self.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
         return float(np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf).max())
 
-    def changed(self, point: int, less: list[int], more: list[int]) -> Floats:
-        """Return the position of a point without some rays and with others."""
-        normal = self.normal[point] - self.across[less].sum(axis=0) + self.across[more].sum(axis=0)
-        constant = self.constant[point] - self.right[less].sum(axis=0) + self.right[more].sum(axis=0)
-        rays = self.count[point] - len(less) + len(more)
+    def met(self, point: int, less: list[int]) -> Floats:
+        """Return the position of a point without some rays."""
+        normal = self.normal[point] - self.across[less].sum(axis=0)
+        constant = self.constant[point] - self.right[less].sum(axis=0)
+        rays = self.count[point] - len(less)
         position: Floats = meet(normal[np.newaxis], constant[np.newaxis], np.array([rays]))[0]
         return position
 
     def without(self, point: int, rows: Indices, row: int) -> float:
         """Return the largest residual of a point's other observations without one of them."""
-        return self.largest(rows[rows != row], self.changed(point, [row], []))
-
-    def exchanged(self, point: int, rows: Indices, own: int, other: int) -> float:
-        """Return a point's largest residual with another observation instead of its own."""
-        taken = np.where(rows == own, other, rows)
-        return self.largest(taken, self.changed(point, [own], [other]))
+        return self.largest(rows[rows != row], self.met(point, [row]))
 
 
-def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, list[int]]]:
-    """Find exchanged names on a photo; return findings, and photos of each point.
-
-    A name occurs in only one pair per photo, the pair that explains it best.
-    """
-    block = solver.rays.block
-    on_photo: dict[int, list[int]] = {}
-    for rows in rows_of.values():
-        for row in rows.tolist():
-            on_photo.setdefault(int(block.image_photos[row]), []).append(row)
-    before = {point: solver.largest(rows, solver.changed(point, [], [])) for point, rows in rows_of.items()}
+def _exchanged(rays: Rays, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, int]]:
+    """Find exchanged names among broken points; return findings, and the photo of each point."""
+    block = rays.block
+    # Before the adjustment, residuals of good images have the size of their pattern.
+    usual = float(np.nanmedian(rays.intersect().sizes[rays.used])) / MEDIAN_SIZE
+    alone = kept_images(block, rays.used).replace(point_sd=np.inf)
+    alone = alone.replace(image_sd=np.maximum(alone.image_sd, usual))
     findings: list[Finding] = []
-    found: dict[int, list[int]] = {}
-    for photo, images in on_photo.items():
-        pairs = []
-        for one, other in combinations(images, 2) if len(images) <= MOST_ON_PHOTO else ():
-            a, b = int(block.image_points[one]), int(block.image_points[other])
-            after_a = solver.exchanged(a, rows_of[a], one, other)
-            after_b = solver.exchanged(b, rows_of[b], other, one)
-            if after_a < EXPLAINED * before[a] and after_b < EXPLAINED * before[b]:
-                pairs.append((max(after_a, after_b), a, b))
-        paired: set[int] = set()
-        for after, a, b in sorted(pairs):
-            if paired & {a, b}:
-                continue
-            paired |= {a, b}
-            names, name = [block.point_ids[a], block.point_ids[b]], block.photo_ids[photo]
-            message, unit = phrase("check.exchanged-points", points=names, photo=name), solver.rays.unit
-            values = {f"before_{unit}": max(before[a], before[b]), f"after_{unit}": after}
-            findings.append(finding("grave", message, [name], names, values=values))
-            found.setdefault(a, []).append(photo)
-            found.setdefault(b, []).append(photo)
+    found: dict[int, int] = {}
+    for each in exchanged_names(alone, ~np.isin(alone.image_points, list(rows_of))):
+        photo, points = each.photos[0], list(each.points)
+        message = phrase("check.exchanged-points", points=points, photo=photo)
+        values = {"statistic_as_named": each.as_named, "statistic_exchanged": each.exchanged}
+        findings.append(finding("grave", message, [photo], points, values=values))
+        found |= dict.fromkeys(map(block.point_ids.index, points), block.photo_ids.index(photo))
     return findings, found
 
 

@@ -69,10 +69,7 @@ class Hypothesis:
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
     """Yield possible mistakes of a block; `seen` compares it with predictions."""
-    every = np.ones(len(block.photo_ids), dtype=bool)
-    for name in TURNS:
-        change = partial(images_turned, photos=every, turn=turn_of(name))
-        yield Hypothesis(name, phrase(f"mistake.{name}"), change)
+    yield from turns(np.ones(len(block.photo_ids), dtype=bool))
     composed = None if seen is None else image_hypothesis(block, seen)
     if composed is not None:
         yield composed
@@ -81,6 +78,13 @@ def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothe
     for name, (message, _) in attitude_readings(block).items():
         yield Hypothesis(name, message, partial(read_as, name=name))
     yield from _positions(block)
+
+
+def turns(photos: Bools) -> Iterator[Hypothesis]:
+    """Yield reflections and rotations of the images of (P,) photos."""
+    for name in TURNS:
+        change = partial(images_turned, photos=photos, turn=turn_of(name))
+        yield Hypothesis(name, phrase(f"mistake.{name}"), change)
 
 
 def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:

@@ -122,30 +122,21 @@ def _free_ratio(block: Block, adjusted: Adjuster) -> float:
     return float(found.values[place] / camera.parameters[name])
 
 
-def half_pixel(result: Result, adjusted: Adjuster) -> list[Finding]:
-    """Find principal points with half-pixel offsets by different pixel origins."""
-    block = result.block
-    if block.image_unit != "px":
+def half_pixel(result: Result) -> list[Finding]:
+    """Find fixed principal points with half-pixel offsets by different pixel origins."""
+    summary = result.reliability_summary
+    if result.block.image_unit != "px" or summary is None:
         return []
-    findings = []
-    for row, camera in enumerate(block.cameras):
-        sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-        if {"cx", "cy"} - {*sd} or not all(math.isfinite(sd[name]) for name in ("cx", "cy")):
+    errors, findings = summary.hypotheses, []
+    for row in np.flatnonzero(errors.code == "camera-point").tolist():
+        error, camera = errors.sets[row], result.block.camera_names[errors.index[row]]
+        if error["parameters"] != ["cx", "cy"] or not error["estimate"]:
             continue
-        if "w" in camera.names:
-            continue
-        cameras = list(block.cameras)
-        cameras[row] = freed(camera, ["cx", "cy"])
-        found = adjusted.converged(block.replace(cameras=cameras))
-        if found is None:
-            continue
-        places = [camera.names.index(name) for name in ("cx", "cy")]
-        changes = found.cameras[row].values[places] - camera.values[places]
-        deviations = found.cameras[row].sd[places]
-        if (np.abs(np.abs(changes) - HALF) < NEARLY).all() and (
-            np.abs(changes) > SIGNIFICANT * deviations
-        ).all():
+        changes = np.array(error["estimate"])
+        deviations = np.sqrt(np.diag(np.reshape(error["cofactors"], (2, 2))))
+        half = np.abs(np.abs(changes) - HALF) < NEARLY
+        if half.all() and (np.abs(changes) > SIGNIFICANT * deviations).all():
             x, y = changes.tolist()
-            message = phrase("check.half-pixel", camera=block.camera_names[row], x=x, y=y)
+            message = phrase("check.half-pixel", camera=camera, x=x, y=y)
             findings.append(finding("look", message, values={"cx_px": x, "cy_px": y}))
     return findings

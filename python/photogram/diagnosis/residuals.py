@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.diagnosis.findings import Section, note, small_unit
-from photogram.diagnosis.robust import critical, normal_of_chi_square
+from photogram.diagnosis.robust import critical
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
 from photogram.show.quantity import Axis, Quantity, Table
+from photogram.statistics.patterns import group_patterns
 from photogram.words import phrase
 
-FEWEST = 20  # Images of a photo that a test of its pattern needs
+CHANCE = 0.01  # Probability that any photo of a correct network is named
 WORTH = 0.3  # Notable amplitude of a common pattern (sd of an image coordinate)
 ROUNDING = 0.01  # Least used sd of residuals (sd of an image coordinate)
 SHOWN = 5
@@ -37,7 +37,7 @@ def residuals(result: Result, spread: float) -> Section:
         section.remark("images beyond what the lens sees: no patterns over the frame")
         return section
     _frame_pattern(result, plain, spread, section)
-    _photo_patterns(result, plain, spread, section)
+    _photo_patterns(result, spread, section)
     return section
 
 
@@ -136,36 +136,19 @@ def _frame_pattern(result: Result, plain: Block, spread: float, section: Section
             note(section, "look", phrase("check.systematic-pattern", **fields), values=values)
 
 
-def _photo_patterns(result: Result, plain: Block, spread: float, section: Section) -> None:
-    block = result.block
-    rows = np.flatnonzero(result.used_images)
-    rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
-    bounds = np.searchsorted(block.image_photos[rows], np.arange(len(block.photo_ids) + 1)).tolist()
-    size = frame_radius(plain)
+def _photo_patterns(result: Result, spread: float, section: Section) -> None:
+    """Find photos whose residuals have a shift or a linear form of their own."""
+    block, used = result.block, result.used_images
+    count = len(block.photo_ids)
     unit, factor = small_unit(block.image_unit)
-    limit, tested = critical(len(block.photo_ids)), 0
-    for photo, (first, last) in enumerate(pairwise(bounds)):
-        own = rows[first:last]
-        if len(own) < FEWEST:
-            continue
-        tested += 1
-        significance = _own_pattern(result, plain, own, size, spread)
-        if significance > limit:
-            name, (x, y) = block.photo_ids[photo], (factor * result.residuals[own].mean(axis=0)).tolist()
-            fields = {"photo": name, "x": x, "y": y, "unit": unit, "significance": significance}
-            values = {f"mean_x_{unit}": x, f"mean_y_{unit}": y, "significance_sd": significance}
-            note(section, "look", phrase("check.photo-pattern", **fields), [name], values=values)
-    section.figure("photos tested for a pattern of their own", f"{tested} of {len(block.photo_ids)}")
-
-
-def _own_pattern(result: Result, plain: Block, rows: Indices, size: float, spread: float) -> float:
-    """Return the significance of mean and patterns of a photo, in standard deviations."""
-    block = result.block
-    _, terms = _terms(plain.image_xy[rows], size)
-    means = np.broadcast_to(np.eye(2), (len(rows), 2, 2))
-    design = np.concatenate([means, terms], axis=1) / block.image_sd[rows][:, np.newaxis]
-    design = design.transpose(0, 2, 1).reshape(2 * len(rows), -1)
-    observed = (result.residuals[rows] / block.image_sd[rows]).ravel() / spread
-    solved = np.linalg.lstsq(design, observed, rcond=None)[0]
-    explained = float(((design @ solved) ** 2).sum())
-    return normal_of_chi_square(explained, design.shape[1])
+    photos, residuals = block.image_photos[used], result.residuals[used]
+    given = block.image_xy[used], residuals / block.image_sd[used] / spread, result.redundancy[used]
+    statistics, probabilities = group_patterns(photos, count, *given)
+    tested = np.isfinite(statistics)
+    for photo in np.flatnonzero(probabilities < CHANCE / max(int(tested.sum()), 1)).tolist():
+        x, y = (factor * residuals[photos == photo].mean(axis=0)).tolist()
+        fields = {"x": x, "y": y, "unit": unit, "statistic": float(statistics[photo])}
+        values = {f"mean_x_{unit}": x, f"mean_y_{unit}": y, "statistic": fields["statistic"]}
+        name = block.photo_ids[photo]
+        note(section, "look", phrase("check.photo-pattern", photo=name, **fields), [name], values=values)
+    section.figure("photos tested for a pattern of their own", f"{int(tested.sum())} of {count}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from statistics import NormalDist
 
 import numpy as np
@@ -23,12 +22,6 @@ def mad_sd(values: Floats) -> float:
 def critical(tests: int, chance: float = 0.01) -> float:
     """Return the critical value of the largest of several normal values (Bonferroni)."""
     return NormalDist().inv_cdf(1 - chance / 2 / max(tests, 1))
-
-
-def normal_of_chi_square(value: float, freedom: int) -> float:
-    """Convert chi-square to a normal value (Wilson and Hilferty, 1931)."""
-    spread = 2 / (9 * freedom)
-    return float(((value / freedom) ** (1 / 3) - (1 - spread)) / math.sqrt(spread))
 
 
 def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:

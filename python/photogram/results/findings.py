@@ -19,6 +19,7 @@ from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.patterns import block_patterns
 from photogram.results.tests import Tests
+from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text, TypeFactor
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
@@ -60,7 +61,7 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=_type_factors(tests, result.given.image_unit) if rejected and result.KNOWN else [],
+        types=type_factors(tests, result.given.image_unit) if rejected and result.KNOWN else [],
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
@@ -75,7 +76,7 @@ def network_findings(
     )
 
 
-def _type_factors(tests: Tests, unit: str) -> list[TypeFactor]:
+def type_factors(tests: Tests, unit: str) -> list[TypeFactor]:
     """Return the sums of squares and redundancy numbers of all observed types.
 
     `unit` is the unit of image coordinates.
@@ -84,14 +85,15 @@ def _type_factors(tests: Tests, unit: str) -> list[TypeFactor]:
     for each in tests.normal:
         for kind, components in each.groups.items():
             observed = each.observed[:, components]
-            residuals, sd, redundancy = (
-                values[:, components][observed] for values in (each.residuals, each.sd, each.redundancy)
-            )
+            values = each.residuals, each.sd, each.redundancy, each.values
+            residuals, sd, redundancy, w = (own[:, components][observed] for own in values)
             if observed.any():
                 equal = each.type == "image" and np.ptp(sd) <= 1e-9 * sd[0]
                 given = float(sd[0]) if equal else math.nan
                 squares, r = float(np.sum((residuals / sd) ** 2)), float(np.nansum(redundancy))
-                found.append(TypeFactor(kind, squares, r, given, unit))
+                tested = np.abs(w[np.isfinite(w)])
+                median = float(np.median(tested)) / MEDIAN if tested.size else math.nan
+                found.append(TypeFactor(kind, squares, r, median, given, unit))
     return found
 
 

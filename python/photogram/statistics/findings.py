@@ -161,6 +161,7 @@ class TypeFactor:
     group: Text
     squares: float  # q and r: weighted sum of squares, and sum of redundancy numbers
     redundancy: float
+    median: float  # Factor of the standard deviations from the median test value
     sd: float  # The given standard deviation of images, with its unit; NaN if there are several
     unit: str
 
