@@ -65,6 +65,7 @@ class BlockBuilder:
         self.camera_rows: dict[Hashable, int] = {}
         self.photo_rows: dict[Hashable, int] = {}
         self.point_rows: dict[Hashable, int] = {}
+        self._photo_names, self._point_names = set[str](), set[str]()
         self.poses: dict[Hashable, tuple[Floats, Floats, str]] = {}
         self.crs: str | None = ""  # System of the coordinates of the frame; None: another
         self._poses: tuple[Floats, Floats] | None = None
@@ -97,7 +98,7 @@ class BlockBuilder:
     ) -> None:
         """Add a photo of a camera."""
         place, name = place or self.place, str(key) if name is None else name
-        _check_name("photo", name, place)
+        _check_name("photo", name, self._photo_names, place)
         if camera not in self.camera_rows:
             raise place.error(phrase("format.undefined", what="camera", name=str(camera)))
         _add(self.photo_rows, key, "photo", place)
@@ -139,7 +140,7 @@ class BlockBuilder:
     def point(self, key: Hashable, place: Failing | None = None, *, name: str | None = None) -> None:
         """Add a point."""
         place, name = place or self.place, str(key) if name is None else name
-        _check_name("point", name, place)
+        _check_name("point", name, self._point_names, place)
         _add(self.point_rows, key, "point", place)
         self.point_ids.append(name)
 
@@ -413,7 +414,8 @@ def _add(rows: dict[Hashable, int], key: Hashable, what: str, place: Failing) ->
     rows[key] = len(rows)
 
 
-def _check_name(what: str, name: str, place: Failing) -> None:
-    """Reject a name without printable characters."""
-    if not name.strip() or not name.isprintable():
+def _check_name(what: str, name: str, names: set[str], place: Failing) -> None:
+    """Reject a repeated name, or one without printable characters; add it to the others."""
+    if name in names or not name.strip() or not name.isprintable():
         raise place.error(phrase("format.name", what=what, name=name))
+    names.add(name)
