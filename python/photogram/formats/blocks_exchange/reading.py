@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +71,7 @@ class _Reader:
         """Name, position, id of its system, standard deviations of control, whether it is a check point."""
         self.images: list[tuple[int, int, float, float, bool]] = []
         """Photo id, point, x, y, and whether these are millimetres from the principal point."""
-        self.measured: list[Element] = []
+        self.in_millimetres: Element | None = None  # The first observation in millimetres
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -246,14 +246,17 @@ def _measurements(found: _Reader, element: Element) -> None:
     point = len(found.points) - 1
     for each in element.all("Measurement"):
         millimetres = each.child("xmm") is not None
-        x, y = (each.number(name) for name in (("xmm", "ymm") if millimetres else ("x", "y")))
-        found.images.append((each.whole("PhotoId"), point, x, y, millimetres))
-        found.measured.append(each)
+        across, down = ("xmm", "ymm") if millimetres else ("x", "y")
+        xy = each.number(across), each.number(down)
+        found.images.append((each.whole("PhotoId"), point, *xy, millimetres))
+        if millimetres and found.in_millimetres is None:
+            found.in_millimetres = each
 
 
 def _project(found: _Reader, srs: str) -> Project:
     block = found.block
 
+    @cache
     def system(own: str) -> str:
         """Return the definition of a system for PROJ; empty if it is local."""
         text = found.systems.get(own or srs, "").strip()
@@ -322,7 +325,8 @@ def _corner(found: _Reader, images: list[tuple[int, int, float, float, bool]], g
         if not own.any():
             continue
         if group.pixel is None:
-            raise found.measured[0].error(phrase("format.sensor-size"))
+            assert found.in_millimetres is not None
+            raise found.in_millimetres.error(phrase("format.sensor-size"))
         right, up = (xy[own] @ group.axes[:2, :2] / group.pixel).T
         values = group.camera.parameters
         cx, cy = values["cx"], values["cy"]
