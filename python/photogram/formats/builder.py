@@ -114,11 +114,16 @@ class BlockBuilder:
         self.poses[key] = centre, matrix, crs
 
     def photos(
-        self, names: Sequence[str], cameras: Sequence[int] | Indices, centres: Floats, matrices: Floats
+        self,
+        names: Sequence[str],
+        cameras: Sequence[int] | Indices,
+        centres: Floats | None = None,
+        matrices: Floats | None = None,
     ) -> None:
         """Set all photos: their cameras as rows, and their poses as :meth:`pose`."""
         self.photo_ids, self.photo_cameras = list(names), np.asarray(cameras).tolist()
-        self._poses = centres, matrices
+        if centres is not None and matrices is not None:
+            self._poses = centres, matrices
 
     def rigs(self, frames: Sequence[FrameOf], cameras: Mapping[str, int] | None = None) -> None:
         """Mount photos on frames, after :meth:`photos`; photos without images represent missing frames.
