@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -47,11 +47,9 @@ class BlockBuilder:
     transformed into `frame` at the end.
     """
 
-    def __init__(
-        self, path: Path, title: str, frame: Frame | None = None, messages: Iterable[Message] = ()
-    ) -> None:
-        self.path, self.place, self.title, self.frame = path, Place(path), title, frame or Frame()
-        self.messages, self.lacks = list(messages), list[Phrase]()
+    def __init__(self, path: Path, title: str) -> None:
+        self.path, self.place, self.title, self.frame = path, Place(path), title, Frame()
+        self.messages, self.lacks = list[Message](), list[Phrase]()
         self.observations: list[Observation] = []
         self.mounts: list[Mount] = []
         self.cameras: list[Camera] = []
@@ -69,7 +67,7 @@ class BlockBuilder:
         self.poses: dict[Hashable, tuple[Floats, Floats, str]] = {}
         self.crs: str | None = ""  # System of the coordinates of the frame; None: another
         self._poses: tuple[Floats, Floats] | None = None
-        self._points: dict[str, Floats | None] = {}
+        self._points: dict[str, Any] = {}
         self._starts: dict[Hashable, _Located] = {}
         self._control: dict[Hashable, _Located] = {}
         self._checks: dict[Hashable, _Located] = {}
@@ -141,6 +139,11 @@ class BlockBuilder:
             np.vstack([centres, *(each.centre[np.newaxis] for each in stands)]),
             np.concatenate([matrices, *(each.matrix[np.newaxis] for each in stands)]),
         )
+        free = np.full((len(stands), 3), np.inf)
+        if np.ndim(self.position_sd):
+            self.position_sd = np.vstack([self.position_sd, free])
+        if np.ndim(self.attitude_sd):
+            self.attitude_sd = np.vstack([self.attitude_sd, free])
 
     def point(self, key: Hashable, place: Failing | None = None, *, name: str | None = None) -> None:
         """Add a point."""
@@ -326,9 +329,13 @@ class BlockBuilder:
         for key in (*self._control, *self._checks):
             if key not in self.point_rows:
                 self.point(key)
-        count, rows = len(self.point_ids), self.point_rows
-        starts, positions, check_sd = np.full((3, count, 3), np.nan)
-        sd = np.full((count, 3), np.inf)
+        fields, rows = dict(self._points), self.point_rows
+        unknown = {"starts": np.nan, "point_positions": np.nan, "point_sd": np.inf}
+        unknown |= {"point_check_sd": np.nan} if self._checks else {}
+        for name, value in unknown.items():
+            if fields.get(name) is None:
+                fields[name] = np.full((len(self.point_ids), 3), value)
+        starts, positions, sd = fields.pop("starts"), fields["point_positions"], fields["point_sd"]
         for key, _, xyz, _ in self._located({key: self._starts[key] for key in self._starts if key in rows}):
             starts[rows[key]] = xyz
         for key, each, xyz, covariance in self._located(self._control):
@@ -343,14 +350,12 @@ class BlockBuilder:
                 raise each.place.error(phrase("error.covariance"))
             self.observations.append(Control(self.point_ids[row], xyz, covariance=covariance))
         for key, each, xyz, covariance in self._located(self._checks):
-            row, known = rows[key], each.sd > 0
+            row = rows[key]
             starts[row] = positions[row] = xyz
-            check_sd[row] = np.where(known, np.sqrt(np.diag(covariance)), np.nan)
-        fields = {"point_positions": positions, "point_sd": sd, "point_check_sd": check_sd}
-        fields |= {name: value for name, value in self._points.items() if value is not None}
-        if np.isnan(fields["point_check_sd"]).all():
+            fields["point_check_sd"][row] = np.where(each.sd > 0, np.sqrt(np.diag(covariance)), np.nan)
+        if (check_sd := fields.get("point_check_sd")) is not None and np.isnan(check_sd).all():
             del fields["point_check_sd"]
-        return fields.pop("starts", starts), fields
+        return starts, fields
 
     def _add_gnss(self) -> None:
         """Add observed positions of photos; omit positions that cannot be transformed."""

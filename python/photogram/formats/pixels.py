@@ -83,7 +83,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     for own in zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True):
         block.camera(*own)
     photos, points = table.names("photo"), table.names("point")
-    which = _cameras_of(table, list(block.camera_rows))
+    which = _cameras_of(table, [each.name for each in block.cameras])
     of_photo = np.zeros(len(photos.names), dtype=np.int64)
     of_photo[photos.rows] = which
     other = np.flatnonzero(of_photo[photos.rows] != which)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Hashable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +86,7 @@ def _camera(camera: Camera) -> HouseCamera:
         return HouseCamera(model, values, name=str(camera.number), unit="px")
 
 
-def _check_model(model: Model, cameras: Container[int]) -> None:
+def _check_model(model: Model, cameras: Container[Hashable]) -> None:
     """Reject invalid names, cameras and numbers."""
     images, points = model.images, model.points
     for name, camera, place in zip(images.names, images.cameras.tolist(), images.places, strict=True):

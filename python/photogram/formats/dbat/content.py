@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -89,7 +88,7 @@ class DbatBuilder(BlockBuilder):
         self.sensors: dict[str, Sensor] = {}
         self.paths: list[str] = []  # Files of photos
         # Standard deviations of columns and rows of each image observation; NaN without
-        self.image_sd: list[ArrayLike] = []
+        self.image_sd: list[Floats] = []
         # Photos with fixed poses, and free parameters of cameras
         self.held: set[int] = set()
         self.free: set[str] = set()
@@ -110,7 +109,7 @@ class DbatBuilder(BlockBuilder):
         if number not in self.photo_rows:
             raise place.error(phrase("format.undefined", what="photo", name=str(number)))
 
-    def pixel(self, photo: int, point: int, xy: Floats, sd: ArrayLike) -> None:
+    def pixel(self, photo: int, point: int, xy: Floats, sd: Floats) -> None:
         """Add an image observation: column and row from the corner."""
         self.image(photo, point, *xy.tolist())
         self.image_sd.append(sd)
@@ -122,7 +121,7 @@ class DbatBuilder(BlockBuilder):
         photos, points, pixels = self.image_rows()
         cameras, sensors = np.array(self.photo_cameras)[photos], list(self.sensors.values())
         side = np.array(self.pixel_mm, dtype=float)[cameras, np.newaxis]
-        sd = side * np.broadcast_to(wishes.sd.get("images", self.image_sd), pixels.shape)
+        sd = side * np.broadcast_to(wishes.sd.get("images", np.array(self.image_sd)), pixels.shape)
         if (missing := np.isnan(sd)).any():
             sd = np.where(missing, side, sd)
             fields = {"number": 1.0, "unit": "pixel", "option": option_sd("images")}

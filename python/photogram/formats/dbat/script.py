@@ -350,7 +350,7 @@ def read_measurements(path: Path, wishes: Wishes) -> DbatBuilder:
     for photo in sorted({photo for (_, photo), _ in images}):
         content.numbered_photo(photo, str(photo), camera, content.place)
     for (point, photo), xy in images:
-        content.pixel(photo, point, np.array(xy), (np.nan, np.nan))
+        content.pixel(photo, point, np.array(xy), np.full(2, np.nan))
     beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
     if path.name.endswith(MEASURED) and beside.is_file():
         for place, own in _cells(beside, "id,name,photos (used),", 6):
