@@ -16,6 +16,7 @@ from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
 from photogram.formats.reduced_coordinates import (
+    HOLDS,
     ReducedBuilder,
     ReducedImages,
     by_photo,
@@ -136,5 +137,6 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(IMAGES,),
+    holds=HOLDS,
     cannot_hold=cannot_hold,
 )

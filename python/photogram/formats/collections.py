@@ -19,7 +19,7 @@ from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format, Wishes
-from photogram.formats.models import complete_positions, losses
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.io.files import read_lines
@@ -121,11 +121,10 @@ def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) 
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that a collection cannot contain."""
+    """Return the parameters of cameras that a collection cannot contain."""
     cameras = zip(project.block.cameras, project.sizes, strict=True)
-    moved = ["moved-images"] if any(_reduced(camera, size) is None for camera, size in cameras) else []
-    kinds = ("names", "deviations", "frame", "shared-cameras", *moved, "control", "all-observations", "rigs")
-    return losses(project, *kinds)
+    moved = any(_reduced(camera, size) is None for camera, size in cameras)
+    return [phrase("lost.moved-images")] if moved else []
 
 
 def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | None:
@@ -207,6 +206,7 @@ BUNDLER = Format(
     read=_read_bundler,
     write=_write_bundler,
     files=(FILE, "*.out"),
+    holds=frozenset({"points", "lenses"}),
     cannot_hold=cannot_hold,
     pixels=True,
 )
@@ -217,6 +217,7 @@ BAL = Format(
     read=_read_bal,
     write=_write_bal,
     files=(PROBLEM, "problem-*.txt", "*.bal"),
+    holds=frozenset({"points", "lenses"}),
     cannot_hold=cannot_hold,
     pixels=True,
 )

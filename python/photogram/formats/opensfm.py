@@ -15,7 +15,7 @@ from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.models import complete_positions, losses
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.io.files import read_lines
@@ -231,9 +231,8 @@ VERSION = "OPENSFM_TRACKS_VERSION_v2"
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that the files cannot contain."""
-    control = "control-list" if _placed_frame(project) else "control"
-    return losses(project, "deviations", control, "observations-and-control", "gnss", "place", "rigs")
+    """Return the list of control, which is not part of the model."""
+    return [phrase("lost.control-list")] if _control(project) else []
 
 
 def write(project: Project) -> Mapping[str, bytes]:
@@ -373,6 +372,7 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(MODEL,),
+    holds=frozenset({"names", "points", "frame", "topocentric", "lenses", "shared-cameras", "gnss"}),
     cannot_hold=cannot_hold,
     pixels=True,
 )

@@ -24,6 +24,7 @@ from photogram.formats.images import is_rotation
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
 from photogram.formats.reduced_coordinates import (
+    HOLDS,
     ReducedBuilder,
     ReducedImages,
     by_photo,
@@ -174,5 +175,6 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(f"block{IMAGES}", f"*{IMAGES}"),
+    holds=HOLDS,
     cannot_hold=cannot_hold,
 )

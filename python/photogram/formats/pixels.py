@@ -14,7 +14,6 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.columns import PLAIN, in_units
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import by_camera, from_corner, to_corner
-from photogram.formats.models import losses
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
@@ -153,11 +152,6 @@ def write(project: Project) -> Mapping[str, bytes]:
     }
 
 
-def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that a table of pixels cannot contain."""
-    return losses(project, "all-but-images")
-
-
 FORMAT = Format(
     name="pixels",
     title=TITLE,
@@ -165,7 +159,7 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(FILE, "*.csv"),
-    cannot_hold=cannot_hold,
+    cannot_hold=lambda _: [phrase("lost.all-but-images")],
     pixels=True,
     geographic=True,
 )

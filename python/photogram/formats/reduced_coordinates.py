@@ -11,7 +11,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.models import complete_positions, losses
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
 from photogram.formats.self_check import agreement
@@ -26,6 +26,7 @@ BETTER = 3.0  # Smallest ratio of misfits for which rotations are transposed
 LEAST, MOST = 2.0, 3000.0  # Smallest and largest principal distance of cameras, millimetres
 NOMINAL = 100.0
 """Principal distance in millimetres for an unknown pixel size; it does not affect the rays."""
+HOLDS = frozenset({"names", "shared-cameras", "control"})
 SIDE = -0.02  # Largest u3 of unit directions that a perspective camera can image
 
 
@@ -157,9 +158,8 @@ def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
 
 
 def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[Phrase]:
-    """Return parts of a project that files of reduced coordinates cannot contain."""
-    found = losses(project, "deviations", "points", "frame", "lenses", "unposed", "correlations")
-    found += losses(project, "observations-and-gnss", "rigs")
+    """Return images and principal distances that files of reduced coordinates cannot contain."""
+    found = []
     if any(camera.unit == "px" for camera in known_cameras(project.block)[0]) and None in project.pixel_mm:
         found.append(phrase("lost.nominal-distance", distance=NOMINAL))
     if lost := len(project.block.image_xy) - len(reduced.rows):
