@@ -76,7 +76,7 @@ def test_a_table_of_markers_is_control(tmp_path):
         (
             'sensor_id="0" component_id="0" label="DJI_0001"',
             'sensor_id="9" label="DJI_0001"',
-            ["format.undefined what=sensor name=9"],
+            ["format.undefined what=camera name=9"],
         ),
         ("<document", "<documents", ["record"]),
     ],

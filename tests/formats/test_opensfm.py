@@ -73,7 +73,7 @@ def test_a_round_trip_keeps_all_but_deviations(tmp_path):
     for word in (
         "standard deviations",
         "the use of control",
-        "1 observations other than images and GNSS",
+        "1 observations other than images, GNSS",
         "the frame",
     ):
         assert word in lost

@@ -12,19 +12,18 @@ blanks, one record per line, `#` before comments; millimetres and radians.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import Card, cards, has_suffix, one_file
 from photogram.formats.format import Format, Wishes
-from photogram.formats.project import Project, Size, assembled
+from photogram.formats.project import Project
 from photogram.io.places import at_place
-from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
@@ -36,21 +35,13 @@ IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
 _NOT_ORIENTED = 1
 
 
-@dataclass
-class _Found:
-    """The contents of the files, by names of photos and points."""
+class _Reader:
+    """A block, with the photos and points that are inactive in the files."""
 
-    cameras: dict[str, Camera] = field(default_factory=dict)
-    sizes: dict[str, tuple[Size, float]] = field(default_factory=dict)
-    photos: dict[str, str] = field(default_factory=dict)
-    poses: dict[str, Floats] = field(default_factory=dict)
-    points: dict[str, Floats] = field(default_factory=dict)
-    held: dict[str, Floats] = field(default_factory=dict)
-    images: list[tuple[str, str]] = field(default_factory=list)
-    values: list[Floats] = field(default_factory=list)
-    bars: list[Distance] = field(default_factory=list)
-    left: dict[str, set[str]] = field(default_factory=lambda: {"photos": set(), "points": set()})
-    messages: list[Message] = field(default_factory=list)
+    def __init__(self, path: Path, control_sd: tuple[float, ...] | None) -> None:
+        self.block, self.control_sd = BlockBuilder(path, TITLE), control_sd
+        self.inactive: dict[str, set[str]] = {"photos": set(), "points": set()}
+        self.images: list[list[float]] = []  # Standard deviations
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -59,26 +50,35 @@ def read(path: Path, wishes: Wishes) -> Project:
     images = one_file(folder, IMAGES) if path.is_dir() else path
     if images is None:
         raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=folder)
-    beside = {
+    files = {
         suffix: each if (each := images.with_suffix(suffix)).is_file() else one_file(folder, suffix)
         for suffix in (CAMERAS, POSES, POINTS, BARS)
     }
-    if beside[CAMERAS] is None:
+    if files[CAMERAS] is None:
         raise InputError(phrase("format.files", name=f"*{CAMERAS}"), file=images)
-    found = _Found()
-    beside[IMAGES] = images
+    reader, files[IMAGES] = _Reader(images, wishes.sd.get("control")), images
     readers = {CAMERAS: _cameras, POSES: _poses, POINTS: _points, IMAGES: _images, BARS: _bars}
-    for suffix, reader in readers.items():
-        if (file := beside[suffix]) is not None:
-            reader(file, found)
-    return _project(images, found, wishes)
+    for suffix, take in readers.items():
+        if (file := files[suffix]) is not None:
+            take(file, reader)
+    block = reader.block
+    for kind, names in reader.inactive.items():
+        if names:
+            block.messages.append(Message(phrase("aicon.inactive", n=len(names), what=kind)))
+    photos, points, xy = block.image_rows()
+    sd = np.array(reader.images)
+    block.images(photos, points, xy, sd if (sd > 0).all() else None)
+    if not block.controls:
+        block.lacks.append(Phrase("read.free", {"option": Phrase("option.datum")}))
+    return block.project(linear_unit="mm")
 
 
 def _lines(path: Path) -> Iterator[Card]:
     return (each for each in cards(path) if each.words)
 
 
-def _cameras(path: Path, found: _Found) -> None:
+def _cameras(path: Path, reader: _Reader) -> None:
+    block = reader.block
     lines = _lines(path)
     for head in lines:
         name = head.words[0]
@@ -91,83 +91,71 @@ def _cameras(path: Path, found: _Found) -> None:
             values |= zip(names.split(), card.numbers(0, names).tolist(), strict=True)
         width, height, columns, rows = (values.pop(each) for each in names.split())
         size = int(columns), int(rows)
-        if name in found.cameras or min(*size, width, height) <= 0 or size != (columns, rows):
+        if min(*size, width, height) <= 0 or size != (columns, rows):
             sides = {"width": width, "height": height, "columns": columns, "rows": rows}
             raise head.place.error(phrase("aicon.camera", name=name, **sides))
         with at_place(head.place):
-            found.cameras[name] = Camera("brown_forward", values, name=f"camera {name}")
-        found.sizes[name] = size, width / columns
-        found.messages.append(
-            Message(phrase("aicon.principal-distance", camera=name, value=c, distance=abs(c)), path)
-        )
-    if not found.cameras:
+            camera = Camera("brown_forward", values, name=f"camera {name}")
+        block.camera(camera, size, width / columns, key=name, place=head.place)
+        remark = phrase("aicon.principal-distance", camera=name, value=c, distance=abs(c))
+        block.messages.append(Message(remark, path))
+    if not block.cameras:
         raise InputError(phrase("format.missing", what="a camera"), file=path)
 
 
-def _once(card: Card, names: Collection[str], what: str) -> str:
-    """Return the first word of a line, a name that must be unique."""
-    name = card.words[0]
-    if name in names:
-        raise card.place.error(phrase("format.repeated", what=what, name=name))
-    return name
-
-
-def _poses(path: Path, found: _Found) -> None:
+def _poses(path: Path, reader: _Reader) -> None:
     for card in _lines(path):
-        name = _once(card, found.photos, "photo")
+        name = card.words[0]
         order, active, state = card.numbers(8, "order active state").tolist()
         if not active:
-            found.left["photos"].add(name)
+            reader.inactive["photos"].add(name)
             continue
-        camera = card.words[1]
-        if camera not in found.cameras:
-            raise card.place.error(phrase("format.undefined", what="camera", name=camera))
-        found.photos[name] = camera
+        reader.block.photo(name, card.words[1], card.place)
         if state == _NOT_ORIENTED:
             continue
         if order != 0:
             raise card.place.error(phrase("aicon.order", order=order))
-        found.poses[name] = card.numbers(2, "X Y Z omega phi kappa")
+        pose = card.numbers(2, "X Y Z omega phi kappa")
+        reader.block.pose(name, pose[:3], Attitudes.of("omega_phi_kappa", [pose[3:]]).matrices[0])
 
 
-def _points(path: Path, found: _Found) -> None:
+def _points(path: Path, reader: _Reader) -> None:
     for card in _lines(path):
-        name = _once(card, found.points, "point")
+        name = card.words[0]
         if len(card.words) >= 9 and not card.number(8, "active"):
-            found.left["points"].add(name)
+            reader.inactive["points"].add(name)
             continue
-        found.points[name] = card.numbers(1, "X Y Z")
+        xyz = card.numbers(1, "X Y Z")
+        reader.block.start(name, xyz, card.place)
         if len(card.words) >= 10 and not card.number(9, "new"):
-            found.held[name] = card.numbers(4, "sX sY sZ")
-            if (found.held[name] < 0).any():
+            sd = card.numbers(4, "sX sY sZ")
+            if (sd < 0).any():
                 raise card.place.error(phrase("format.negative"))
+            reader.block.control(name, xyz, reader.control_sd or sd, card.place)
 
 
-def _images(path: Path, found: _Found) -> None:
-    lost = 0
-    only = next(iter(found.cameras)) if len(found.cameras) == 1 else None
+def _images(path: Path, reader: _Reader) -> None:
+    lost, block, only = 0, reader.block, list(reader.block.camera_rows)
     for card in _lines(path):
-        values = card.numbers(2, "x y sx sy")
+        x, y, *sd = card.numbers(2, "x y sx sy").tolist()
         active = len(card.words) < 10 or card.number(9, "active") > 0
         photo, point = card.words[0], card.words[1]
-        if not active or photo in found.left["photos"] or point in found.left["points"]:
+        if not active or photo in reader.inactive["photos"] or point in reader.inactive["points"]:
             lost += 1
             continue
-        if photo not in found.photos:
-            if only is None:
+        if photo not in block.photo_rows:
+            if len(only) > 1:
                 raise card.place.error(phrase("format.no-camera", photo=photo))
-            found.photos[photo] = only
-        found.images.append((photo, point))
-        values[2:] = np.where(values[2:] > 0, values[2:], np.nan)
-        found.values.append(values)
-    if not found.images:
+            block.photo(photo, only[0], card.place)
+        block.image(photo, point, x, y)
+        reader.images.append(sd)
+    if not reader.images:
         raise InputError(phrase("format.missing", what="active image observations"), file=path)
     if lost:
-        found.messages.append(Message(phrase("aicon.inactive", n=lost, what="image observations"), path))
+        block.messages.append(Message(phrase("aicon.inactive", n=lost, what="image observations"), path))
 
 
-def _bars(path: Path, found: _Found) -> None:
-    seen = {point for _, point in found.images}
+def _bars(path: Path, reader: _Reader) -> None:
     for card in _lines(path):
         # Names of bars may contain blanks: the columns follow the last quotation mark.
         own = Card(card.place)
@@ -176,56 +164,12 @@ def _bars(path: Path, found: _Found) -> None:
         if len(own.words) > 4 and not own.number(4, "active"):
             continue
         first, second = own.words[:2]
-        if not {first, second} <= seen:
-            found.messages.append(Message(phrase("aicon.bar", first=first, second=second), path))
+        if not {first, second} <= reader.block.point_rows.keys():
+            reader.block.messages.append(Message(phrase("aicon.bar", first=first, second=second), path))
             continue
         if not (length > 0 and sd > 0) or first == second:
             raise card.place.error(phrase("aicon.length"))
-        found.bars.append(Distance(first, second, length, sd))
-
-
-def _project(path: Path, found: _Found, wishes: Wishes) -> Project:
-    photos, order = list(found.photos), {name: row for row, name in enumerate(found.cameras)}
-    points = list(dict.fromkeys([*(point for _, point in found.images), *found.held]))
-    rows, places = ({name: row for row, name in enumerate(each)} for each in (photos, points))
-    none = np.full(6, np.nan)
-    poses = np.array([found.poses.get(name, none) for name in photos])
-    matrices = np.full((len(photos), 3, 3), np.nan)
-    posed = np.isfinite(poses).all(axis=1)
-    if posed.any():
-        matrices[posed] = Attitudes.of("omega_phi_kappa", poses[posed, 3:]).matrices
-    starts = np.array([found.points.get(name, none[:3]) for name in points])
-    held = np.array([name in found.held for name in points])[:, np.newaxis]
-    sd = np.array([found.held.get(name, np.full(3, np.inf)) for name in points])
-    if held.any() and "control" in wishes.sd:
-        sd = np.where(held, wishes.sd["control"], np.inf)
-    values = np.array(found.values)
-    for kind, names in found.left.items():
-        if names:
-            found.messages.append(Message(phrase("aicon.inactive", n=len(names), what=kind)))
-    return assembled(
-        path=path,
-        title=TITLE,
-        cameras=list(found.cameras.values()),
-        sizes=[size for size, _ in found.sizes.values()],
-        pixel_mm=[pixel for _, pixel in found.sizes.values()],
-        photo_ids=photos,
-        photo_cameras=[order[camera] for camera in found.photos.values()],
-        centres=poses[:, :3],
-        matrices=matrices,
-        point_ids=points,
-        starts=starts,
-        point_positions=np.where(held, starts, np.nan),
-        point_sd=sd,
-        image_photos=np.array([rows[photo] for photo, _ in found.images], dtype=np.int64),
-        image_points=np.array([places[point] for _, point in found.images], dtype=np.int64),
-        image_xy=values[:, :2],
-        image_sd=values[:, 2:] if np.isfinite(values[:, 2:]).all() else None,
-        observations=found.bars,
-        lacks=[] if held.any() else [Phrase("read.free", {"option": Phrase("option.datum")})],
-        messages=found.messages,
-        linear_unit="mm",
-    )
+        reader.block.observations.append(Distance(first, second, length, sd))
 
 
 FORMAT = Format(name="aicon", title=TITLE, recognises=partial(has_suffix, IMAGES), read=read)

@@ -16,17 +16,15 @@ from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
 from photogram.formats.reduced_coordinates import (
-    Reduced,
+    HOLDS,
+    ReducedBuilder,
     ReducedImages,
     by_photo,
     given_control,
     lost_of_reduced,
-    project_of,
     reduced_images,
-    with_fitting_rotations,
 )
 from photogram.io.csv_text import csv_text
-from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, phrase
 
@@ -43,36 +41,25 @@ def read(path: Path, wishes: Wishes) -> Project:
         raise InputError(phrase("format.cameras"), file=images)
     given = read_cameras(Tables(Settings(images, tables={"cameras": table}, image="mm"), []))
     known = {each.name: each for each in given.cameras}
-    found = Reduced(cameras=known)
+    block = ReducedBuilder(images, TITLE, wishes.sd)
     photo: str | None = None
     for card in cards(images):
         if not card.words or card.ends:
             photo = None
         elif photo is None:
             photo, camera = card.words[0], card.words[1] if len(card.words) > 1 else ""
-            if photo in found.photos:
-                raise card.place.error(phrase("format.repeated", what="photo", name=photo))
-            if camera not in known:
-                raise card.place.error(phrase("format.undefined", what="camera", name=camera))
-            found.photos[photo] = camera
+            if camera in known and camera not in block.camera_rows:
+                block.camera(known[camera])
+            block.photo(photo, camera, card.place)
         else:
             x, y = card.numbers(1, "x y").tolist()
-            found.images.append((photo, card.words[0], x, y))
-    if not found.images:
-        raise InputError(phrase("format.missing", what="image observations"), file=images)
-    used = set(found.photos.values())
-    found.cameras = {name: each for name, each in known.items() if name in used}
+            block.image(photo, card.words[0], x, y)
     if (folder / ORIENTATION).is_file():
-        _orientation(folder / ORIENTATION, found, wishes)
-    first = found.images[0]
-    message = Message(
-        phrase("format.first-record", unit="mm", point=first[1], photo=first[0], x=first[2], y=first[3]),
-        images,
-    )
-    return with_fitting_rotations(project_of(found, images, TITLE, wishes, [message]))
+        _orientation(folder / ORIENTATION, block, wishes)
+    return block.reduced_project("mm")
 
 
-def _orientation(path: Path, found: Reduced, wishes: Wishes) -> None:
+def _orientation(path: Path, block: ReducedBuilder, wishes: Wishes) -> None:
     unit = angle_unit(wishes.angles, "gon", path)
     for card in cards(path):
         if not card.words or card.ends:
@@ -83,13 +70,11 @@ def _orientation(path: Path, found: Reduced, wishes: Wishes) -> None:
             )
         if len(card.words) < 9:
             raise card.place.error(phrase("format.member", name="photo, camera, X, Y, Z, omega, phi, kappa"))
-        photo = card.words[1]
-        if photo in found.poses:
-            raise card.place.error(phrase("format.repeated", what="photo", name=photo))
         angles = to_radians(card.numbers(6, "omega phi kappa"), unit)
         if abs(angles).max() > 1e4:
             raise card.place.error(phrase("format.angles"))
-        found.poses[photo] = card.numbers(3, "X Y Z"), Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
+        matrix = Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
+        block.pose(card.words[1], card.numbers(3, "X Y Z"), matrix, card.place)
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
@@ -152,5 +137,6 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(IMAGES,),
+    holds=HOLDS,
     cannot_hold=cannot_hold,
 )

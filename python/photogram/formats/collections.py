@@ -17,10 +17,11 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format, Wishes
-from photogram.formats.models import complete_positions, losses
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
-from photogram.formats.project import Project, Size, assembled
+from photogram.formats.project import Project, Size
 from photogram.io.files import read_lines
 from photogram.io.packed_numbers import pieces
 from photogram.messages import Message
@@ -99,43 +100,31 @@ def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) 
     """Return the project of a collection without unregistered photos (f is 0)."""
     registered = found.photo_parameters[:, 6] != 0
     rows = np.flatnonzero(registered)
-    remarks = []
+    block = BlockBuilder(path, title)
     if len(rows) < len(registered):
         lost = [names[row] for row in np.flatnonzero(~registered).tolist()]
-        remarks.append(Message(phrase("format.unposed", n=len(lost), names=lost)))
+        block.messages.append(Message(phrase("format.unposed", n=len(lost), names=lost)))
     parameters = found.photo_parameters[rows]
     to_photo = _photocore.vector_rotations(np.ascontiguousarray(parameters[:, :3]))
     places = np.full(len(registered), -1, dtype=np.int64)
     places[rows] = np.arange(len(rows))
-    remarks.append(Message(phrase("bundler.cameras")))
-    return assembled(
-        path=path,
-        title=title,
-        cameras=[
-            Camera("bal", {"f": f, "k1": k1, "k2": k2}, name=names[row])
-            for row, (f, k1, k2) in zip(rows.tolist(), parameters[:, 6:].tolist(), strict=True)
-        ],
-        sizes=[None] * len(rows),
-        photo_ids=[names[row] for row in rows.tolist()],
-        photo_cameras=np.arange(len(rows)),
-        centres=-np.einsum("nji,nj->ni", to_photo, parameters[:, 3:6]),
-        matrices=to_photo.transpose(0, 2, 1),
-        point_ids=[str(row) for row in range(len(found.point_positions))],
-        starts=np.array(found.point_positions),
-        image_photos=places[found.image_photos],
-        image_points=found.image_points,
-        image_xy=np.array(found.image_xy),
-        lacks=[Phrase("read.placeless", {"option": Phrase("option.control")})],
-        messages=remarks,
-    )
+    block.messages.append(Message(phrase("bundler.cameras")))
+    names = [names[row] for row in rows.tolist()]
+    for name, (f, k1, k2) in zip(names, parameters[:, 6:].tolist(), strict=True):
+        block.camera(Camera("bal", {"f": f, "k1": k1, "k2": k2}, name=name))
+    centres = -np.einsum("nji,nj->ni", to_photo, parameters[:, 3:6])
+    block.photos(names, np.arange(len(rows)), centres, to_photo.transpose(0, 2, 1))
+    block.points(list(map(str, range(len(found.point_positions)))), np.array(found.point_positions))
+    block.images(places[found.image_photos], found.image_points, np.array(found.image_xy))
+    block.lacks.append(Phrase("read.placeless", {"option": Phrase("option.control")}))
+    return block.project()
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that a collection cannot contain."""
+    """Return the parameters of cameras that a collection cannot contain."""
     cameras = zip(project.block.cameras, project.sizes, strict=True)
-    moved = ["moved-images"] if any(_reduced(camera, size) is None for camera, size in cameras) else []
-    kinds = ("names", "deviations", "frame", "shared-cameras", *moved, "control", "all-observations", "rigs")
-    return losses(project, *kinds)
+    moved = any(_reduced(camera, size) is None for camera, size in cameras)
+    return [phrase("lost.moved-images")] if moved else []
 
 
 def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | None:
@@ -217,6 +206,7 @@ BUNDLER = Format(
     read=_read_bundler,
     write=_write_bundler,
     files=(FILE, "*.out"),
+    holds=frozenset({"points", "lenses"}),
     cannot_hold=cannot_hold,
     pixels=True,
 )
@@ -227,6 +217,7 @@ BAL = Format(
     read=_read_bal,
     write=_write_bal,
     files=(PROBLEM, "problem-*.txt", "*.bal"),
+    holds=frozenset({"points", "lenses"}),
     cannot_hold=cannot_hold,
     pixels=True,
 )

@@ -137,7 +137,7 @@ class Format:
         Function that returns the files of a project by name relative to a directory; None if the format is
         read-only.
     cannot_hold
-        Function that returns the parts of a project that the format cannot contain.
+        Function that returns further parts of a project that the format cannot contain.
     results
         Function that returns files with adjustment results for the directory of an adjusted project; None:
         none.
@@ -153,6 +153,11 @@ class Format:
     adjusting
         Function that converts a call that adjusts a block once, with options by name, to a call that adjusts
         a project as its format requires; None: the block is adjusted once.
+    holds
+        Capabilities: `names` of points, standard `deviations`, positions of `points`, the `frame` (only if
+        it is `topocentric`), `lenses`, `shared-cameras`, `unknowns` of cameras, `control`, `gnss`, `rigs`,
+        `boards`, and `unposed` photos. Other parts of projects are listed as lost; None: all parts are
+        contained.
     """
 
     name: str
@@ -167,3 +172,4 @@ class Format:
     pixels: bool = False
     geographic: bool = False
     adjusting: Callable[[Project, Callable[..., Result]], Callable[..., Result]] | None = None
+    holds: frozenset[str] | None = None

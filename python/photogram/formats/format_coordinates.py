@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.models import intersected, losses
+from photogram.formats.models import intersected
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.network.attitudes import Attitudes
@@ -190,8 +190,12 @@ def topocentric_remarks(project: Project) -> list[Phrase | str]:
     longitude, latitude = np.degrees(origin[0, :2])
     place = {"latitude": float(latitude), "longitude": float(longitude)}
     ellipsoid = {"a": block.spheroid.a, "b": block.spheroid.b}
-    found = [phrase("lost.geographic", unit=block.linear_unit, **place, **ellipsoid, angle=angle)]
-    return [*found, *losses(project, "all-observations")]
+    found: list[Phrase | str] = [
+        phrase("lost.geographic", unit=block.linear_unit, **place, **ellipsoid, angle=angle)
+    ]
+    if n := len(block.observations):
+        found.append(phrase("lost.observations", n=n, names=["images"]))
+    return found
 
 
 def _origin(block: Block) -> Floats:

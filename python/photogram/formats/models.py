@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.block_contents import posed
+from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.directions import image_directions
 from photogram.network.motion import on_shared
-from photogram.network.observations import Control, Observation, Position
+from photogram.network.observations import Control, Position
 from photogram.network.subset import kept_images
 from photogram.words import Phrase, phrase
 
@@ -89,43 +89,44 @@ def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, me
 Count = Callable[[Project], int | np.integer | bool]
 
 
-def _other_than(*kinds: type[Observation]) -> Count:
-    return lambda project: sum(not isinstance(each, kinds) for each in project.block.observations)
-
-
-def _kind(kind: type[Observation]) -> Count:
-    return lambda project: sum(isinstance(each, kind) for each in project.block.observations)
-
-
-_COUNTS: Mapping[str, Count] = {
-    "control": lambda project: _held(project) + len(project.checks),
-    "control-list": lambda project: _held(project) + len(project.checks),
-    "correlations": _kind(Control),
-    "gnss": _kind(Position),
-    "all-observations": _other_than(),
-    "observations": _other_than(Control, Position),
-    "observations-and-gnss": _other_than(Control),
-    "observations-and-control": _other_than(Position),
-    "rigs": lambda project: len(project.block.mounts),
-    "boards": lambda project: len(project.block.passages),
-    "unposed": lambda project: np.count_nonzero(~posed(project.block)),
-    "unplaced": lambda project: np.count_nonzero(~np.isfinite(complete_positions(project)).all(axis=1)),
-    "unknowns": lambda project: any(each.deviations.any() for each in known_cameras(project.block)[0]),
-    "lenses": lambda project: any(each.model != "perspective" for each in known_cameras(project.block)[0]),
-    "place": lambda project: project.frame.kind != "topocentric",
-    "features": lambda project: len(project.features),
-    "trajectories": lambda project: len(project.block.timed),
-    "moments": lambda project: sum(each.moment is not None for each in project.block.observations),
-}
-"""Functions that count parts of a project by type; other types apply to every project."""
-
-
 def _held(project: Project) -> int:
     return int(np.count_nonzero(np.isfinite(project.block.point_sd).any(axis=1)))
 
 
-def losses(project: Project, *kinds: str) -> list[Phrase]:
-    """Return the types of parts of a project, with counts."""
-    counts = {kind: int(_COUNTS[kind](project)) if kind in _COUNTS else 1 for kind in kinds}
+def _always(project: Project) -> bool:
+    del project
+    return True
+
+
+_ABSENT: Mapping[str, Count] = {
+    "names": _always,
+    "deviations": _always,
+    "points": _always,
+    "frame": _always,
+    "lenses": lambda project: any(each.model != "perspective" for each in known_cameras(project.block)[0]),
+    "shared-cameras": _always,
+    "unknowns": lambda project: any(each.deviations.any() for each in known_cameras(project.block)[0]),
+    "control": lambda project: _held(project) + len(project.checks),
+    "rigs": lambda project: len(project.block.mounts),
+    "boards": lambda project: len(project.block.passages),
+    "unposed": lambda project: np.count_nonzero(~posed(project.block)),
+}
+"""Functions that count the parts of a project that formats without a capability cannot contain."""
+_PARTIAL: Mapping[str, tuple[str, Count]] = {
+    "place": ("topocentric", lambda project: project.frame.kind != "topocentric"),
+    "correlations": ("control", lambda project: len(correlated_control(project.block))),
+    "gnss": ("gnss", lambda project: any(isinstance(each, Position) for each in project.block.observations)),
+}
+"""Capabilities with parts that no format with them can contain, and functions that count these parts."""
+
+
+def lost(project: Project, holds: Collection[str]) -> list[Phrase]:
+    """Return the parts of a project that a format with these capabilities cannot contain."""
+    counts = {part: count(project) for part, count in _ABSENT.items() if part not in holds}
+    counts |= {part: count(project) for part, (whole, count) in _PARTIAL.items() if whole in holds}
+    kinds = {name: kind for name, kind in (("control", Control), ("GNSS", Position)) if name.lower() in holds}
+    others = [each for each in project.block.observations if not isinstance(each, tuple(kinds.values()))]
+    counts["observations"] = len(others)
     fields = {"frame": project.frame.phrase, "held": _held(project), "checks": len(project.checks)}
-    return [phrase(f"lost.{kind}", n=count, **fields) for kind, count in counts.items() if count]
+    fields["names"] = ["images", *kinds]
+    return [phrase(f"lost.{part}", n=int(count), **fields) for part, count in counts.items() if count]

@@ -12,11 +12,12 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.block_contents import correlated_control, posed
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.models import complete_positions, losses
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
-from photogram.formats.project import Frame, Project, Size, assembled
+from photogram.formats.project import Frame, Project, Size
 from photogram.io.files import read_lines
 from photogram.io.json import Tree, read_json, to_json, unknown
 from photogram.io.numbers import finite_number
@@ -48,47 +49,36 @@ def read(path: Path, wishes: Wishes) -> Project:
     folder = place_of(path)
     if folder is None:
         raise InputError(phrase("format.files", name=MODEL), file=path)
-    messages: list[Message] = []
+    block = BlockBuilder(folder / MODEL, TITLE)
+    messages = block.messages
     model = _model(read_json(folder / MODEL), wishes.model, messages)
-    cameras, sizes = _cameras(model["cameras"])
-    camera_rows = {each.name: row for row, each in enumerate(cameras)}
+    block.frame = _frame(model)
+    for name, each in model["cameras"].items():
+        size = each["width"].whole(1), each["height"].whole(1)
+        with at_place(each):
+            block.camera(_camera(name, each, *size), size)
     shots = dict(model["shots"].items())
-    names = list(shots)
-    for name, shot in shots.items():
-        if not name.strip() or not name.isprintable():
-            raise shot.error(phrase("format.name", what="shot", name=name))
-        if shot["camera"].text() not in camera_rows:
-            raise shot["camera"].error(phrase("format.undefined", what="camera", name=shot["camera"].text()))
-    of_photo = np.array([camera_rows[shot["camera"].value] for shot in shots.values()], dtype=np.int64)
     rotations, translations = _poses(shots)
+    centres = -np.einsum("nji,nj->ni", rotations, translations)
+    for (name, shot), centre, rotation in zip(shots.items(), centres, rotations, strict=True):
+        block.photo(name, shot["camera"].text(), shot["camera"])
+        block.pose(name, centre, (Y_DOWN @ rotation).T)
     points = dict(model.get("points", {}).items())
-    there = (folder / TRACKS).is_file()
-    photos, tracks, xy = _tracks(folder / TRACKS, names, list(points), messages) if there else _NO_TRACKS
+    starts = np.array([each["coordinates"].numbers(3) for each in points.values()]).reshape(-1, 3)
+    block.points(list(points), starts)
+    if (folder / TRACKS).is_file():
+        photos, tracks, xy = _tracks(folder / TRACKS, list(shots), list(points), messages)
+    else:
+        photos, tracks, xy = _NO_TRACKS
+        block.lacks.append(Phrase("read.tracks", {"file": TRACKS, "option": Phrase("option.images")}))
+    sizes = np.array(block.sizes, dtype=float)[np.array(block.photo_cameras)[photos]]
+    block.images(photos, tracks, sizes / 2 + sizes.max(axis=1, keepdims=True) * xy)
+    block.observations += _gps(shots, wishes, messages)
+    messages += _beside(folder)
     colours = {
         name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)] for name, each in points.items()
     }
-    scales = np.array([max(size) for size in sizes], dtype=float)[of_photo[photos]]
-    middles = np.array(sizes, dtype=float)[of_photo[photos]] / 2
-    return assembled(
-        path=folder / MODEL,
-        title=TITLE,
-        cameras=cameras,
-        sizes=list[Size | None](sizes),
-        photo_ids=names,
-        photo_cameras=of_photo,
-        centres=-np.einsum("nji,nj->ni", rotations, translations),
-        matrices=(Y_DOWN @ rotations).transpose(0, 2, 1),
-        point_ids=list(points),
-        starts=np.array([each["coordinates"].numbers(3) for each in points.values()]).reshape(-1, 3),
-        image_photos=photos,
-        image_points=tracks,
-        image_xy=middles + scales[:, np.newaxis] * xy,
-        observations=_gps(shots, wishes, messages),
-        frame=_frame(model),
-        lacks=[] if there else [Phrase("read.tracks", {"file": TRACKS, "option": Phrase("option.images")})],
-        messages=[*messages, *_beside(folder)],
-        details={"colours": colours},
-    ).replace(tracks=frozenset(points))
+    return block.project(details={"colours": colours}).replace(tracks=frozenset(points))
 
 
 def _model(document: Tree, wanted: int | None, messages: list[Message]) -> Tree:
@@ -113,16 +103,6 @@ def _model(document: Tree, wanted: int | None, messages: list[Message]) -> Tree:
     if not sizes[chosen]:
         raise models[chosen].error(phrase("format.missing", what="shots"))
     return models[chosen]
-
-
-def _cameras(cameras: Tree) -> tuple[list[Camera], list[Size]]:
-    found, sizes = [], []
-    for name, each in cameras.items():
-        width, height = each["width"].whole(1), each["height"].whole(1)
-        with at_place(each):
-            found.append(_camera(name, each, width, height))
-        sizes.append((width, height))
-    return found, sizes
 
 
 def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
@@ -251,9 +231,8 @@ VERSION = "OPENSFM_TRACKS_VERSION_v2"
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that the files cannot contain."""
-    control = "control-list" if _placed_frame(project) else "control"
-    return losses(project, "deviations", control, "observations-and-control", "gnss", "place", "rigs")
+    """Return the list of control, which is not part of the model."""
+    return [phrase("lost.control-list")] if _control(project) else []
 
 
 def write(project: Project) -> Mapping[str, bytes]:
@@ -393,6 +372,7 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(MODEL,),
+    holds=frozenset({"names", "points", "frame", "topocentric", "lenses", "shared-cameras", "gnss"}),
     cannot_hold=cannot_hold,
     pixels=True,
 )

@@ -24,18 +24,16 @@ from photogram.formats.images import is_rotation
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
 from photogram.formats.reduced_coordinates import (
-    Reduced,
+    HOLDS,
+    ReducedBuilder,
     ReducedImages,
     by_photo,
     given_control,
     lost_of_reduced,
-    project_of,
     reduced_images,
-    with_fitting_rotations,
 )
 from photogram.io.csv_text import csv_text
 from photogram.io.numbers import scaled
-from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, phrase
 
@@ -52,25 +50,16 @@ def read(path: Path, wishes: Wishes) -> Project:
     if images is None:
         raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
     names = names_beside(folder / NAMES)
-    found, messages = Reduced(), []
-    _images(images, names, found)
-    if not found.images:
-        raise InputError(phrase("format.missing", what="image observations"), file=images)
-    first = found.images[0]
-    messages.append(
-        Message(
-            phrase("format.first-record", unit="um", point=first[1], photo=first[0], x=first[2], y=first[3]),
-            images,
-        )
-    )
+    block = ReducedBuilder(images, TITLE, wishes.sd)
+    _images(images, names, block)
     if (orientation := one_file(folder, ORIENTATION)) is not None:
-        _orientation(orientation, names, found, wishes)
+        _orientation(orientation, names, block, wishes)
     if (control := one_file(folder, CONTROL)) is not None:
-        _control(control, names, found)
-    return with_fitting_rotations(project_of(found, images, TITLE, wishes, messages))
+        _control(control, names, block)
+    return block.reduced_project("um")
 
 
-def _images(path: Path, names: dict[str, str], found: Reduced) -> None:
+def _images(path: Path, names: dict[str, str], block: ReducedBuilder) -> None:
     photo: str | None = None
     for card in cards(path):
         if not card.words:
@@ -79,16 +68,14 @@ def _images(path: Path, names: dict[str, str], found: Reduced) -> None:
             photo = None
         elif photo is None:
             photo = names.get(card.words[0], card.words[0])
-            if photo in found.photos:
-                raise card.place.error(phrase("format.repeated", what="photo", name=photo))
             c = card.number(1, "the principal distance") * MICROMETRES
-            found.photos[photo] = found.principal_distance(c, card.place)
+            block.photo(photo, block.principal_distance(c, card.place), card.place)
         else:
             x, y = (scaled(card.numbers(1, "x y"), MICROMETRES)).tolist()
-            found.images.append((photo, names.get(card.words[0], card.words[0]), x, y))
+            block.image(photo, names.get(card.words[0], card.words[0]), x, y)
 
 
-def _orientation(path: Path, names: dict[str, str], found: Reduced, wishes: Wishes) -> None:
+def _orientation(path: Path, names: dict[str, str], block: ReducedBuilder, wishes: Wishes) -> None:
     lines = [card for card in cards(path) if card.words and not card.ends]
     row = 0
     while row < len(lines):
@@ -108,9 +95,7 @@ def _orientation(path: Path, names: dict[str, str], found: Reduced, wishes: Wish
                 elements += lines[row].numbers(0, " ".join(["element"] * len(lines[row].words))).tolist()
                 row += 1
             matrix = _rotation(head, elements)
-        if photo in found.poses:
-            raise head.place.error(phrase("format.repeated", what="photo", name=photo))
-        found.poses[photo] = centre, matrix
+        block.pose(photo, centre, matrix, head.place)
 
 
 def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -125,18 +110,16 @@ def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], 
     return nearest
 
 
-def _control(path: Path, names: dict[str, str], found: Reduced) -> None:
+def _control(path: Path, names: dict[str, str], block: ReducedBuilder) -> None:
     for card in cards(path):
         if not card.words or card.ends:
             continue
         name = names.get(card.words[0], card.words[0])
         position = card.numbers(1, "X Y Z")
         codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
-        if name in found.control:
-            raise card.place.error(phrase("format.repeated", what="point", name=name))
         # A single code applies to all coordinates, two to position and height.
         level, height = (code > 0 for code in (codes[0], codes[-1])) if codes else (False, False)
-        found.control[name] = position, np.array([level, level, height])
+        block.known_point(name, position, np.array([level, level, height]), card.place)
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
@@ -192,5 +175,6 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(f"block{IMAGES}", f"*{IMAGES}"),
+    holds=HOLDS,
     cannot_hold=cannot_hold,
 )

@@ -10,16 +10,16 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.columns import PLAIN, in_units
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import by_camera, from_corner, to_corner
-from photogram.formats.models import losses
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import camera_table, known_cameras
-from photogram.formats.project import Project, assembled
+from photogram.formats.project import Project
 from photogram.io.column_table import ColumnTable
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
@@ -75,11 +75,14 @@ def read(path: Path, wishes: Wishes) -> Project:
     """Read a table; cameras are in `--camera FILE`, selected by a column `camera`."""
     if wishes.cameras is None:
         raise InputError(phrase("format.cameras"), file=path)
-    messages: list[Message] = []
+    block = BlockBuilder(path, TITLE)
+    messages = block.messages
     table = pixel_table(path, messages)
     cameras = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}), messages))
+    for own in zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True):
+        block.camera(*own)
     photos, points = table.names("photo"), table.names("point")
-    which = _cameras_of(table, [each.name for each in cameras.cameras])
+    which = _cameras_of(table, [each.name for each in block.cameras])
     of_photo = np.zeros(len(photos.names), dtype=np.int64)
     of_photo[photos.rows] = which
     other = np.flatnonzero(of_photo[photos.rows] != which)
@@ -88,31 +91,16 @@ def read(path: Path, wishes: Wishes) -> Project:
     corner = corner_of(table, wishes.pixel_origin)
     if wishes.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
         messages.append(Message(phrase("pixels.origin")))
-    xy = by_camera(corner, which, lambda row, own: from_corner(cameras.cameras[row], cameras.sizes[row], own))
+    xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], block.sizes[row], own))
     keep = table.flags("use")
     if not keep.all():
         messages.append(Message(phrase("pixels.unused", n=int(np.count_nonzero(~keep))), path))
     sd = _sd(table, wishes)
-    count = len(photos.names)
-    return assembled(
-        path=path,
-        title=TITLE,
-        cameras=cameras.cameras,
-        sizes=cameras.sizes,
-        pixel_mm=cameras.pixel_mm,
-        photo_ids=photos.names,
-        photo_cameras=of_photo,
-        centres=np.full((count, 3), np.nan),
-        matrices=np.full((count, 3, 3), np.nan),
-        point_ids=points.names,
-        starts=np.full((len(points.names), 3), np.nan),
-        image_photos=photos.rows[keep],
-        image_points=points.rows[keep],
-        image_xy=xy[keep],
-        image_sd=None if sd is None else sd[keep],
-        lacks=[Phrase("read.oriented", {"option": Phrase("option.control")})],
-        messages=messages,
-    )
+    block.photos(photos.names, of_photo)
+    block.points(points.names)
+    block.images(photos.rows[keep], points.rows[keep], xy[keep], None if sd is None else sd[keep])
+    block.lacks.append(Phrase("read.oriented", {"option": Phrase("option.control")}))
+    return block.project()
 
 
 def _sd(table: ColumnTable, wishes: Wishes) -> Floats | None:
@@ -164,11 +152,6 @@ def write(project: Project) -> Mapping[str, bytes]:
     }
 
 
-def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that a table of pixels cannot contain."""
-    return losses(project, "all-but-images")
-
-
 FORMAT = Format(
     name="pixels",
     title=TITLE,
@@ -176,7 +159,7 @@ FORMAT = Format(
     read=read,
     write=write,
     files=(FILE, "*.csv"),
-    cannot_hold=cannot_hold,
+    cannot_hold=lambda _: [phrase("lost.all-but-images")],
     pixels=True,
     geographic=True,
 )

@@ -2,41 +2,27 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import repeated_pairs
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
-from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
-from photogram.network.moving_photos import Timed
-from photogram.network.observations import Control, Observation
-from photogram.network.passages import Passage
-from photogram.network.rigs import Mount
 from photogram.results.features import Definition
 from photogram.show.methods import Brief
 from photogram.targets.board import Board
-from photogram.words import Phrase, option_sd, phrase
+from photogram.words import Phrase, phrase
 
-__all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]
+__all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused"]
 
 DatumName = Literal["control", "minimum", "inner"]
 Size = tuple[int, int]  # Image width and height of a camera, pixels
-
-ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Default for image coordinates
 
 
 def frame_of(block: Block) -> Frame:
@@ -176,169 +162,3 @@ class Project(Brief):
             np.isnan(self.block.point_positions), self.starts, self.block.point_positions
         )
         return found
-
-
-def assembled(
-    *,
-    path: Path,
-    title: str,
-    cameras: Sequence[Camera],
-    sizes: Sequence[Size | None],
-    photo_ids: list[str],
-    photo_cameras: ArrayLike,
-    centres: Floats,
-    matrices: Floats,
-    point_ids: list[str],
-    starts: Floats,
-    image_photos: Indices,
-    image_points: Indices,
-    image_xy: Floats,
-    image_sd: Floats | float | None = None,
-    pixel_mm: Sequence[float | None] | None = None,
-    point_positions: Floats | None = None,
-    point_sd: Floats | None = None,
-    point_check_sd: Floats | None = None,
-    photo_position_sd: ArrayLike = np.inf,
-    photo_attitude_sd: ArrayLike = np.inf,
-    observations: Sequence[Observation] = (),
-    mounts: Sequence[Mount] = (),
-    timed: Sequence[Timed] = (),
-    passages: Sequence[Passage] = (),
-    frame: Frame | None = None,
-    options: Options | None = None,
-    lacks: Sequence[Phrase] = (),
-    messages: Sequence[Message] = (),
-    details: Mapping[str, Any] | None = None,
-    linear_unit: str = "m",
-    name: str = "",
-    spheroid: Spheroid | None = None,
-    photo_to_ground: bool = False,
-) -> Project:
-    """Return the project of a file from its parts.
-
-    `centres` (P, 3) and `matrices` (P, 3, 3), photo to object, are NaN if unknown; `image_sd` is None if
-    missing in the file. Errors of the block name the file.
-    """
-    place, found = Place(path), list(messages)
-    if not photo_ids:
-        raise place.error(phrase("error.empty-file", content="photos"))
-    left = repeated_pairs(image_photos, image_points, len(point_ids))
-    repeated = Repeated(
-        tuple(photo_ids[row] for row in image_photos[left].tolist()),
-        tuple(point_ids[row] for row in image_points[left].tolist()),
-        np.asarray(image_xy)[left],
-    )
-    if len(left):
-        image_photos, image_points = np.delete(image_photos, left), np.delete(image_points, left)
-        image_xy = np.delete(image_xy, left, axis=0)
-        if image_sd is not None and np.ndim(image_sd):
-            image_sd = np.delete(image_sd, left, axis=0)
-        names = [f"{point} on {photo}" for point, photo in zip(repeated.points, repeated.photos, strict=True)]
-        found.append(Message.of("read.repeated", n=len(left), names=names, option=Phrase("option.repeated")))
-    lacking = list(lacks)
-    if image_sd is None:
-        unit = cameras[0].unit or "px"
-        image_sd = ASSUMED_SD[unit]
-        fields = {"number": float(image_sd), "unit": unit, "option": option_sd("images")}
-        lacking.append(Phrase("read.images", fields))
-    for each in (image_photos, image_points, image_xy, image_sd):
-        if isinstance(each, np.ndarray):
-            # These arrays are complete and read-only: the block shares them.
-            each.flags.writeable = False
-    count = len(point_ids)
-    angles = np.full((len(photo_ids), 3), np.nan)
-    known = np.isfinite(matrices).all(axis=(1, 2))
-    if known.any():
-        angles[known] = Attitudes(matrices[known]).values(
-            "omega_phi_kappa_photo_to_ground" if photo_to_ground else "omega_phi_kappa"
-        )
-    with _names_at(place, photo=photo_ids, point=point_ids), at_place(place):
-        block = Block(
-            photo_ids=photo_ids,
-            photo_positions=centres,
-            photo_attitudes=angles,
-            photo_position_sd=np.asarray(photo_position_sd),
-            photo_attitude_sd=np.asarray(photo_attitude_sd),
-            cameras=list(cameras),
-            photo_cameras=np.asarray(photo_cameras),
-            point_ids=point_ids,
-            point_positions=np.full((count, 3), np.nan) if point_positions is None else point_positions,
-            point_sd=np.full((count, 3), np.inf) if point_sd is None else point_sd,
-            point_check_sd=None
-            if point_check_sd is None or np.isnan(point_check_sd).all()
-            else point_check_sd,
-            image_photos=image_photos,
-            image_points=image_points,
-            image_xy=image_xy,
-            image_sd=image_sd,
-            observations=observations,
-            mounts=mounts,
-            timed=timed,
-            passages=passages,
-            linear_unit=linear_unit,
-            title=name,
-            spheroid=spheroid,
-            photo_to_ground=photo_to_ground,
-        )
-    return Project(
-        block=block,
-        path=path,
-        title=title,
-        sizes=tuple(sizes),
-        pixel_mm=tuple(pixel_mm) if pixel_mm is not None else (None,) * len(cameras),
-        starts=starts,
-        frame=frame or Frame(),
-        options=options or Options(),
-        lacks=tuple(lacking),
-        messages=tuple(found),
-        details=details or {},
-        repeated=repeated,
-    )
-
-
-@contextmanager
-def _names_at(place: Place, **names: Sequence[str]) -> Iterator[None]:
-    """Add the location to the error of a block on repeated names."""
-    try:
-        yield
-    except InputError:
-        for kind, own in names.items():
-            if len(set(own)) < len(own):
-                twice = next(name for name, count in Counter(own).items() if count > 1)
-                raise place.error(phrase("error.repeated", kind=kind, name=twice)) from None
-        raise
-
-
-class PointTable:
-    """A table of points to which a reader adds positions, control and check points."""
-
-    def __init__(self, names: list[str]) -> None:
-        self.names = names
-        self.starts, self.positions, self.check_sd = np.full((3, len(names), 3), np.nan)
-        self.sd = np.full((len(names), 3), np.inf)
-        self.observations: list[Observation] = []
-
-    def control(self, row: int, xyz: Floats, covariance: Floats) -> None:
-        """Add control; with correlations it becomes an observation of the point."""
-        self.starts[row] = xyz
-        variances = np.diag(covariance)
-        if (covariance == np.diag(variances)).all():
-            self.positions[row], self.sd[row] = xyz, np.where(np.isnan(xyz), np.inf, np.sqrt(variances))
-        else:
-            symmetric = (covariance + covariance.T) / 2
-            self.observations.append(Control(self.names[row], xyz, covariance=symmetric))
-
-    def check(self, row: int, xyz: Floats, variances: Floats) -> None:
-        """Add a check point; variances that are not positive are unknown."""
-        self.starts[row] = self.positions[row] = xyz
-        self.check_sd[row] = np.sqrt(np.where(variances > 0, variances, np.nan))
-
-    def arguments(self) -> dict[str, Any]:
-        """Return the arguments of `assembled` for points."""
-        return {
-            "point_ids": self.names,
-            "starts": self.starts,
-            "point_positions": self.positions,
-            "point_sd": self.sd,
-            "point_check_sd": self.check_sd,
-        }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +10,13 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
-from photogram.formats.format import Wishes
-from photogram.formats.models import complete_positions, losses
+from photogram.formats.builder import BlockBuilder
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
-from photogram.formats.project import PointTable, Project, assembled
+from photogram.formats.project import Project
 from photogram.formats.self_check import agreement
 from photogram.io.places import Place
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
@@ -26,74 +26,47 @@ BETTER = 3.0  # Smallest ratio of misfits for which rotations are transposed
 LEAST, MOST = 2.0, 3000.0  # Smallest and largest principal distance of cameras, millimetres
 NOMINAL = 100.0
 """Principal distance in millimetres for an unknown pixel size; it does not affect the rays."""
+HOLDS = frozenset({"names", "shared-cameras", "control"})
 SIDE = -0.02  # Largest u3 of unit directions that a perspective camera can image
 
 
-@dataclass
-class Reduced:
-    """The contents of the files of such a block."""
+class ReducedBuilder(BlockBuilder):
+    """A block of such files; `sd` are standard deviations of the user."""
 
-    photos: dict[str, str] = field(default_factory=dict)  # Camera of each photo by photo name
-    # Photo, point, x, y in millimetres
-    images: list[tuple[str, str, float, float]] = field(default_factory=list)
-    # Centre and attitude A of photos, photo to object
-    poses: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
-    # Position of control points, and which coordinates are fixed or weighted; none of check points
-    control: dict[str, tuple[Floats, Bools]] = field(default_factory=dict)
-    cameras: dict[str, Camera] = field(default_factory=dict)  # By name
+    def __init__(self, path: Path, title: str, sd: Mapping[str, tuple[float, ...]]) -> None:
+        super().__init__(path, title)
+        self.sd = sd
 
     def principal_distance(self, c: float, place: Place) -> str:
         """Return the name of the camera of a principal distance in millimetres."""
         if not LEAST < abs(c) < MOST:
             raise place.error(phrase("reduced.distance", value=abs(c), low=LEAST, high=MOST))
         name = f"c {abs(c):.12g} mm"
-        # Coordinates are in the positive plane, for which c of the model is negative.
-        self.cameras.setdefault(name, Camera("perspective", {"c": -abs(c)}, name=name))
+        if name not in self.camera_rows:
+            # Coordinates are in the positive plane, for which c of the model is negative.
+            self.camera(Camera("perspective", {"c": -abs(c)}, name=name))
         return name
 
+    def known_point(self, name: str, xyz: Floats, used: Bools, place: Place) -> None:
+        """Add a control point with the coordinates in use, or a check point without such."""
+        control = self.sd.get("control", (np.inf,))
+        if used.any():
+            self.control(name, np.where(used, xyz, np.nan), np.where(used, control, np.inf), place)
+        else:
+            sd = self.sd.get("check", control)
+            self.check(name, xyz, np.where(np.isfinite(sd), sd, np.nan), place)
 
-def project_of(
-    found: Reduced, path: Path, title: str, wishes: Wishes, messages: Sequence[Message]
-) -> Project:
-    """Return the project."""
-    photos = list(found.photos)
-    rows = {name: row for row, name in enumerate(photos)}
-    points = list(dict.fromkeys([*(each[1] for each in found.images), *found.control]))
-    places = {name: row for row, name in enumerate(points)}
-    unknown = np.full((len(photos), 3), np.nan)
-    centres, matrices = unknown.copy(), np.full((len(photos), 3, 3), np.nan)
-    for name, (centre, matrix) in found.poses.items():
-        if name in rows:
-            centres[rows[name]], matrices[rows[name]] = centre, matrix
-    table, lacks = PointTable(points), []
-    held = [name for name, (_, used) in found.control.items() if used.any()]
-    if held and "control" not in wishes.sd:
-        lacks.append(Phrase("read.control", {"number": len(held), "option": option_sd("control")}))
-    for name, (position, used) in found.control.items():
-        # Free coordinates of a control point are unknown; a check point is completely known.
-        row = places[name]
-        table.positions[row] = table.starts[row] = np.where(used | ~used.any(), position, np.nan)
-        if used.any() and "control" in wishes.sd:
-            table.sd[row] = np.where(used, wishes.sd["control"], np.inf)
-        elif not used.any():
-            table.check_sd[row] = wishes.sd.get("check", wishes.sd.get("control", np.nan))
-    cameras = {camera: row for row, camera in enumerate(found.cameras)}
-    return assembled(
-        path=path,
-        title=title,
-        cameras=list(found.cameras.values()),
-        sizes=[None] * len(cameras),
-        photo_ids=photos,
-        photo_cameras=[cameras[camera] for camera in found.photos.values()],
-        centres=centres,
-        matrices=matrices,
-        **table.arguments(),
-        image_photos=np.array([rows[each[0]] for each in found.images], dtype=np.int64),
-        image_points=np.array([places[each[1]] for each in found.images], dtype=np.int64),
-        image_xy=np.array([each[2:] for each in found.images], dtype=float).reshape(-1, 2),
-        lacks=lacks,
-        messages=[*messages, Message(phrase("reduced.assumed"))],
-    )
+    def reduced_project(self, unit: str) -> Project:
+        """Return the project; `unit` is the unit of the image file, for remarks."""
+        if not self.image_keys:
+            raise self.place.error(phrase("format.missing", what="image observations"))
+        (photo, point), (x, y) = self.image_keys[0], self.image_xy[0]
+        first = phrase("format.first-record", unit=unit, point=point, photo=photo, x=x, y=y)
+        self.messages += [Message(first, self.path), Message(phrase("reduced.assumed"))]
+        if self.controls and "control" not in self.sd:
+            fields = {"number": self.controls, "option": option_sd("control")}
+            self.lacks.append(Phrase("read.control", fields))
+        return with_fitting_rotations(self.project())
 
 
 def with_fitting_rotations(project: Project) -> Project:
@@ -185,9 +158,8 @@ def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
 
 
 def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[Phrase]:
-    """Return parts of a project that files of reduced coordinates cannot contain."""
-    found = losses(project, "deviations", "points", "frame", "lenses", "unposed", "correlations")
-    found += losses(project, "observations-and-gnss", "rigs")
+    """Return images and principal distances that files of reduced coordinates cannot contain."""
+    found = []
     if any(camera.unit == "px" for camera in known_cameras(project.block)[0]) and None in project.pixel_mm:
         found.append(phrase("lost.nominal-distance", distance=NOMINAL))
     if lost := len(project.block.image_xy) - len(reduced.rows):

@@ -17,7 +17,7 @@ from photogram.formats.format_coordinates import (
     nominal_pixels,
     topocentric_remarks,
 )
-from photogram.formats.models import losses
+from photogram.formats.models import lost
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
@@ -288,10 +288,17 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     if chosen.name != "plain":
         check_images(project.block, chosen.title)
     found = [] if chosen.geographic else topocentric_remarks(project)
-    found += chosen.cannot_hold(_fitting(project, chosen))
+    fitting = _fitting(project, chosen)
+    found += [] if chosen.holds is None else lost(fitting, chosen.holds)
+    found += chosen.cannot_hold(fitting)
     if chosen.name != "plain":
-        found += [*losses(project, "features"), *parts_of_asked(project.statement)]
-        found += losses(project, "trajectories", "moments")
+        found += parts_of_asked(project.statement)
+        counts = {
+            "features": len(project.features),
+            "trajectories": len(project.block.timed),
+            "moments": sum(each.moment is not None for each in project.block.observations),
+        }
+        found += [phrase(f"lost.{part}", n=n) for part, n in counts.items() if n]
     return [str(part) for part in [*found, *(nominal_pixels(project) if chosen.pixels else [])]]
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,17 @@ class Names:
     names: list[str]
     rows: Indices
     distinct: bool = False
+
+
+class TableRow(NamedTuple):
+    """A row, whose location is found on demand."""
+
+    table: ColumnTable
+    row: int
+
+    def error(self, message: str | Phrase) -> InputError:
+        """Return an error with the location of the row."""
+        return self.table.error(self.row, message)
 
 
 @dataclass(frozen=True)
@@ -80,6 +91,10 @@ class ColumnTable:
     def error(self, row: int, message: str | Phrase) -> InputError:
         """Return an error with the location of a row."""
         return self.place(row).error(message)
+
+    def at(self, row: int) -> TableRow:
+        """Return a row as a location for errors."""
+        return TableRow(self, row)
 
     def cell_error(self, row: int, column: str, code: str, **fields: Any) -> InputError:
         """Return an error of a cell from the code of its message."""

@@ -26,6 +26,7 @@ FORMAT = Format(
     read=later(f"{__name__}.reading", "read"),
     write=later(f"{__name__}.writing", "write"),
     files=(FILE, "*.xml"),
+    holds=frozenset({"names", "frame", "lenses", "shared-cameras", "control", "gnss"}),
     cannot_hold=later(f"{__name__}.writing", "cannot_hold"),
     pixels=True,
 )

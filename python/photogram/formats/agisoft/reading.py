@@ -8,30 +8,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photogram.arguments.arrays import is_covariance
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.formats.agisoft import TITLE
+from photogram.formats.builder import BlockBuilder
+from photogram.formats.crs import GEOCENTRIC as EARTH
+from photogram.formats.crs import GEOGRAPHIC
 from photogram.formats.format import Wishes
 from photogram.formats.images import Y_DOWN, checked_rotation
-from photogram.formats.plain.tables import covariances_of
-from photogram.formats.project import Frame, PointTable, Project, Size, assembled
+from photogram.formats.project import Project, Size
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.network.observations import Observation, Position
 from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6  # Distance from the origin (m) beyond which a world is geocentric
 _TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
-
-
-class _Sensor(NamedTuple):
-    camera: Camera
-    size: Size
-    pixel: float | None
 
 
 class _Similarity(NamedTuple):
@@ -45,39 +38,18 @@ class _Similarity(NamedTuple):
 def read(path: Path, wishes: Wishes) -> Project:
     """Read the first or the requested chunk of a document."""
     root = read_stream(path, {}, "document")
-    messages: list[Message] = []
-    chunk = _chunk(root, wishes.model, messages)
-    sensors = _sensors(chunk, messages)
-    shots = _shots(chunk, sensors, messages)
-    centres, matrices = _poses(chunk, shots)
-    markers = {each.attributes.get("id", ""): each for each in _members(chunk, "markers", "marker")}
-    frame, positions = _frame(chunk, centres, matrices, [*shots, *markers.values()], messages)
-    given = _accuracies(chunk, wishes)
-    names = [each.attributes["label"] for each in shots]
-    observations, lacks = _gnss(positions, shots, names, given["gnss"])
-    points = _markers(positions, list(markers.values()), given["control"])
-    rows = {each.attributes["id"]: row for row, each in enumerate(shots)}
-    photos, owners, xy = _locations(chunk, rows, {key: row for row, key in enumerate(markers)})
-    order = {key: row for row, key in enumerate(sensors)}
-    return assembled(
-        path=path,
-        title=TITLE,
-        cameras=[each.camera for each in sensors.values()],
-        sizes=[each.size for each in sensors.values()],
-        pixel_mm=[each.pixel for each in sensors.values()],
-        photo_ids=names,
-        photo_cameras=[order[each.attributes["sensor_id"]] for each in shots],
-        centres=centres,
-        matrices=matrices,
-        **points.arguments(),
-        image_photos=photos,
-        image_points=owners,
-        image_xy=xy,
-        observations=[*points.observations, *observations],
-        frame=frame,
-        lacks=[Phrase("read.ties"), *lacks],
-        messages=messages,
-    )
+    block = BlockBuilder(path, TITLE)
+    block.lacks.append(Phrase("read.ties"))
+    chunk = _chunk(root, wishes.model, block.messages)
+    _sensors(chunk, block)
+    shots = _shots(chunk, block)
+    markers = _members(chunk, "markers", "marker")
+    system = _with_poses(chunk, shots, markers, block)
+    accuracies = _accuracies(chunk, wishes)
+    _gnss(block, shots, system, accuracies["gnss"])
+    _markers(block, markers, system, accuracies["control"])
+    _locations(chunk, block)
+    return block.project()
 
 
 def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Element:
@@ -112,8 +84,7 @@ def _members(chunk: Element, folder: str, name: str) -> list[Element]:
     return [own for each in found.children for own in ([each] if each.name == name else each.all(name))]
 
 
-def _sensors(chunk: Element, messages: list[Message]) -> dict[str, _Sensor]:
-    found: dict[str, _Sensor] = {}
+def _sensors(chunk: Element, block: BlockBuilder) -> None:
     names: set[str] = set()
     for each in _members(chunk, "sensors", "sensor"):
         key = each.attributes.get("id", "")
@@ -122,13 +93,12 @@ def _sensors(chunk: Element, messages: list[Message]) -> dict[str, _Sensor]:
             name += "'"
         names.add(name)
         with at_place(each):
-            found[key] = _sensor(each, name, messages)
-    if not found:
+            block.camera(*_sensor(each, name, block.messages), key=key, place=each)
+    if not block.cameras:
         raise chunk.error(phrase("format.missing", what="sensors"))
-    return found
 
 
-def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
+def _sensor(element: Element, name: str, messages: list[Message]) -> tuple[Camera, Size, float | None]:
     kind = element.attributes.get("type", "frame")
     resolution = element.need("resolution")
     width, height = resolution.attribute("width"), resolution.attribute("height")
@@ -138,7 +108,7 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
     properties = _properties(element.all("property"), "pixel_width", "focal_length")
     pixel = properties.get("pixel_width") or None
     if kind == "spherical":
-        return _Sensor(Camera("equirectangular", {"w": width, "h": height}, name=name), size, pixel)
+        return Camera("equirectangular", {"w": width, "h": height}, name=name), size, pixel
     if kind not in ("frame", "fisheye"):
         raise element.error(
             phrase(
@@ -168,29 +138,23 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
     further = {term: 0.0 if calibration is None else calibration.number(term, 0.0) for term in ("p3", "p4")}
     if any(further.values()):
         model, values = f"{model}_p4", values | further
-    return _Sensor(Camera(model, values, name=name), size, pixel)
+    return Camera(model, values, name=name), size, pixel
 
 
-def _shots(chunk: Element, sensors: dict[str, _Sensor], messages: list[Message]) -> list[Element]:
-    """Return cameras with a pose; the others are unusable."""
-    found, lost, seen = [], [], set()
+def _shots(chunk: Element, block: BlockBuilder) -> list[Element]:
+    """Add cameras with a pose; the others are unusable."""
+    found, lost = [], []
     for each in _members(chunk, "cameras", "camera"):
-        label = each.attributes.get("label", "")
-        if not label or "id" not in each.attributes:
+        label, key = each.attributes.get("label", ""), each.attributes.get("id")
+        if not label or key is None:
             continue
-        if each.attributes.get("sensor_id") not in sensors:
-            raise each.error(
-                phrase("format.undefined", what="sensor", name=each.attributes.get("sensor_id", ""))
-            )
         if each.child("transform") is None:
             lost.append(label)
             continue
-        if label in seen or not label.isprintable() or not label.strip():
-            raise each.error(phrase("format.name", what="camera", name=label))
-        seen.add(label)
+        block.photo(key, each.attributes.get("sensor_id"), each, name=label)
         found.append(each)
     if lost:
-        messages.append(Message(phrase("format.unposed", n=len(lost), names=lost)))
+        block.messages.append(Message(phrase("format.unposed", n=len(lost), names=lost)))
     if not found:
         raise chunk.error(phrase("format.missing", what="aligned cameras"))
     return found
@@ -227,29 +191,6 @@ def _similarity(element: Element | None) -> _Similarity | None:
     return _Similarity(checked_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)
 
 
-@dataclass
-class _Positions:
-    """Transformation of references into the frame; `known` is False if none exists."""
-
-    frame: Frame
-    crs: str
-    known: bool = True
-
-    def reference(self, element: Element, default: Floats) -> tuple[Floats, Floats] | None:
-        """Return a reference with standard deviations; None if it is unusable."""
-        return _reference(element, default) if self.known else None
-
-    def carried(self, xyz: Floats, sd: Floats) -> tuple[Floats, Floats]:
-        """Return positions and covariances in the frame."""
-        covariances = covariances_of(sd)
-        if self.frame.kind == "cartesian" or not len(xyz):
-            return xyz, covariances
-        from photogram.formats.crs import to_frame
-
-        found, turned, _ = to_frame(self.crs, xyz, covariances, self.frame)
-        return found, turned
-
-
 def _is_geocentric(reference: str, centres: Floats, references: Floats) -> bool:
     """Return whether a world is geocentric, judged by size and references."""
     if np.linalg.norm(centres.mean(axis=0)) < GEOCENTRIC or reference.upper().startswith(LOCAL):
@@ -257,28 +198,29 @@ def _is_geocentric(reference: str, centres: Floats, references: Floats) -> bool:
     return bool(reference or (np.abs(references[:, :2]) <= (360.0, 90.0)).all())
 
 
-def _frame(
-    chunk: Element, centres: Floats, matrices: Floats, marked: list[Element], messages: list[Message]
-) -> tuple[Frame, _Positions]:
-    """Transform poses from geocentric axes into a topocentric frame, in place."""
-    reference = chunk.word("reference")
-    given = [own[0] for each in marked if (own := _reference(each, np.ones(3))) is not None]
-    if not _is_geocentric(reference, centres, np.array(given).reshape(-1, 3)):
-        frame = Frame()
-        known = not reference or reference.upper().startswith(LOCAL)
-        if given and not known:
-            messages.append(Message(phrase("agisoft.local", n=len(given))))
-        return frame, _Positions(frame, "", known)
-    from photogram.formats.crs import GEOCENTRIC as EARTH
-    from photogram.formats.crs import GEOGRAPHIC, amid, to_frame, turn_to_frame
+def _with_poses(
+    chunk: Element, shots: list[Element], markers: list[Element], block: BlockBuilder
+) -> str | None:
+    """Add poses, in a topocentric frame if they are geocentric.
 
-    frame = Frame("topocentric", "EPSG:4979", amid(EARTH, centres))
-    matrices[:] = turn_to_frame(EARTH, centres, frame) @ matrices
-    centres[:] = to_frame(EARTH, centres, np.zeros((len(centres), 3, 3)), frame)[0]
-    messages.append(Message(phrase("format.frame", crs=EARTH, frame=frame.phrase)))
-    if not reference:
-        messages.append(Message(phrase("agisoft.references")))
-    return frame, _Positions(frame, reference or GEOGRAPHIC)
+    Returns the system of references; None if they cannot be transformed.
+    """
+    centres, matrices = _poses(chunk, shots)
+    system = chunk.word("reference")
+    given = [own[0] for each in (*shots, *markers) if (own := _reference(each, np.ones(3))) is not None]
+    geocentric = _is_geocentric(system, centres, np.array(given).reshape(-1, 3))
+    for shot, centre, matrix in zip(shots, centres, matrices, strict=True):
+        block.pose(shot.attributes["id"], centre, matrix, shot, crs=EARTH if geocentric else "")
+    if geocentric:
+        block.frame_amid(EARTH)
+        if not system:
+            block.messages.append(Message(phrase("agisoft.references")))
+        return system or GEOGRAPHIC
+    if not system or system.upper().startswith(LOCAL):
+        return ""
+    if given:
+        block.messages.append(Message(phrase("agisoft.local", n=len(given))))
+    return None
 
 
 def _reference(element: Element, default: Floats) -> tuple[Floats, Floats] | None:
@@ -300,63 +242,45 @@ def _enabled(element: Element) -> bool:
     return own is not None and own.attributes.get("enabled", "true").lower() not in ("false", "0")
 
 
-def _gnss(
-    positions: _Positions, shots: list[Element], names: list[str], default: Floats
-) -> tuple[list[Observation], list[Phrase]]:
-    given = {
-        row: own
-        for row, each in enumerate(shots)
-        if _enabled(each) and (own := positions.reference(each, default)) is not None
-    }
-    known = {row: own for row, own in given.items() if (own[1] > 0).all()}
-    lost = len(given) - len(known)
-    lacks = [Phrase("read.references", {"number": lost, "option": option_sd("gnss")})] if lost else []
-    if not known:
-        return [], lacks
-    xyz, sd = map(np.array, zip(*known.values(), strict=True))
-    found, turned = positions.carried(xyz, sd)
-    covariances = (turned + turned.transpose(0, 2, 1)) / 2
-    each = zip(known, found, covariances, strict=True)
-    return [Position(names[row], place, covariance=own) for row, place, own in each], lacks
-
-
-def _markers(positions: _Positions, markers: list[Element], default: Floats) -> PointTable:
-    names = [each.attributes.get("label") or f"marker {row}" for row, each in enumerate(markers)]
-    points = PointTable(names)
-    for row, (name, marker) in enumerate(zip(names, markers, strict=True)):
-        if name in names[:row] or not name.isprintable() or not name.strip():
-            raise marker.error(phrase("format.name", what="marker", name=name))
-        reference = positions.reference(marker, default)
-        if reference is None:
+def _gnss(block: BlockBuilder, shots: list[Element], system: str | None, default: Floats) -> None:
+    lost = 0
+    for each in shots:
+        reference = _reference(each, default)
+        if system is None or reference is None or not _enabled(each):
             continue
-        [xyz], [covariance] = positions.carried(
-            reference[0][np.newaxis], np.nan_to_num(reference[1])[np.newaxis]
-        )
-        if not _enabled(marker):
-            points.check(row, xyz, np.where(reference[1] > 0, np.diag(covariance), 0.0))
-        elif not (reference[1] > 0).all():
-            raise marker.error(phrase("format.sd", name=name, option=option_sd("control")))
-        elif not is_covariance(covariance) and (covariance != np.diag(np.diag(covariance))).any():
-            raise marker.error(phrase("agisoft.accuracy", name=name))
+        xyz, sd = reference
+        if (sd > 0).all():
+            block.gnss(each.attributes["label"], xyz, sd, each, crs=system)
         else:
-            points.control(row, xyz, covariance)
-    return points
+            lost += 1
+    if lost:
+        block.lacks.append(Phrase("read.references", {"number": lost, "option": option_sd("gnss")}))
 
 
-def _locations(
-    chunk: Element, rows: dict[str, int], markers: dict[str, int]
-) -> tuple[Indices, Indices, Floats]:
-    """Return manual measurements; predicted locations are not observations."""
-    photos, points, xy = [], [], []
+def _markers(block: BlockBuilder, markers: list[Element], system: str | None, default: Floats) -> None:
+    for row, marker in enumerate(markers):
+        key = marker.attributes.get("id", "")
+        name = marker.attributes.get("label") or f"marker {row}"
+        block.point(key, marker, name=name)
+        reference = _reference(marker, default)
+        if system is None or reference is None:
+            continue
+        xyz, sd = reference
+        if not _enabled(marker):
+            block.check(key, xyz, np.where(sd > 0, sd, np.nan), marker, crs=system)
+        elif not (sd > 0).all():
+            raise marker.error(phrase("format.sd", name=name, option=option_sd("control")))
+        else:
+            block.control(key, xyz, sd, marker, crs=system)
+
+
+def _locations(chunk: Element, block: BlockBuilder) -> None:
+    """Add manual measurements; predicted locations are not observations."""
     for frame in _members(chunk, "frames", "frame"):
         for marker in _members(frame, "markers", "marker"):
-            point = markers.get(marker.attributes.get("marker_id", ""))
+            point = marker.attributes.get("marker_id", "")
             for each in marker.all("location"):
-                photo = rows.get(each.attributes.get("camera_id", ""))
+                photo = each.attributes.get("camera_id", "")
                 by_hand = all(each.attributes.get(name) != "false" for name in ("pinned", "valid"))
-                if point is None or photo is None or not by_hand:
-                    continue
-                photos.append(photo)
-                points.append(point)
-                xy.append((each.attribute("x"), each.attribute("y")))
-    return np.array(photos, dtype=np.int64), np.array(points, dtype=np.int64), np.reshape(xy, (-1, 2))
+                if point in block.point_rows and photo in block.photo_rows and by_hand:
+                    block.image(photo, point, each.attribute("x"), each.attribute("y"))

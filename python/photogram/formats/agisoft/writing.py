@@ -12,7 +12,6 @@ from photogram.errors import InputError
 from photogram.formats.agisoft import FILE
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.images import Y_DOWN, known_size, lens_of, to_corner
-from photogram.formats.models import losses
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
@@ -28,7 +27,7 @@ _TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3",
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that the file cannot contain."""
+    """Return images of tie points, incomplete control, and digits of the earth."""
     block, marked = project.block, _marked(project)
     partial = np.isfinite(block.point_positions).any(axis=1) & ~marked
     counts = {
@@ -36,8 +35,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
         "lost.partial-control": np.count_nonzero(partial),
         "lost.geocentric-digits": np.count_nonzero(project.frame.kind in ("topocentric", "geocentric")),
     }
-    found = losses(project, "deviations", "unposed", "correlations", "observations", "gnss", "rigs", "boards")
-    return found + [phrase(code, n=int(count)) for code, count in counts.items() if count]
+    return [phrase(code, n=int(count)) for code, count in counts.items() if count]
 
 
 def write(project: Project) -> Mapping[str, bytes]:

@@ -24,6 +24,7 @@ FORMAT = Format(
     read=later(f"{__name__}.reading", "read"),
     write=later(f"{__name__}.writing", "write"),
     files=(FILE, "*.xml"),
+    holds=frozenset({"names", "points", "frame", "lenses", "shared-cameras", "control", "gnss", "unposed"}),
     cannot_hold=later(f"{__name__}.writing", "cannot_hold"),
     pixels=True,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -12,159 +12,18 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.blocks_exchange import TITLE
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Wishes
 from photogram.formats.images import checked_rotation
-from photogram.formats.plain.tables import covariances_of
-from photogram.formats.project import Frame, PointTable, Project, Size, assembled
+from photogram.formats.project import Frame, Project, Size
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.network.observations import Observation, Position
 from photogram.words import Phrase, option_sd, phrase
-
-LOCAL = "local"
-
-
-@dataclass
-class PhotoRecord:
-    """A photo of a file: its pose (y up, z back) and the ids of its systems."""
-
-    path: str
-    group: int
-    centre: Floats
-    rotation: Floats
-    srs: str
-    gnss: Floats | None
-    gnss_srs: str
-    place: Element
-
-
-@dataclass
-class PointRecord:
-    """A point of a file, with standard deviations unless it is a tie point."""
-
-    name: str
-    place: Element
-    position: Floats
-    srs: str
-    sd: Floats | None = None
-    check: bool = False
-
-
-class Systems:
-    """Positions in the systems of a file, transformed into one cartesian frame."""
-
-    def __init__(
-        self, systems: Mapping[str, str], srs: str, photos: list[PhotoRecord], messages: list[Message]
-    ) -> None:
-        self.systems, self.main, self.messages = systems, srs, messages
-        self.lacks: list[Phrase] = []
-        definition = self.definition(srs or (photos[0].srs if photos else ""))
-        self.frame = Frame()
-        if definition != LOCAL:
-            from photogram.formats.crs import amid, enu_origin
-
-            own = enu_origin(definition)
-            if own is not None:
-                self.frame = Frame("topocentric", "EPSG:4979", own)
-            else:
-                centres = np.array([each.centre for each in photos])
-                known = centres[np.isfinite(centres).all(axis=1)]
-                if not len(known):
-                    raise InputError(
-                        phrase("blocks-exchange.centres", crs=definition), file=photos[0].place.file
-                    )
-                self.frame = Frame("topocentric", "EPSG:4979", amid(definition, known))
-                messages.append(Message(phrase("format.frame", crs=definition, frame=self.frame.phrase)))
-        self.same = definition
-
-    def definition(self, srs: str) -> str:
-        """Return the definition of an id for PROJ or this reader, or `local`."""
-        text = self.systems.get(srs or self.main, "").strip()
-        return LOCAL if not text or text.upper().startswith("LOCAL_CS") else text
-
-    def _carried(self, srs: str, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-        definition = self.definition(srs)
-        if definition == self.same and (definition == LOCAL or definition.upper().startswith("ENU:")):
-            return xyz, covariances
-        if LOCAL in (definition, self.same):
-            raise InputError(phrase("blocks-exchange.systems", crs=definition, frame=self.same))
-        from photogram.formats.crs import to_frame
-
-        found, turned, remarks = to_frame(definition, xyz, covariances, self.frame)
-        known = {message.phrase for message in self.messages}
-        self.messages += [Message(remark) for remark in remarks if remark not in known]
-        return found, turned
-
-    def poses(self, photos: list[PhotoRecord], centres: Floats, matrices: Floats) -> tuple[Floats, Floats]:
-        """Transform centres and attitudes, which refer to local axes, into the frame."""
-        centres, matrices = centres.copy(), matrices.copy()
-        for srs in dict.fromkeys(each.srs for each in photos):
-            definition = self.definition(srs)
-            own = np.array([each.srs == srs for each in photos]) & np.isfinite(centres).all(axis=1)
-            if not own.any() or definition == LOCAL or definition.upper().startswith("ENU:"):
-                continue
-            from photogram.formats.crs import turn_to_frame
-
-            matrices[own] = turn_to_frame(definition, centres[own], self.frame) @ matrices[own]
-            centres[own] = self._carried(srs, centres[own], np.zeros((int(own.sum()), 3, 3)))[0]
-        return centres, matrices
-
-    def points(self, records: list[PointRecord], names: list[str]) -> PointTable:
-        """Return the points, with control and check points."""
-        points = PointTable(names)
-        for srs in dict.fromkeys(record.srs for record in records):
-            rows = [row for row, record in enumerate(records) if record.srs == srs]
-            own = [records[row] for row in rows]
-            xyz = np.array([record.position for record in own])
-            whole = np.isfinite(xyz).all(axis=1)
-            local = self.definition(srs) == self.same and self.frame.kind == "cartesian"
-            for record, complete in zip(own, whole, strict=True):
-                if not local and record.sd is not None and not complete:
-                    raise record.place.error(phrase("blocks-exchange.part"))
-            sd = np.array([np.zeros(3) if record.sd is None else record.sd for record in own])
-            covariances = covariances_of(np.nan_to_num(sd))
-            if whole.any():
-                xyz[whole], covariances[whole] = self._carried(srs, xyz[whole], covariances[whole])
-            for row, record, position, covariance in zip(rows, own, xyz, covariances, strict=True):
-                if record.sd is None:
-                    points.starts[row] = position
-                elif record.check:
-                    points.check(row, position, np.diag(covariance))
-                else:
-                    points.control(row, position, covariance)
-        return points
-
-    def gnss(self, photos: list[PhotoRecord], names: list[str], wishes: Wishes) -> list[Observation]:
-        """Return photo positions as observations, if they have standard deviations."""
-        rows = [row for row, each in enumerate(photos) if each.gnss is not None]
-        if not rows:
-            return []
-        if "gnss" not in wishes.sd:
-            self.lacks.append(Phrase("read.gnss", {"number": len(rows), "option": option_sd("gnss")}))
-            return []
-        sd = np.broadcast_to(wishes.sd["gnss"], 3)
-        found: list[Observation] = []
-        lost = []
-        for row in rows:
-            position = photos[row].gnss
-            assert position is not None
-            try:
-                own, turned = self._carried(
-                    photos[row].gnss_srs, position[np.newaxis], np.diag(sd**2)[np.newaxis]
-                )
-            except InputError:
-                lost.append(names[row])
-                continue
-            found.append(Position(names[row], own[0], covariance=(turned[0] + turned[0].T) / 2))
-        if lost:
-            self.messages.append(Message(phrase("blocks-exchange.gnss", n=len(lost), names=lost)))
-        return found
-
 
 ORIENTATIONS = {
     "XRightYDown": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
@@ -198,24 +57,26 @@ class _Group:
     pixel: float | None
 
 
-@dataclass
-class _Found:
-    """Contents of a file in the order of reading."""
+class _Reader:
+    """The contents of a file in the order of reading."""
 
-    wishes: Wishes
-    systems: dict[str, str] = field(default_factory=dict)
-    blocks: list[str] = field(default_factory=list)
-    groups: list[_Group] = field(default_factory=list)
-    photos: dict[int, PhotoRecord] = field(default_factory=dict)
-    points: list[PointRecord] = field(default_factory=list)
-    images: list[tuple[int, int, float, float, bool]] = field(default_factory=list)
-    """Photo id, point, x, y, and whether these are millimetres from the principal point."""
-    measured: list[Element] = field(default_factory=list)
+    def __init__(self, path: Path, wishes: Wishes) -> None:
+        self.block, self.wishes = BlockBuilder(path, TITLE), wishes
+        self.systems: dict[str, str] = {}
+        self.groups: list[_Group] = []
+        self.photos: list[tuple[int, int, str, Element]] = []  # Id, group, path and element
+        self.poses: list[tuple[int, Floats, Floats, str]] = []  # Id, centre, rotation and id of its system
+        self.gnss: list[tuple[int, Floats, str]] = []  # Id, position and id of its system
+        self.points: list[tuple[str, Floats, str, Floats | None, bool, Element]] = []
+        """Name, position, id of its system, standard deviations of control, whether it is a check point."""
+        self.images: list[tuple[int, int, float, float, bool]] = []
+        """Photo id, point, x, y, and whether these are millimetres from the principal point."""
+        self.in_millimetres: Element | None = None  # The first observation in millimetres
 
 
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a file with one block."""
-    found = _Found(wishes)
+    found = _Reader(path, wishes)
     take: dict[str, Callable[[Element], None]] = {
         "SRS": lambda own: found.systems.__setitem__(own.word("Id"), own.word("Definition")),
         "Photogroup": partial(_group, found),
@@ -228,10 +89,10 @@ def read(path: Path, wishes: Wishes) -> Project:
         raise root.error(phrase("blocks-exchange.blocks"))
     if block is None or not found.photos:
         raise root.error(phrase("format.missing", what="a block with photos"))
-    return _checked(_project(path, found, block.word("SRSId")))
+    return _checked(_project(found, block.word("SRSId")))
 
 
-def _group(found: _Found, element: Element) -> None:
+def _group(found: _Reader, element: Element) -> None:
     dimensions = element.need("ImageDimensions")
     size = dimensions.whole("Width"), dimensions.whole("Height")
     if not (0 < size[0] < 2**31 and 0 < size[1] < 2**31):
@@ -312,28 +173,22 @@ def _terms(element: Element) -> dict[str, float]:
     return found
 
 
-def _photo(found: _Found, element: Element, srs: str) -> None:
-    number = element.whole("Id")
-    if number in found.photos:
-        raise element.error(phrase("format.repeated", what="photo", name=str(number)))
-    pose = element.child("Pose")
-    unknown = np.full(3, np.nan)
-    centre, rotation, gnss, gnss_srs = unknown, np.full((3, 3), np.nan), None, srs
+def _photo(found: _Reader, element: Element, srs: str) -> None:
+    number, pose = element.whole("Id"), element.child("Pose")
     if pose is not None:
-        own = pose.child("Center")
-        if own is not None:
+        centre, rotation = np.full(3, np.nan), np.full((3, 3), np.nan)
+        if (own := pose.child("Center")) is not None:
             centre, srs = _position(own), own.word("SRSId") or srs
-        turn = pose.child("Rotation")
-        if turn is not None:
+        if (turn := pose.child("Rotation")) is not None:
             rotation = found.groups[-1].axes.T @ _rotation(turn)
+        found.poses.append((number, centre, rotation.T, srs))
         metadata = pose.child("Metadata")
         if metadata is not None and metadata.child("Center") is not None:
-            gnss, gnss_srs = _position(metadata.need("Center")), metadata.word("SRSId") or srs
+            found.gnss.append((number, _position(metadata.need("Center")), metadata.word("SRSId") or srs))
     path = element.word("ImagePath")
     if not path:
         raise element.error(phrase("format.member", name="ImagePath"))
-    group = len(found.groups) - 1
-    found.photos[number] = PhotoRecord(path, group, centre, rotation, srs, gnss, gnss_srs, element)
+    found.photos.append((number, len(found.groups) - 1, path, element))
 
 
 def _position(element: Element) -> Floats:
@@ -354,7 +209,7 @@ def _rotation(element: Element) -> Floats:
     raise element.error(phrase("blocks-exchange.rotation"))
 
 
-def _control(found: _Found, element: Element) -> None:
+def _control(found: _Reader, element: Element) -> None:
     name = element.word("Name") or f"control {len(found.points) + 1}"
     category = element.word("Category", "Full")
     given = element.need("Position")
@@ -375,85 +230,92 @@ def _control(found: _Found, element: Element) -> None:
     check = element.word("CheckPoint").lower() in ("true", "1")
     if not check and not (sd[~np.isnan(position)] > 0).all():
         raise element.error(phrase("format.sd", name=name, option=option_sd("control")))
-    found.points.append(PointRecord(name, element, position, element.word("SRSId"), sd, check))
+    found.points.append((name, position, element.word("SRSId"), sd, check, element))
     _measurements(found, element)
 
 
-def _tie(found: _Found, element: Element) -> None:
+def _tie(found: _Reader, element: Element) -> None:
     given = element.child("Position")
     position = np.full(3, np.nan) if given is None else _position(given)
     name = element.word("Name") or f"tie {len(found.points) + 1}"
-    found.points.append(PointRecord(name, element, position, element.word("SRSId")))
+    found.points.append((name, position, element.word("SRSId"), None, False, element))
     _measurements(found, element)
 
 
-def _measurements(found: _Found, element: Element) -> None:
+def _measurements(found: _Reader, element: Element) -> None:
     point = len(found.points) - 1
     for each in element.all("Measurement"):
         millimetres = each.child("xmm") is not None
-        x, y = (each.number(name) for name in (("xmm", "ymm") if millimetres else ("x", "y")))
-        found.images.append((each.whole("PhotoId"), point, x, y, millimetres))
-        found.measured.append(each)
+        across, down = ("xmm", "ymm") if millimetres else ("x", "y")
+        xy = each.number(across), each.number(down)
+        found.images.append((each.whole("PhotoId"), point, *xy, millimetres))
+        if millimetres and found.in_millimetres is None:
+            found.in_millimetres = each
 
 
-def _project(path: Path, found: _Found, srs: str) -> Project:
-    messages: list[Message] = []
-    photos = list(found.photos.values())
-    rows = {number: row for row, number in enumerate(found.photos)}
-    frames = Systems(found.systems, srs, photos, messages)
-    centres = np.array([each.centre for each in photos])
-    matrices = np.array([each.rotation.T for each in photos])
-    centres, matrices = frames.poses(photos, centres, matrices)
-    images = [each for each in found.images if each[0] in rows]
-    if lost := len(found.images) - len(images):
-        messages.append(Message(phrase("format.unknown-images", n=lost)))
-    names = [each.path.replace("\\", "/").rsplit("/", 1)[-1] for each in photos]
+def _project(found: _Reader, srs: str) -> Project:
+    block = found.block
+
+    @cache
+    def system(own: str) -> str:
+        """Return the definition of a system for PROJ; empty if it is local."""
+        text = found.systems.get(own or srs, "").strip()
+        return "" if text.upper().startswith("LOCAL_CS") else text
+
+    for row, group in enumerate(found.groups):
+        block.camera(group.camera, group.size, group.pixel, key=row)
+    names = [path.replace("\\", "/").rsplit("/", 1)[-1] for _, _, path, _ in found.photos]
     if len(set(names)) < len(names):
-        names = [each.path for each in photos]
-    for name, photo in zip(names, photos, strict=True):
-        if not name.strip() or not name.isprintable():
-            raise photo.place.error(phrase("format.name", what="ImagePath", name=name))
-    points = frames.points(found.points, _names(found))
-    of_photo = np.array([each.group for each in photos], dtype=np.int64)
-    image_photos = np.array([rows[each[0]] for each in images], dtype=np.int64)
-    return assembled(
-        path=path,
-        title=TITLE,
-        cameras=[each.camera for each in found.groups],
-        sizes=[each.size for each in found.groups],
-        pixel_mm=[each.pixel for each in found.groups],
-        photo_ids=names,
-        photo_cameras=of_photo,
-        centres=centres,
-        matrices=matrices,
-        **points.arguments(),
-        image_photos=image_photos,
-        image_points=np.array([each[1] for each in images], dtype=np.int64),
-        image_xy=_corner(found, images, of_photo[image_photos]),
-        observations=[*points.observations, *frames.gnss(photos, names, found.wishes)],
-        frame=frames.frame,
-        lacks=frames.lacks,
-        messages=messages,
-    )
+        names = [path for _, _, path, _ in found.photos]
+    for name, (number, camera, _, element) in zip(names, found.photos, strict=True):
+        block.photo(number, camera, element, name=name)
+    for number, centre, matrix, own in found.poses:
+        block.pose(number, centre, matrix, crs=system(own))
+    _set_frame(block, system(srs or (found.poses[0][3] if found.poses else "")))
+    _add_points(found, system)
+    if "gnss" in found.wishes.sd:
+        for number, xyz, own in found.gnss:
+            name = block.photo_ids[block.photo_rows[number]]
+            block.gnss(name, xyz, found.wishes.sd["gnss"], crs=system(own))
+    elif found.gnss:
+        block.lacks.append(Phrase("read.gnss", {"number": len(found.gnss), "option": option_sd("gnss")}))
+    images = [each for each in found.images if each[0] in block.photo_rows]
+    if lost := len(found.images) - len(images):
+        block.messages.append(Message(phrase("format.unknown-images", n=lost)))
+    photos = np.array([block.photo_rows[each[0]] for each in images], dtype=np.int64)
+    points = np.array([each[1] for each in images], dtype=np.int64)
+    block.images(photos, points, _corner(found, images, np.array(block.photo_cameras)[photos]))
+    return block.project()
 
 
-def _names(found: _Found) -> list[str]:
-    names: list[str] = []
-    taken: set[str] = set()
-    for each in found.points:
-        name = each.name
-        while name in taken:
-            if each.sd is not None:
-                raise each.place.error(phrase("format.repeated", what="control point", name=name))
+def _set_frame(block: BlockBuilder, system: str) -> None:
+    """Set the frame of the main system."""
+    if system:
+        from photogram.formats.crs import enu_origin
+
+        if (origin := enu_origin(system)) is None:
+            block.frame_amid(system)
+        else:
+            block.frame, block.crs = Frame("topocentric", "EPSG:4979", origin), system
+
+
+def _add_points(found: _Reader, system: Callable[[str], str]) -> None:
+    """Add tie points and control; tie points with the name of another point are renamed."""
+    block, names = found.block, set[str]()
+    for key, (name, xyz, srs, sd, check, element) in enumerate(found.points):
+        while sd is None and name in names:
             name += "'"
-        if not name.strip() or not name.isprintable():
-            raise each.place.error(phrase("format.name", what="point", name=name))
-        taken.add(name)
-        names.append(name)
-    return names
+        names.add(name)
+        block.point(key, element, name=name)
+        if sd is not None and check:
+            block.check(key, xyz, sd, element, crs=system(srs))
+        elif sd is not None:
+            block.control(key, xyz, sd, element, crs=system(srs))
+        elif np.isfinite(xyz).all():
+            block.start(key, xyz, element, crs=system(srs))
 
 
-def _corner(found: _Found, images: list[tuple[int, int, float, float, bool]], groups: Any) -> Floats:
+def _corner(found: _Reader, images: list[tuple[int, int, float, float, bool]], groups: Any) -> Floats:
     """Return (m, 2) columns and rows from the corner."""
     xy = np.array([each[2:4] for each in images], dtype=float).reshape(-1, 2)
     millimetres = np.array([each[4] for each in images], dtype=bool)
@@ -463,7 +325,8 @@ def _corner(found: _Found, images: list[tuple[int, int, float, float, bool]], gr
         if not own.any():
             continue
         if group.pixel is None:
-            raise found.measured[0].error(phrase("format.sensor-size"))
+            assert found.in_millimetres is not None
+            raise found.in_millimetres.error(phrase("format.sensor-size"))
         right, up = (xy[own] @ group.axes[:2, :2] / group.pixel).T
         values = group.camera.parameters
         cx, cy = values["cx"], values["cy"]

@@ -13,7 +13,6 @@ from photogram.formats.block_contents import correlated_control
 from photogram.formats.blocks_exchange import FILE
 from photogram.formats.blocks_exchange.reading import CENTER
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.models import losses
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
@@ -22,11 +21,10 @@ from photogram.words import Phrase, phrase
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that the file cannot contain."""
+    """Return differences of standard deviations of control that the file cannot contain."""
     sd = project.block.point_sd
     sd = sd[np.isfinite(sd).all(axis=1)]
-    unequal = ["horizontal-deviations"] if (sd[:, 0] != sd[:, 1]).any() else []
-    return losses(project, "deviations", *unequal, "correlations", "observations", "gnss", "rigs", "boards")
+    return [phrase("lost.horizontal-deviations")] if (sd[:, 0] != sd[:, 1]).any() else []
 
 
 def write(project: Project) -> Mapping[str, bytes]:

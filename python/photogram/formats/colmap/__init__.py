@@ -8,12 +8,15 @@ from photogram.formats.format import Format
 
 __all__ = ["FORMAT", "TEXT"]
 
+HOLDS = frozenset({"names", "points", "lenses", "shared-cameras", "rigs"})
+
 FORMAT = Format(
     name="colmap",
     title=TITLE,
     recognises=lambda path: path.is_dir() and place_of(path) is not None,
     read=read,
     write=write,
+    holds=HOLDS,
     cannot_hold=cannot_hold,
     pixels=True,
     results=covariance_files,
@@ -25,6 +28,7 @@ TEXT = Format(
     recognises=lambda _: False,
     read=read,
     write=write_as_text,
+    holds=HOLDS,
     cannot_hold=cannot_hold,
     pixels=True,
 )

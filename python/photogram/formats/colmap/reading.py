@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Hashable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +10,14 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model, Pose
 from photogram.formats.colmap.files import read_model
 from photogram.formats.format import Wishes
 from photogram.formats.images import Y_DOWN
 from photogram.formats.names import NAMES, Colours, renamed
-from photogram.formats.project import Project, Size, assembled
-from photogram.formats.rigging import FrameOf, Rig, mounted
+from photogram.formats.project import Project
+from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.cameras import Camera as HouseCamera
@@ -49,48 +50,31 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 
 def _project(model: Model, path: Path) -> Project:
-    messages: list[Message] = []
-    cameras = [_camera(each) for each in model.cameras]
-    sizes: list[Size | None] = [(each.width, each.height) for each in model.cameras]
-    places = {each.number: row for row, each in enumerate(model.cameras)}
-    images = model.images
-    _check_model(model, places)
+    block, images = BlockBuilder(path, TITLE), model.images
+    for each in model.cameras:
+        block.camera(_camera(each), (each.width, each.height), key=each.number, place=each.place)
+    _check_model(model, block.camera_rows)
     rotations, off = _rotations(images.quaternions, images.places)
     if len(off):
         names = [images.names[row] for row in off]
-        messages.append(Message.of("colmap.normalised", n=len(off), names=names))
+        block.messages.append(Message.of("colmap.normalised", n=len(off), names=names))
     translations = images.translations.copy()
-    frames = _composed(model, rotations, translations, messages)
-    matrices = (Y_DOWN @ rotations).transpose(0, 2, 1)
+    frames = _composed(model, rotations, translations, block.messages)
+    cameras = [block.camera_rows[number] for number in images.cameras.tolist()]
     centres = -np.einsum("nji,nj->ni", rotations, translations)
-    mounts, stands = mounted(frames, images.names, centres, matrices)
-    of_names = {each.name: row for row, each in enumerate(cameras)}
-    rows, points = _observed(model, messages)
-    point_ids = list(map(str, model.points.numbers.tolist()))
-    return assembled(
-        path=path,
-        title=TITLE,
-        cameras=cameras,
-        sizes=sizes,
-        photo_ids=[*images.names, *(each.name for each in stands)],
-        photo_cameras=[
-            *(places[number] for number in images.cameras.tolist()),
-            *(of_names[each.camera] for each in stands),
-        ],
-        centres=np.vstack([centres, *(each.centre[np.newaxis] for each in stands)]),
-        matrices=np.concatenate([matrices, *(each.matrix[np.newaxis] for each in stands)]),
-        point_ids=point_ids,
-        starts=model.points.positions,
-        image_photos=np.repeat(np.arange(len(images.names)), images.counts)[rows],
-        image_points=points,
-        image_xy=images.xy[rows],
-        mounts=mounts,
-        lacks=[Phrase("read.placeless", {"option": Phrase("option.control")})] if len(rows) else [],
-        messages=messages,
+    block.photos(images.names, cameras, centres, (Y_DOWN @ rotations).transpose(0, 2, 1))
+    block.rigs(frames)
+    rows, points = _observed(model, block.messages)
+    block.points(list(map(str, model.points.numbers.tolist())), model.points.positions)
+    photos = np.repeat(np.arange(len(images.names)), images.counts)[rows]
+    block.images(photos, points, images.xy[rows])
+    if len(rows):
+        block.lacks.append(Phrase("read.placeless", {"option": Phrase("option.control")}))
+    return block.project(
         details={
             "image numbers": dict(zip(images.names, images.numbers.tolist(), strict=True)),
-            "colours": Colours(point_ids, model.points.colours),
-        },
+            "colours": Colours(block.point_ids, model.points.colours),
+        }
     )
 
 
@@ -102,7 +86,7 @@ def _camera(camera: Camera) -> HouseCamera:
         return HouseCamera(model, values, name=str(camera.number), unit="px")
 
 
-def _check_model(model: Model, cameras: Mapping[int, int]) -> None:
+def _check_model(model: Model, cameras: Container[Hashable]) -> None:
     """Reject invalid names, cameras and numbers."""
     images, points = model.images, model.points
     for name, camera, place in zip(images.names, images.cameras.tolist(), images.places, strict=True):

@@ -13,7 +13,7 @@ from photogram.formats.block_contents import posed
 from photogram.formats.colmap import content
 from photogram.formats.colmap.files import binary_files, text_files
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.models import complete_positions, losses
+from photogram.formats.models import complete_positions
 from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
@@ -27,9 +27,9 @@ from photogram.words import Phrase, phrase
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that a COLMAP model cannot contain."""
-    kinds = ("deviations", "frame", "control", "all-observations", "unposed", "unplaced", "unknowns")
-    found = losses(project, *kinds)
+    """Return points without a position, and rigs that cameras cannot define."""
+    unplaced = np.count_nonzero(~np.isfinite(complete_positions(project)).all(axis=1))
+    found = [phrase("lost.unplaced", n=int(unplaced))] if unplaced else []
     which = known_cameras(project.block)[1]
     if not _told_by_cameras(project.block.mounts, dict(zip(project.block.photo_ids, which, strict=True))):
         found.append(phrase("lost.rigs"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from photogram.formats.dbat.content import project_of
 from photogram.formats.dbat.export import is_export, read_export
 from photogram.formats.dbat.script import (
     is_folder,
@@ -52,7 +51,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         take = read_script
     else:
         take = read_measurements if is_measurements(path) else read_export
-    return project_of(take(path, wishes), wishes)
+    return take(path, wishes).dbat_project(wishes)
 
 
 FORMAT = Format(name="dbat", title="PhotoModeler or DBAT block", recognises=_recognises, read=read)

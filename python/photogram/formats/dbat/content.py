@@ -14,12 +14,13 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Wishes
 from photogram.formats.images import by_camera
-from photogram.formats.project import Options, PointTable, Project, Size, assembled
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.formats.project import Options, Project, Size
+from photogram.io.places import Failing
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
-from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.words import Phrase, option_sd, phrase
 
@@ -79,103 +80,67 @@ def sensors_of_table(
     return found
 
 
-@dataclass
-class Content:
-    """The contents of the files; photos and points have numbers."""
+class DbatBuilder(BlockBuilder):
+    """A block of the files; keys of photos and points are numbers."""
 
-    path: Path
-    title: str
-    sensors: dict[str, Sensor] = field(default_factory=dict)  # The cameras by name
-    # Name and camera of each photo; its centre, and omega, phi, kappa in radians
-    photos: dict[int, str] = field(default_factory=dict)
-    cameras: dict[int, str] = field(default_factory=dict)
-    poses: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
-    # Position and standard deviations of control points, of check points, and computed positions of others
-    control: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
-    checks: dict[int, Floats] = field(default_factory=dict)
-    check_sd: dict[int, Floats] = field(default_factory=dict)
-    starts: dict[int, Floats] = field(default_factory=dict)
-    image_photos: list[int] = field(default_factory=list)
-    image_points: list[int] = field(default_factory=list)
-    # (m, 2) columns and rows from the corner, and their standard deviations; NaN without
-    pixels: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    image_sd: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    # Photos with fixed poses, and free parameters of cameras
-    held: set[int] = field(default_factory=set)
-    free: set[str] = field(default_factory=set)
-    options: Options = field(default_factory=Options)
-    lacks: list[Phrase] = field(default_factory=list)
-    messages: list[Message] = field(default_factory=list)
+    def __init__(self, path: Path, title: str) -> None:
+        super().__init__(path, title)
+        self.sensors: dict[str, Sensor] = {}
+        self.paths: list[str] = []  # Files of photos
+        # Standard deviations of columns and rows of each image observation; NaN without
+        self.image_sd: list[Floats] = []
+        # Photos with fixed poses, and free parameters of cameras
+        self.held: set[int] = set()
+        self.free: set[str] = set()
+        self.options = Options()
 
+    def sensor(self, name: str, sensor: Sensor) -> None:
+        """Add a camera."""
+        self.sensors[name] = sensor
+        self.camera(sensor.camera, sensor.size, sensor.pixel, key=name)
 
-def project_of(content: Content, wishes: Wishes) -> Project:
-    """Return the project; user-defined standard deviations are in pixels."""
-    if not content.image_photos:
-        raise InputError(phrase("format.missing", what="image observations"), file=content.path)
-    order = {number: row for row, number in enumerate(content.photos)}
-    centres, matrices = np.full((len(order), 3), np.nan), np.full((len(order), 3, 3), np.nan)
-    posed = [number for number in order if number in content.poses]
-    if posed:
-        rows = [order[number] for number in posed]
-        centres[rows] = [content.poses[number][0] for number in posed]
-        angles = np.array([content.poses[number][1] for number in posed])
-        matrices[rows] = Attitudes.of("omega_phi_kappa", angles).matrices
-    points = list(dict.fromkeys([*content.image_points, *content.control, *content.checks]))
-    places = {number: row for row, number in enumerate(points)}
-    table = PointTable([str(number) for number in points])
-    for number, position in content.starts.items():
-        if number in places:
-            table.starts[places[number]] = position
-    for number, position in content.checks.items():
-        table.starts[places[number]] = table.positions[places[number]] = position
-        table.check_sd[places[number]] = content.check_sd.get(number, np.nan)
-    for number, (position, deviations) in content.control.items():
-        table.starts[places[number]] = table.positions[places[number]] = position
-        table.sd[places[number]] = deviations
-    sensors = list(content.sensors.values())
-    sensor_rows = {name: row for row, name in enumerate(content.sensors)}
-    photo_cameras = np.array([sensor_rows[content.cameras[number]] for number in order])
-    image_photos = np.array([order[number] for number in content.image_photos], dtype=np.int64)
-    of_images = photo_cameras[image_photos]
-    pixel = np.array([sensor.pixel for sensor in sensors])[of_images, np.newaxis]
-    given = wishes.sd.get("images", content.image_sd)
-    image_sd = pixel * np.broadcast_to(given, content.image_sd.shape)
-    lacks = list(content.lacks)
-    if (missing := np.isnan(image_sd)).any():
-        image_sd = np.where(missing, pixel, image_sd)
-        lacks.append(Phrase("read.images", {"number": 1.0, "unit": "pixel", "option": option_sd("images")}))
-    held = np.where([number in content.held for number in order], 0.0, np.inf)[:, np.newaxis] * np.ones(3)
-    free = dict.fromkeys(content.free, np.inf)
-    return assembled(
-        path=content.path,
-        title=content.title,
-        cameras=[each.camera.replace(sd=free) if free else each.camera for each in sensors],
-        sizes=[each.size for each in sensors],
-        pixel_mm=[each.pixel for each in sensors],
-        photo_ids=_names(content),
-        photo_cameras=photo_cameras,
-        centres=centres,
-        matrices=matrices,
-        photo_position_sd=held,
-        photo_attitude_sd=held,
-        **table.arguments(),
-        image_photos=image_photos,
-        image_points=np.array([places[number] for number in content.image_points], dtype=np.int64),
-        image_xy=by_camera(content.pixels, of_images, lambda row, own: sensors[row].images(own)),
-        image_sd=image_sd,
-        options=content.options,
-        lacks=lacks,
-        messages=content.messages,
-    ).replace(sd_taken=True)
+    def numbered_photo(self, number: int, path: str, camera: str, place: Failing) -> None:
+        """Add a photo with its file."""
+        self.photo(number, camera, place)
+        self.paths.append(path)
 
+    def check_photo(self, number: int, place: Failing) -> None:
+        """Reject a photo that was not added."""
+        if number not in self.photo_rows:
+            raise place.error(phrase("format.undefined", what="photo", name=str(number)))
 
-def _names(content: Content) -> list[str]:
-    """Return unique names of photos: file names, with folders if necessary."""
-    whole = [name.replace("\\", "/").strip() for name in content.photos.values()]
-    short = [name.rpartition("/")[2] for name in whole]
-    if all(short) and len(set(short)) == len(short):
-        return short
-    if all(whole) and len(set(whole)) == len(whole):
-        return whole
-    content.messages.append(Message(phrase("dbat.names", names=sorted(set(short)))))
-    return [str(number) for number in content.photos]
+    def pixel(self, photo: int, point: int, xy: Floats, sd: Floats) -> None:
+        """Add an image observation: column and row from the corner."""
+        self.image(photo, point, *xy.tolist())
+        self.image_sd.append(sd)
+
+    def dbat_project(self, wishes: Wishes) -> Project:
+        """Return the project; user-defined standard deviations are in pixels."""
+        if not self.image_keys:
+            raise self.place.error(phrase("format.missing", what="image observations"))
+        photos, points, pixels = self.image_rows()
+        cameras, sensors = np.array(self.photo_cameras)[photos], list(self.sensors.values())
+        side = np.array(self.pixel_mm, dtype=float)[cameras, np.newaxis]
+        sd = side * np.broadcast_to(wishes.sd.get("images", np.array(self.image_sd)), pixels.shape)
+        if (missing := np.isnan(sd)).any():
+            sd = np.where(missing, side, sd)
+            fields = {"number": 1.0, "unit": "pixel", "option": option_sd("images")}
+            self.lacks.append(Phrase("read.images", fields))
+        xy = by_camera(pixels, cameras, lambda row, own: sensors[row].images(own))
+        self.images(photos, points, xy, sd)
+        held = [[0.0 if number in self.held else np.inf] * 3 for number in self.photo_rows]
+        self.position_sd = self.attitude_sd = held
+        if self.free:
+            self.cameras = [each.replace(sd=dict.fromkeys(self.free, np.inf)) for each in self.cameras]
+        self.photo_ids = self._names()
+        return self.project(options=self.options).replace(sd_taken=True)
+
+    def _names(self) -> list[str]:
+        """Return unique names of photos: file names, with folders if necessary."""
+        whole = [name.replace("\\", "/").strip() for name in self.paths]
+        short = [name.rpartition("/")[2] for name in whole]
+        for names in (short, whole):
+            if all(names) and len(set(names)) == len(names):
+                return names
+        self.messages.append(Message(phrase("dbat.names", names=sorted(set(short)))))
+        return self.photo_ids

@@ -15,13 +15,14 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.cards import Card
-from photogram.formats.dbat.content import Content, Sensor, sensor_of
+from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of
 from photogram.formats.format import Wishes
 from photogram.formats.project import Size
 from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
+from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, option_sd, phrase
 
 TITLE = "PhotoModeler export"
@@ -75,10 +76,10 @@ class _Lines:
             yield card
 
 
-def read_export(path: Path, wishes: Wishes) -> Content:
+def read_export(path: Path, wishes: Wishes) -> DbatBuilder:
     """Read an export file."""
     lines = _Lines(path)
-    content = Content(path, TITLE)
+    content = DbatBuilder(path, TITLE)
     lines.take("the title")
     size = _size(lines.take("tolerance and iterations"))
     lines.take("nine standard deviations")
@@ -89,7 +90,7 @@ def read_export(path: Path, wishes: Wishes) -> Content:
         _photo(card, lines, cameras)
     _control(lines, content, wishes)
     for card in lines.until_empty():
-        content.starts[_number(card, 0)] = card.numbers(1, "X Y Z")
+        content.start(_number(card, 0), card.numbers(1, "X Y Z"), card.place)
     _measurements(lines, content)
     return content
 
@@ -123,7 +124,7 @@ def _sensor(card: Card, first: int, name: str, size: Size) -> Sensor:
 class _Cameras:
     """The camera of the header, and different cameras of photos."""
 
-    content: Content
+    content: DbatBuilder
     head: Card
     common: Sensor
     size: Size
@@ -135,11 +136,12 @@ class _Cameras:
         words = tuple(card.words[1:11])
         last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]
         if (np.abs(given - own) <= np.array(last)).all():
-            self.content.sensors.setdefault("camera", self.common)
+            if "camera" not in self.content.sensors:
+                self.content.sensor("camera", self.common)
             return "camera"
         if words not in self.others:
             name = self.others[words] = f"camera of photo {number}"
-            self.content.sensors[name] = _sensor(card, 1, name, self.size)
+            self.content.sensor(name, _sensor(card, 1, name, self.size))
             remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
             self.content.messages.append(Message(remark, card.place.file))
         return self.others[words]
@@ -147,46 +149,38 @@ class _Cameras:
 
 def _photo(head: Card, lines: _Lines, cameras: _Cameras) -> None:
     number, content = _number(head, 0), cameras.content
-    if number in content.photos:
+    if number in content.photo_rows:
         raise head.place.error(phrase("format.repeated", what="photo", name=str(number)))
     pose, _, _, camera, _ = (lines.take(f"the {what} of photo {number}") for what in _PHOTO)
     for card in (pose, camera):
         if _number(card, 0) != number:
             raise card.place.error(phrase("dbat.photo", number=number, other=card.words[0]))
-    content.photos[number] = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
-    kappa, phi, omega = np.radians(pose.numbers(4, "kappa phi omega")).tolist()
-    content.poses[number] = pose.numbers(1, "X Y Z"), np.array([omega, phi, kappa])
-    content.cameras[number] = cameras.name_of(number, camera)
+    file = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
+    content.numbered_photo(number, file, cameras.name_of(number, camera), head.place)
+    angles = np.radians(pose.numbers(4, "kappa phi omega"))[np.newaxis, ::-1]
+    content.pose(number, pose.numbers(1, "X Y Z"), Attitudes.of("omega_phi_kappa", angles).matrices[0])
 
 
-def _control(lines: _Lines, content: Content, wishes: Wishes) -> None:
-    given = wishes.sd.get("control")
+def _control(lines: _Lines, content: DbatBuilder, wishes: Wishes) -> None:
+    given, negative = wishes.sd.get("control"), 0
     for card in lines.until_empty():
-        number = _number(card, 0)
-        if number in content.control or number in content.checks:
-            raise card.place.error(phrase("format.repeated", what="control point", name=str(number)))
+        number, position = _number(card, 0), card.numbers(1, "X Y Z")
         sd: Floats = card.numbers(4, "sx sy sz") if given is None else np.broadcast_to(given, 3)
-        position = card.numbers(1, "X Y Z")
         if (sd < 0).all():
-            content.checks[number] = position
+            content.check(number, position, place=card.place)
+            negative += 1
         else:
-            content.control[number] = position, np.where(sd < 0, np.inf, sd)
-    if content.checks:
-        fields = {"number": len(content.checks), "option": option_sd("control")}
+            content.control(number, position, np.where(sd < 0, np.inf, sd), card.place)
+    if negative:
+        fields = {"number": negative, "option": option_sd("control")}
         content.lacks.append(Phrase("read.negative", fields))
-    if content.control:
+    if content.controls:
         content.messages.append(Message(phrase("dbat.control"), content.path))
 
 
-def _measurements(lines: _Lines, content: Content) -> None:
-    pixels, sd = [], []
+def _measurements(lines: _Lines, content: DbatBuilder) -> None:
     for card in lines.until_empty():
         photo = _number(card, 0)
-        if photo not in content.photos:
-            raise card.place.error(phrase("format.undefined", what="photo", name=str(photo)))
-        content.image_photos.append(photo)
-        content.image_points.append(_number(card, 1))
-        pixels.append(card.numbers(2, "x y"))
-        own = card.numbers(4, "sx sy") if len(card.words) >= 6 else np.full(2, np.nan)
-        sd.append(np.where(own > 0, own, np.nan))
-    content.pixels, content.image_sd = np.array(pixels).reshape(-1, 2), np.array(sd).reshape(-1, 2)
+        content.check_photo(photo, card.place)
+        sd = card.numbers(4, "sx sy") if len(card.words) >= 6 else np.full(2, np.nan)
+        content.pixel(photo, _number(card, 1), card.numbers(2, "x y"), np.where(sd > 0, sd, np.nan))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.formats.dbat.content import Content, Sensor, sensor_of, sensors_of_table
+from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of, sensors_of_table
 from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, titled, untitled
 from photogram.formats.format import Wishes
 from photogram.formats.plain.cameras import read_cameras
@@ -41,19 +41,21 @@ _GROUPS = {
 """Camera parameters by the words of `set_bundle_estimate_params`."""
 
 
-def read_script(path: Path, wishes: Wishes) -> Content:
+def read_script(path: Path, wishes: Wishes) -> DbatBuilder:
     """Read a script and its tables."""
     root = read_stream(path, {}, "document")
     given = root.need("input")
-    content = Content(path, TITLE)
+    content = DbatBuilder(path, TITLE)
     base = path.parent / _known(given, given.attributes.get("base_dir", "$HERE"))
     cameras = given.need("cameras")
     file = cameras.child("file")
-    content.sensors = (
+    sensors = (
         _cameras(cameras, content.messages)
         if file is None
         else read_camera_file(_path(file, base), content.messages)
     )
+    for name, sensor in sensors.items():
+        content.sensor(name, sensor)
     for _, table in _tables(given.need("images"), base):
         take_photos(table, content)
     eo = given.child("prior_eo")
@@ -135,7 +137,7 @@ def _operations(operations: Element, name: str) -> Iterator[Element]:
         yield from each.all(name)
 
 
-def _estimates(operations: Element, content: Content) -> None:
+def _estimates(operations: Element, content: DbatBuilder) -> None:
     """Read the free parameters of cameras: `all`, then exceptions."""
     for each in _operations(operations, "set_bundle_estimate_params"):
         interior = each.child("io")
@@ -161,7 +163,7 @@ def _estimates(operations: Element, content: Content) -> None:
                 )
 
 
-def _datum(operations: Element, content: Content) -> None:
+def _datum(operations: Element, content: DbatBuilder) -> None:
     """Apply the datum `depend`: one fixed photo, and a coordinate for scale."""
     for each in _operations(operations, "set_datum"):
         if each.text.strip() != "depend":
@@ -304,8 +306,15 @@ def is_measurements(path: Path) -> bool:
     return any(line.startswith(_HEADER) for line in begin.splitlines()[:_FREE])
 
 
+def _with_sensors(path: Path, title: str, wishes: Wishes) -> DbatBuilder:
+    """Return a block with the cameras of the user's table, otherwise of a file in the folder."""
+    content = DbatBuilder(path, title)
+    for name, sensor in _sensors(path, wishes, content.messages).items():
+        content.sensor(name, sensor)
+    return content
+
+
 def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, Sensor]:
-    """Return cameras from the user's table, otherwise from a file in the folder."""
     if wishes.cameras is not None:
         table = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}, image="mm"), messages))
         return sensors_of_table(table.cameras, table.sizes, table.pixel_mm, wishes.cameras)
@@ -316,10 +325,9 @@ def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, S
     return read_camera_file(files[0], messages)
 
 
-def read_folder(path: Path, wishes: Wishes) -> Content:
+def read_folder(path: Path, wishes: Wishes) -> DbatBuilder:
     """Read `images.txt`, `markpts.txt`, optionally `stations.txt`, `control.txt`."""
-    content = Content(path, "tables of DBAT")
-    content.sensors = _sensors(path, wishes, content.messages)
+    content = _with_sensors(path, "tables of DBAT", wishes)
     take_photos(titled(path / PHOTOS), content)
     if (path / POSES).is_file():
         take_poses(titled(path / POSES), content)
@@ -329,28 +337,25 @@ def read_folder(path: Path, wishes: Wishes) -> Content:
     return content
 
 
-def read_measurements(path: Path, wishes: Wishes) -> Content:
+def read_measurements(path: Path, wishes: Wishes) -> DbatBuilder:
     """Read `NAME-2dpts.txt`, with initial positions of `NAME-3dpts.txt`."""
-    content = Content(path, "PhotoModeler measurements")
-    content.sensors = _sensors(path, wishes, content.messages)
+    content = _with_sensors(path, "PhotoModeler measurements", wishes)
     if len(content.sensors) > 1:
         raise InputError(phrase("format.camera-column", n=len(content.sensors)), file=path)
     camera = next(iter(content.sensors))
-    pixels = []
-    for place, own in _cells(path, _HEADER, 4):
-        point, photo = (place.whole(cell, highest=2**53) for cell in own[:2])
-        content.photos[photo], content.cameras[photo] = str(photo), camera
-        content.image_photos.append(photo)
-        content.image_points.append(point)
-        pixels.append([place.number(cell) for cell in own[2:4]])
-    content.photos = dict(sorted(content.photos.items()))
-    content.pixels = np.array(pixels).reshape(-1, 2)
-    content.image_sd = np.full_like(content.pixels, np.nan)
+    images = [
+        ([place.whole(cell, highest=2**53) for cell in own[:2]], [place.number(cell) for cell in own[2:4]])
+        for place, own in _cells(path, _HEADER, 4)
+    ]
+    for photo in sorted({photo for (_, photo), _ in images}):
+        content.numbered_photo(photo, str(photo), camera, content.place)
+    for (point, photo), xy in images:
+        content.pixel(photo, point, np.array(xy), np.full(2, np.nan))
     beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
     if path.name.endswith(MEASURED) and beside.is_file():
         for place, own in _cells(beside, "id,name,photos (used),", 6):
             position = np.array([place.number(cell) for cell in own[3:6]])
-            content.starts[place.whole(own[0], highest=2**53)] = position
+            content.start(place.whole(own[0], highest=2**53), position, place)
     return content
 
 

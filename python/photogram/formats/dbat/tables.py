@@ -10,10 +10,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import message_of
-from photogram.formats.dbat.content import Content
+from photogram.formats.dbat.content import DbatBuilder
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import NAMELESS, read_columns, read_rows
 from photogram.io.numbers import whole_number
+from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, option_sd, phrase
 
 _KNOWN = {
@@ -61,51 +62,35 @@ def _whole(table: ColumnTable, column: str) -> list[int]:
     return found
 
 
-def _once(table: ColumnTable, numbers: Sequence[int], kind: str) -> None:
-    seen: dict[int, int] = {}
-    for row, number in enumerate(numbers):
-        if seen.setdefault(number, row) != row:
-            raise table.error(row, phrase("format.repeated", what=kind, name=str(number)))
-
-
-def _check_photos(table: ColumnTable, numbers: Sequence[int], content: Content) -> None:
-    for row, number in enumerate(numbers):
-        if number not in content.photos:
-            raise table.error(row, phrase("format.undefined", what="photo", name=str(number)))
-
-
-def take_photos(table: ColumnTable, content: Content) -> None:
+def take_photos(table: ColumnTable, content: DbatBuilder) -> None:
     """Add photos: numbers, paths and cameras; without camera column the only camera."""
     table.require("id", "path")
-    numbers = _whole(table, "id")
-    _once(table, numbers, "photo")
     known = list(content.sensors)
     if "cam" not in table and len(known) > 1:
         raise table.head.error(phrase("format.camera-column", n=len(known)))
     cameras = table.texts("cam", known[0] if len(known) == 1 else "")
-    for row, (number, path, camera) in enumerate(zip(numbers, table.texts("path"), cameras, strict=True)):
-        if camera not in content.sensors:
-            raise table.error(row, phrase("format.undefined", what="camera", name=camera))
-        content.photos[number], content.cameras[number] = path, camera
+    rows = zip(_whole(table, "id"), table.texts("path"), cameras, strict=True)
+    for row, (number, path, camera) in enumerate(rows):
+        content.numbered_photo(number, path, camera, table.at(row))
 
 
-def take_poses(table: ColumnTable, content: Content, unit: str = "degrees") -> None:
+def take_poses(table: ColumnTable, content: DbatBuilder, unit: str = "degrees") -> None:
     """Add centres and angles omega, phi, kappa."""
     if unit not in _RADIANS:
         names = list(_RADIANS)
         raise table.head.error(phrase("format.unknown", what="unit of angles", value=unit, names=names))
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
-    numbers = _whole(table, "id")
-    _once(table, numbers, "photo")
-    centres = table.given(("x", "y", "z"))
     angles = table.given(("omega", "phi", "kappa")) * _RADIANS[unit]
-    _check_photos(table, numbers, content)
-    content.poses |= dict(zip(numbers, zip(centres, angles, strict=True), strict=True))
+    matrices = Attitudes.of("omega_phi_kappa", angles).matrices
+    poses = zip(_whole(table, "id"), table.given(("x", "y", "z")), matrices, strict=True)
+    for row, (number, centre, matrix) in enumerate(poses):
+        content.check_photo(number, table.at(row))
+        content.pose(number, centre, matrix, table.at(row))
 
 
 def take_points(
     table: ColumnTable,
-    content: Content,
+    content: DbatBuilder,
     sd: Sequence[float] | None,
     *,
     check: bool = False,
@@ -113,9 +98,7 @@ def take_points(
 ) -> None:
     """Add control or check points; `sd` replaces their standard deviations."""
     table.require("id", "x", "y", "z")
-    numbers = _whole(table, "id")
-    _once(table, numbers, "point")
-    positions = table.given(("x", "y", "z"))
+    numbers, positions = _whole(table, "id"), table.given(("x", "y", "z"))
     deviations = _deviations(table, ("sx", "sy", "sz"), "sxyz")
     if sd is not None:
         deviations = np.broadcast_to(sd, deviations.shape)
@@ -125,9 +108,9 @@ def take_points(
     for row, number in enumerate(numbers):
         if wanted(number):
             if check:
-                content.checks[number], content.check_sd[number] = positions[row], deviations[row]
+                content.check(number, positions[row], deviations[row], table.at(row))
             else:
-                content.control[number] = positions[row], np.nan_to_num(deviations[row])
+                content.control(number, positions[row], np.nan_to_num(deviations[row]), table.at(row))
 
 
 def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floats:
@@ -144,17 +127,16 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
     return found
 
 
-def take_images(table: ColumnTable, content: Content, sd: float = math.nan) -> None:
+def take_images(table: ColumnTable, content: DbatBuilder, sd: float = math.nan) -> None:
     """Add observations; `sd` is their default standard deviation, pixels."""
     table.require("id", "im", "x", "y")
     photos = _whole(table, "im")
-    _check_photos(table, photos, content)
+    for row, number in enumerate(photos):
+        content.check_photo(number, table.at(row))
     own = _deviations(table, ("sx", "sy"), "sxy")
     own = np.where(np.isnan(own), sd, own)
     if (own == 0).any():
         name = "the standard deviation"
         raise table.error(int(np.argwhere(own == 0)[0][0]), phrase("format.positive", name=name, value=0))
-    content.image_photos += photos
-    content.image_points += _whole(table, "id")
-    content.pixels = np.vstack([content.pixels, table.given(("x", "y"))])
-    content.image_sd = np.vstack([content.image_sd, own])
+    for image in zip(photos, _whole(table, "id"), table.given(("x", "y")), own, strict=True):
+        content.pixel(*image)

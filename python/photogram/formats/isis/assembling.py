@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import filled_lines
 from photogram.formats.csm.cubes import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
@@ -19,7 +20,7 @@ from photogram.formats.isis.points import given_starts, known_points
 from photogram.formats.isis.reading import TITLE, read_network
 from photogram.formats.isis.settings import Settings, read_settings
 from photogram.formats.isis.solving import observations_of, one_flight, solving
-from photogram.formats.project import Project, assembled
+from photogram.formats.project import Project
 from photogram.io.places import Place
 from photogram.messages import Message
 from photogram.network.geometry import Cartesian, Spheroid
@@ -150,33 +151,20 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     remarks = [*contents.settings.remarks]
     if contents.settings.rejects:
         remarks.append(phrase("isis.rejection"))
+    block = BlockBuilder(contents.path, TITLE)
+    block.messages += [*messages, *known.messages, *map(Message, remarks)]
     cameras, of_photos = _cameras(contents)
-    return assembled(
-        path=contents.path,
-        title=TITLE,
-        name=network.network_id or "",
-        cameras=[each.supported.camera for each in cameras],
-        sizes=[None] * len(cameras),
-        pixel_mm=[each.pitch for each in cameras],
-        photo_ids=[each.photo for each in timed],
-        photo_cameras=of_photos,
-        centres=centres,
-        matrices=matrices,
-        point_ids=[network.points.ids[row] for row in seen.points.tolist()],
-        starts=known.starts,
-        point_positions=known.positions,
-        point_sd=known.sd,
-        image_photos=seen.image_photos,
-        image_points=seen.image_points,
-        image_xy=seen.xy,
-        image_sd=np.column_stack([seen.sd, seen.sd]),
-        observations=known.controls,
-        timed=timed,
-        spheroid=spheroid,
-        lacks=[Phrase("read.images", {"number": PITCHES, "unit": "px", "option": option_sd("images")})],
-        messages=[*messages, *known.messages, *map(Message, remarks)],
-        details={DETAILS: contents, "further inputs": [each.path for each in contents.different]},
-    )
+    for row, each in enumerate(cameras):
+        block.camera(each.supported.camera, pixel_mm=each.pitch, key=row)
+    block.photos([each.photo for each in timed], of_photos, centres, matrices)
+    points = [network.points.ids[row] for row in seen.points.tolist()]
+    block.points(points, known.starts, point_positions=known.positions, point_sd=known.sd)
+    block.images(seen.image_photos, seen.image_points, seen.xy, np.column_stack([seen.sd, seen.sd]))
+    block.observations += known.controls
+    fields = {"number": PITCHES, "unit": "px", "option": option_sd("images")}
+    block.lacks.append(Phrase("read.images", fields))
+    details = {DETAILS: contents, "further inputs": [each.path for each in contents.different]}
+    return block.project(details=details, title=network.network_id or "", timed=timed, spheroid=spheroid)
 
 
 def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:

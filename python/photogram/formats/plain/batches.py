@@ -23,6 +23,7 @@ from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.parts import AtHome, Names, Part, assembled_part
 from photogram.distributed.run import Manifest, divided, places_of
 from photogram.errors import InputError
+from photogram.formats.builder import ASSUMED_SD
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.cameras import read_cameras
@@ -30,7 +31,7 @@ from photogram.formats.plain.photos import image_coordinates, read_images, read_
 from photogram.formats.plain.reading import read_tables
 from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables, Transform
-from photogram.formats.project import ASSUMED_SD, Project
+from photogram.formats.project import Project
 from photogram.io.parquet import coded
 from photogram.messages import missing_columns, unknown_name
 from photogram.network.block import checked, refuse_passages

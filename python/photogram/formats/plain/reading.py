@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError, message_of
+from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import (
@@ -44,8 +44,7 @@ from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.subjects import Subjects
 from photogram.formats.plain.tables import Tables, Transform, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
-from photogram.formats.project import Project, Unused, assembled
-from photogram.formats.rigging import Stand, mounted
+from photogram.formats.project import Project, Unused
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import Spheroid
@@ -91,10 +90,15 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras), scanned.photos)
-    mounts, stands = mounted(
-        read_frames(tables, rigs, photos.names, photos.taken), photos.names, photos.centres, photos.matrices
-    )
-    mounts = mounted_halves(seams, mounts, timed, photos.names)
+    block = BlockBuilder(settings.path, "plain project")
+    for row, own in enumerate(zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True)):
+        block.camera(*own, key=row)
+    block.photos(photos.names, photo_cameras, photos.centres, photos.matrices)
+    block.position_sd, block.attitude_sd = photos.position_sd, photos.attitude_sd
+    owners = {each.name: row for row, each in enumerate(cameras.cameras)}
+    owners |= dict(zip(photos.taken, photo_cameras, strict=True))
+    block.rigs(read_frames(tables, rigs, photos.names, photos.taken), owners)
+    block.mounts = mounted_halves(seams, block.mounts, timed, photos.names)
     subjects = Subjects(
         {name: row for row, name in enumerate(photos.names)}, photos.times.tolist(), trajectories
     )
@@ -102,39 +106,29 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     observations = read_observations(tables, transform, subjects, places, rigs)
     boards = read_boards(tables)
     bends = read_bends(tables, boards)
-    common = [*_unknowns(observations, mounts, timed), *(each.bend for each in bends)]
+    common = [*_unknowns(observations, block.mounts, timed), *(each.bend for each in bends)]
     observations += read_covariances(tables).priors(common)
     if trajectories and transform.frame != settings.frame:
         message = phrase("plain.trajectory-frame", frame=str(transform.frame))
         raise InputError(message, file=settings.path)
     assumed = not images.sd_given
-    project = assembled(
-        path=settings.path,
-        title="plain project",
-        lacks=[Phrase("read.levels", {"number": 1.0, "option": option_sd("images")})]
-        if assumed and sd is not None
-        else [],
-        name=settings.name,
-        cameras=cameras.cameras,
-        sizes=cameras.sizes,
-        pixel_mm=cameras.pixel_mm,
-        **_with_stands(photos, stands, photo_cameras, cameras),
-        point_ids=points.names,
-        starts=points.starts,
+    block.points(
+        points.names,
+        points.starts,
         point_positions=points.positions,
         point_sd=points.sd,
         point_check_sd=points.check_sd,
-        image_photos=images.photos,
-        image_points=images.points,
-        image_xy=xy,
-        image_sd=sd,
-        observations=[*observations, *photos.observed, *points.observed, *scanned.observations],
+    )
+    block.images(images.photos, images.points, xy, sd)
+    block.observations += [*observations, *photos.observed, *points.observed, *scanned.observations]
+    block.frame, block.messages = transform.frame, list(tables.messages)
+    if assumed and sd is not None:
+        block.lacks.append(Phrase("read.levels", {"number": 1.0, "option": option_sd("images")}))
+    project = block.project(
+        title=settings.name,
         passages=[*scanned.scans, *bends],
-        mounts=mounts,
         timed=timed,
-        frame=transform.frame,
         options=settings.options,
-        messages=tables.messages,
         linear_unit=settings.length,
         spheroid=spheroid,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
@@ -186,24 +180,6 @@ def _check_features(settings: Settings, names: Sequence[str]) -> None:
         except InputError as error:
             message = phrase("error.at", what=f"[features] {name}", message=message_of(error))
             raise InputError(message, file=settings.path) from None
-
-
-def _with_stands(
-    photos: Photos, stands: Sequence[Stand], photo_cameras: Sequence[int], cameras: Cameras
-) -> dict[str, Any]:
-    """Return photos and substitutes of frames for :func:`assembled`."""
-    free = np.full((len(stands), 3), np.inf)
-    owners = {each.name: row for row, each in enumerate(cameras.cameras)}
-    owners |= dict(zip(photos.taken, photo_cameras, strict=True))
-    more = [owners.get(each.camera, photo_cameras[each.like]) for each in stands]
-    return {
-        "photo_ids": [*photos.names, *(each.name for each in stands)],
-        "photo_cameras": [*photo_cameras, *more],
-        "centres": np.vstack([photos.centres, *(each.centre[np.newaxis] for each in stands)]),
-        "matrices": np.concatenate([photos.matrices, *(each.matrix[np.newaxis] for each in stands)]),
-        "photo_position_sd": np.vstack([photos.position_sd, free]),
-        "photo_attitude_sd": np.vstack([photos.attitude_sd, free]),
-    }
 
 
 def _with_cameras(tables: Tables, path: Path) -> Tables:
