@@ -13,10 +13,11 @@ from photogram.formats.block_contents import correlated_control
 from photogram.formats.images import by_camera, to_tables
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
 from photogram.formats.plain.cameras import knots_table
+from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
-from photogram.formats.plain.observed_poses import observed_tables
+from photogram.formats.plain.observations import observation_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
@@ -113,7 +114,10 @@ def write(project: Project) -> Mapping[str, bytes]:
         **trajectory_tables(block),
         "smoothness": smoothness_table(block),
         "line_times": line_times_table(block),
-        **observed_tables(block, cameras, rigs, films),
+        **observation_tables(block),
+        **rigs.tables(block),
+        **films.tables(),
+        **covariance_tables(block, cameras, rigs, films.covariances()),
         "boards": boards_table(project.boards, block, project.details.get(REGULARISED)),
         "knots": knots_table(cameras),
         "lengths": lengths_table(project.statement.get("lengths", ())),
