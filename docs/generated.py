@@ -3,6 +3,7 @@
 Lines of pages that are replaced:
 
 * `<!-- generated: columns TABLE [FIRST LAST] -->`: all columns of a table of the plain project, or some;
+* `<!-- generated: keys -->`: the keys of `project.toml` by section;
 * `<!-- generated: commands -->`: all commands with their options;
 * `<!-- generated: verdicts -->`: all verdicts with their exit codes and next steps;
 * `<!-- generated: messages FAMILY ... -->`: all messages of some families, the first words of their codes;
@@ -104,6 +105,17 @@ def columns(words: str) -> str:
     return "\n".join(["| column | content | default |", "| --- | --- | --- |", *lines])
 
 
+def keys(_: str) -> str:
+    """Return the declared keys of the settings of a plain project as TOML."""
+    from photogram.formats.plain.keys import KEYS
+
+    sections: dict[str, list[str]] = {}
+    for key in KEYS:
+        sections.setdefault(key.section, []).append(key.described())
+    lines = [line for name, own in sections.items() for line in (f"[{name}]", *own)]
+    return "\n".join(["```toml", *lines, "```"])
+
+
 def commands(_: str) -> str:
     """Return the commands with their options as Markdown."""
     parts = []
@@ -168,5 +180,11 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put generated parts into a page."""
     named = " ".join(["verdict", *(words for _, words in MARK.findall(markdown))]).split()
     rest = " ".join(dict.fromkeys(name.partition(".")[0] for name in sentences()).keys() - set(named))
-    parts = {"columns": columns, "commands": commands, "messages": messages, "verdicts": verdicts}
+    parts = {
+        "columns": columns,
+        "commands": commands,
+        "keys": keys,
+        "messages": messages,
+        "verdicts": verdicts,
+    }
     return MARK.sub(lambda mark: parts[mark[1]](mark[2] or rest), markdown)
