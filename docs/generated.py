@@ -2,6 +2,8 @@
 
 Lines of pages that are replaced:
 
+* `<!-- generated: columns TABLE [FIRST LAST] -->`: all columns of a table of the plain project, or some;
+* `<!-- generated: keys -->`: the keys of `project.toml` by section;
 * `<!-- generated: commands -->`: all commands with their options;
 * `<!-- generated: verdicts -->`: all verdicts with their exit codes and next steps;
 * `<!-- generated: messages FAMILY ... -->`: all messages of some families, the first words of their codes;
@@ -91,6 +93,29 @@ def options_of(help_text: str) -> Iterator[tuple[str, ...]]:
             yield " ".join([option, *(escape(kind).replace("|", "|<wbr>") for kind in kinds)]), cell(meaning)
 
 
+def columns(words: str) -> str:
+    """Return a Markdown table of the columns of a table of the plain project, from one to another one."""
+    from photogram.formats.plain.schema import TABLES
+
+    name, *ends = words.split()
+    declared = [each for each in TABLES[name].all_columns if each.content]
+    rows = [row for row, each in enumerate(declared) if set(ends) & set(each.names)]
+    first, last = (rows[0], rows[-1]) if ends else (0, len(declared))
+    lines = [f"| {' | '.join(each.described())} |" for each in declared[first : last + 1]]
+    return "\n".join(["| column | content | default |", "| --- | --- | --- |", *lines])
+
+
+def keys(_: str) -> str:
+    """Return the declared keys of the settings of a plain project as TOML."""
+    from photogram.formats.plain.keys import KEYS
+
+    sections: dict[str, list[str]] = {}
+    for key in KEYS:
+        sections.setdefault(key.section, []).append(key.described())
+    lines = [line for name, own in sections.items() for line in (f"[{name}]", *own)]
+    return "\n".join(["```toml", *lines, "```"])
+
+
 def commands(_: str) -> str:
     """Return the commands with their options as Markdown."""
     parts = []
@@ -153,7 +178,13 @@ def messages(families: str) -> str:
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put generated parts into a page."""
-    named = " ".join(["verdict", *(arguments for _, arguments in MARK.findall(markdown))]).split()
+    named = " ".join(["verdict", *(words for _, words in MARK.findall(markdown))]).split()
     rest = " ".join(dict.fromkeys(name.partition(".")[0] for name in sentences()).keys() - set(named))
-    parts = {"commands": commands, "messages": messages, "verdicts": verdicts}
+    parts = {
+        "columns": columns,
+        "commands": commands,
+        "keys": keys,
+        "messages": messages,
+        "verdicts": verdicts,
+    }
     return MARK.sub(lambda mark: parts[mark[1]](mark[2] or rest), markdown)

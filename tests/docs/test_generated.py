@@ -1,6 +1,7 @@
 """The pages list every command, every option and every message of the program."""
 
 import re
+import tomllib
 from html import unescape
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import pytest
 
 from files.test_guards import COMMANDS
 from photogram.cli.command_classes import declarations
+from photogram.formats.plain.keys import KEYS
+from photogram.formats.plain.schema import TABLES
+from photogram.formats.plain.settings import read_settings
 from photogram.statistics.verdict import RULES
 
 REPLACED = ["out", "as_published"]  # Every command has a text of its own
@@ -54,6 +58,32 @@ def test_no_generated_line_is_broken(commands, messages):
 def test_the_page_has_every_message_once(messages):
     codes = re.findall("<td><code>([^<]*)</code></td></tr>", messages)
     assert sorted(codes) == sorted(generated.sentences())
+
+
+def test_the_page_has_every_table_with_its_columns_once():
+    page = made("formats/plain-tables.md")
+    sections = dict(re.findall(r"^### `(\w+)`\n(.*?)(?=^##|\Z)", page, re.MULTILINE | re.DOTALL))
+    assert list(sections) == list(TABLES)
+    for name, table in TABLES.items():
+        declared = [column for column in table.all_columns if column.content]
+        for column in declared:
+            assert sections[name].count(f"| {' | '.join(column.described())} |") == 1, (name, column)
+        described = {each for column in declared for each in column.names} | {"trajectory", "level"}
+        described |= {"strip", "frame"} if name == "photos" else {table.texts[0], "to"}
+        assert {*table.required, *table.texts} <= described, name
+
+
+def test_the_page_has_every_key_and_its_examples_are_valid(tmp_path):
+    text = made("formats/plain.md").split("```toml\n")[1].split("```")[0]
+    assert text.count(" = ") >= len(KEYS)
+    written = re.sub(r"^(directory|certificate|text) = .*\n", "", text, flags=re.MULTILINE)
+    (tmp_path / "project.toml").write_text(written)
+    settings = read_settings(tmp_path / "project.toml")
+    examples = tomllib.loads(text)
+    assert {(key.section, key.name) for key in KEYS} == {
+        (name, key) for name in examples for key in examples[name]
+    }
+    assert settings.statement["limit"] == tuple(examples["statement"]["length_limit"])
 
 
 def test_verdicts_have_exit_codes_and_next_steps(messages):

@@ -116,8 +116,8 @@ FAULTS = [
     (
         "lines",
         "photos.csv",
-        "oscillator,1.0,1e-05",
-        "oscillator,1.1,1e-05",
+        "oscillator,1.0,1e-5",
+        "oscillator,1.1,1e-5",
         ["record 3", "column scan", "same values"],
     ),
     ("lines", "gnss.csv", "strip 7,201.0", "strip 7,", ["record 2", "column time: must have a value"]),

@@ -25,7 +25,6 @@ from photogram import (
     formats,
     simulate,
 )
-from photogram.formats.plain.schema import TABLES
 from photogram.formats.supplements import self_calibrated
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
@@ -604,15 +603,6 @@ def test_images_name_the_photos_of_a_project_without_a_table_of_photos(example):
     (example / "images.csv").write_text("\n".join(lines) + "\n")
     with rejected("plain.other-camera"):
         formats.read(example)
-
-
-def test_the_page_describes_every_table_and_its_columns():
-    page = (Path(__file__).parents[2] / "docs" / "formats" / "plain-tables.md").read_text(encoding="utf-8")
-    sections = dict(re.findall(r"^### `(\w+)`\n(.*?)(?=^##|\Z)", page, re.MULTILINE | re.DOTALL))
-    assert list(sections) == list(TABLES)
-    for name, table in TABLES.items():
-        for column in {*table.required, *table.texts} - {"strip", "frame"}:
-            assert f"`{column}`" in sections[name], (name, column)
 
 
 def test_a_written_project_keeps_the_comments_of_its_settings(example, tmp_path):

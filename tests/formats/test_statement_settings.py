@@ -13,7 +13,7 @@ from golden_data import DATA, golden
 from message_codes import check_message, rejected
 from photogram import InputError, adjust, formats
 from photogram.formats.names import with_names
-from photogram.formats.plain.statement_settings import read_sentences
+from photogram.formats.plain.keys import KEYS, read_sentences
 from photogram.formats.supplements import with_control
 from photogram.results.statement.request import Asked
 
@@ -514,9 +514,9 @@ def test_classes_of_a_project_are_judged_as_the_golden_data_have_it(tmp_path):
 
 
 def test_the_documentation_shows_sections_that_can_be_read(tmp_path):
-    page = (ROOT / "docs" / "formats" / "plain.md").read_text(encoding="utf-8")
-    block = re.search(r"```toml\n(\[project\].*?)```", page, re.DOTALL)[1]
-    shown = block[block.index("[check]") :]
+    sections = ("check", "statement")
+    keys = {section: [key.described() for key in KEYS if key.section == section] for section in sections}
+    shown = "".join("\n".join([f"[{section}]", *keys[section], ""]) for section in sections)
     place = Path(shutil.copytree(EXAMPLE, tmp_path / "project"))
     (place / "lengths.csv").write_text(LENGTHS)
     (place / "firm.toml").write_text(SENTENCES)

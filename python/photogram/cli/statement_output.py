@@ -66,7 +66,7 @@ class StatementOptions:
 
     def options(self, unit: str) -> dict[str, Any]:
         """Return arguments of :meth:`photogram.Result.statement` for a unit."""
-        from photogram.formats.plain.statement_settings import read_sentences
+        from photogram.formats.plain.keys import read_sentences
         from photogram.results.statement.request import length_of
 
         sizes = {"h": self.class_h, "v": self.class_v, "3d": self.class_3d}

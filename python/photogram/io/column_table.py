@@ -160,7 +160,7 @@ class ColumnTable:
         if len(found.names) < self.count:
             _, first = np.unique(found.rows, return_index=True)
             row = int(np.setdiff1d(np.arange(self.count), first)[0])
-            raise self.error(row, phrase("error.repeated", kind=column, name=texts[row]))
+            raise self.error(row, phrase("error.repeated", kind=column.replace("_", " "), name=texts[row]))
         return texts
 
     def texts(self, column: str, default: str = "") -> list[str]:

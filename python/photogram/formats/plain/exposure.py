@@ -68,8 +68,8 @@ def shutters(
             continue
         if np.isnan(edges[row]).any():
             raise table.error(row, phrase("plain.picture-edges"))
-        given = name or cameras[row].name, float(values[row]), float(deviations[row])
-        readout = tables.shared.one(table, row, "shutter", Readout, *given)
+        title, value, sd = name or cameras[row].name, float(values[row]), float(deviations[row])
+        readout = tables.shared.one(table, row, "shutter", Readout, title, value=value, sd=sd)
         found.append(made(table, row, Shutter, readout, tuple(edges[row].tolist()), directions[row]))
     return found
 

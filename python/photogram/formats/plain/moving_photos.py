@@ -12,9 +12,9 @@ from photogram.arguments.types import Floats
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.rigs import Rigs, sensor_of
-from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
-from photogram.formats.plain.subjects import scalar_columns, scalars
+from photogram.formats.plain.schema import RATE, TABLES, VELOCITY, deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, indices_of, made, named_of
+from photogram.formats.plain.unknowns import read_unknowns, unknown_columns
 from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
@@ -22,7 +22,7 @@ from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, Spheroid
 from photogram.network.motion import about
 from photogram.network.moving_photos import Lines, Timed
-from photogram.network.trajectories import Clock, Readout, Trajectory
+from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Sensor
 from photogram.words import phrase
 
@@ -41,8 +41,10 @@ def read_timed(
     table = photos.table
     on, lines = named_of(table, "trajectory", trajectories, "trajectory"), _line_times(tables, photos)
     motions = _motions(tables, table)
-    clocks = scalars(tables, table, Clock, table.texts("photo"))
-    rates = scalars(tables, table, Readout, table.texts("photo"), 1.0)
+    clocks, rates = (
+        read_unknowns(tables, table, TABLES["photos"].unknown(field), table.texts("photo"))
+        for field in ("clock", "rate")
+    )
     on_rigs, as_sensors = table.texts("rig"), table.texts("sensor")
     found: list[Timed] = []
     for place, row in enumerate(photos.rows.tolist()):
@@ -165,10 +167,10 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
             found[column] = ["" if each is None else each[k] for each in places]
     found["time"] = [None if each is None else each.time for each in own]
     found |= _motion_columns(own)
-    found |= scalar_columns(
-        Clock, [None if each is None or rigs.clock(each.sensor) else each.offset for each in own]
-    )
-    found |= scalar_columns(Readout, [None if each is None else each.rate for each in own])
+    clocks = [None if each is None or rigs.clock(each.sensor) else each.offset for each in own]
+    rates = [None if each is None else each.rate for each in own]
+    for field, unknowns in (("clock", clocks), ("rate", rates)):
+        found |= unknown_columns(block, TABLES["photos"].unknown(field), unknowns, block.photo_ids)
     return {name: column for name, column in found.items() if any(each not in (None, "") for each in column)}
 
 

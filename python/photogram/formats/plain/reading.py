@@ -28,7 +28,7 @@ from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.film_readings import Seen
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.moving_photos import placed, read_timed
-from photogram.formats.plain.observed_poses import read_observations
+from photogram.formats.plain.observations import Known, read_observations
 from photogram.formats.plain.photos import (
     Images,
     Photos,
@@ -41,7 +41,6 @@ from photogram.formats.plain.schema import AXES, SD_AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
-from photogram.formats.plain.subjects import Subjects
 from photogram.formats.plain.tables import Tables, Transform, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.project import Project, Unused
@@ -99,11 +98,10 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     owners |= dict(zip(photos.taken, photo_cameras, strict=True))
     block.rigs(read_frames(tables, rigs, photos.names, photos.taken), owners)
     block.mounts = mounted_halves(seams, block.mounts, timed, photos.names)
-    subjects = Subjects(
-        {name: row for row, name in enumerate(photos.names)}, photos.times.tolist(), trajectories
-    )
     places = points.places
-    observations = read_observations(tables, transform, subjects, places, rigs)
+    photo_rows = {name: row for row, name in enumerate(photos.names)}
+    known_objects = Known(places, photo_rows, photos.times.tolist(), trajectories)
+    observations = read_observations(tables, transform, known_objects, rigs)
     boards = read_boards(tables)
     bends = read_bends(tables, boards)
     common = [*_unknowns(observations, block.mounts, timed), *(each.bend for each in bends)]

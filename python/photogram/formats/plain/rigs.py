@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.schema import AXES, OPK, POSE, ROTATIONS, deviation_columns
-from photogram.formats.plain.subjects import scalar_columns, scalars
-from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of, made
+from photogram.formats.plain.schema import AXES, TABLES
+from photogram.formats.plain.tables import Tables, indices_of, made
+from photogram.formats.plain.unknowns import read_unknowns, unknown_columns, value_columns
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.column_table import ColumnTable
-from photogram.io.numbers import degrees_typed
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
 from photogram.network.rigs import Mount
@@ -23,6 +22,8 @@ from photogram.network.unknowns import Sensor
 from photogram.words import phrase
 
 FRAME = "frame itself"  # Name of the first sensor of a rig if sensors have explicit names
+_SENSOR = TABLES["rigs"].unknown("sensor")
+_REFERENCE = Sensor(FRAME, np.zeros(3), np.eye(3), 0.0)
 ZERO = 1e-6  # Largest difference of the first sensor's pose from zero
 
 
@@ -30,12 +31,12 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
     """Read rigs; the first sensor of each defines the frame."""
     table = tables.rows("rigs")
     values, matrices = tables.vectors(table, AXES), tables.turns(table)
-    lengths = table.vectors(deviation_columns(AXES), math.inf, infinite=True)
-    angles = table.vectors(deviation_columns(ROTATIONS), math.inf, infinite=True, read=tables.angle)
+    deviations = np.column_stack([tables.sd(table, name, math.inf) for name in _SENSOR.sd])
     found: dict[str, tuple[str, dict[str, Sensor]]] = {}
     clocked: dict[str, dict[str, Clock]] = {}
     rows = list(zip(*(table.texts(column) for column in ("rig", "camera", "sensor")), strict=True))
-    dated = scalars(tables, table, Clock, [own or f"{rig}/{camera}" for rig, camera, own in rows])
+    titles = [own or f"{rig}/{camera}" for rig, camera, own in rows]
+    dated = read_unknowns(tables, table, TABLES["rigs"].unknown("clock"), titles)
     for row, (rig, camera, own) in enumerate(rows):
         if camera and camera not in cameras:
             raise table.unknown_error(row, "camera", "camera", camera, cameras)
@@ -45,7 +46,7 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
         if (clock := dated[row]) is not None:
             clocked.setdefault(rig, {})[name] = clock
         matrix = np.eye(3) if np.isnan(matrices[row]).any() else matrices[row]
-        value, sd = np.nan_to_num(values[row]), np.concatenate([lengths[row], angles[row]])
+        value, sd = np.nan_to_num(values[row]), deviations[row]
         if rig not in found:
             if value.any() or np.abs(matrix - np.eye(3)).max() > ZERO:
                 raise table.error(row, phrase("plain.reference-pose", rig=rig))
@@ -54,11 +55,10 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
         reference, sensors = found[rig]
         if name == reference or name in sensors:
             raise table.error(row, phrase("plain.sensor-twice", rig=rig, name=name))
-        title = own or f"{rig}/{camera}"
         # The initial pose of an unspecified sensor is computed from its photos.
         nothing = np.isnan(matrices[row]).any() and np.isnan(values[row]).all() and np.isinf(sd).all()
         values_of_sensor = () if nothing else (value, matrix, sd)
-        sensors[name] = made(table, row, Sensor, title, *values_of_sensor)
+        sensors[name] = made(table, row, Sensor, titles[row], *values_of_sensor)
     return {
         name: Rig(name, reference, sensors, clocked.get(name, {}))
         for name, (reference, sensors) in found.items()
@@ -226,12 +226,13 @@ class Rigs:
             ]
         what = "camera" if self._by_camera else "sensor"
         columns = ("frame", "rig", "photo") if self._by_camera else ("frame", "rig", "photo", "sensor")
+        clocks = [self.clock(row[2]) for row in rows]
         found = {
             "rigs": {
                 "rig": [row[0] for row in rows],
                 what: [row[1] for row in rows],
-                **_poses([row[2] for row in rows], block),
-                **scalar_columns(Clock, [self.clock(row[2]) for row in rows]),
+                **value_columns(block, _SENSOR, [row[2] or _REFERENCE for row in rows]),
+                **unknown_columns(block, TABLES["rigs"].unknown("clock"), clocks, [""] * len(rows)),
             },
         }
         if frames:
@@ -255,19 +256,3 @@ def _clocks(block: Block) -> dict[int, Clock]:
         if each.sensor is not None and found.setdefault(id(each.sensor), each.offset) is not each.offset:
             found[id(each.sensor)] = None
     return {key: clock for key, clock in found.items() if clock is not None}
-
-
-def _poses(sensors: Sequence[Sensor | None], block: Block) -> dict[str, Any]:
-    """Return poses of sensors: zero for the reference, empty if unspecified."""
-    values = np.array([np.zeros(3) if each is None else each.position for each in sensors])
-    matrices = np.array([np.eye(3) if each is None else each.attitude for each in sensors])
-    angles = angles_of(matrices, block)
-    unsaid = [each is not None and each.is_open for each in sensors]
-    values[unsaid] = angles[unsaid] = np.nan
-    sd = np.array([np.zeros(6) if each is None else each.deviations for each in sensors])
-    sd[:, 3:] = degrees_typed(sd[:, 3:])
-    return {
-        **columns_of(AXES, values),
-        **columns_of(OPK, angles),
-        **columns_of(deviation_columns(POSE), sd),
-    }

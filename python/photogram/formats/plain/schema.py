@@ -1,19 +1,36 @@
-"""Tables of the plain project (docs/formats/plain-tables.md)."""
+"""Tables of the plain project, as declared in `tables.csv`.
+
+Each row of this file declares the columns of one quantity: their names, `kind`, unit, default (a value, or
+words for the reference), the `field` of the object that a row of the table makes, or the table with the
+objects that the column names, and their content for docs/formats/plain-tables.md. Rows with an equal cell
+`unknown` declare a shared unknown: its class, field and rule (see :class:`Parameter`). A row without columns
+declares the table: its observations, whether it may have a coordinate system, and the lengths of its `[sd]`.
+
+Kinds of text are `text`, `point`, `photo`, `shared` (an unknown), `group` (of unknowns) and `subject` (a
+photo, or a trajectory at a time). Kinds of numbers are `number`, `place` (a position in the frame of the
+project), `body` (a vector in the axes of a photo), `attitude`, `turn` (an attitude relative to a photo),
+`mounting` (the inverse of a `turn`), `sd`, and `matrix` or `body matrix` (with covariances).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import csv
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
 
 from photogram import _photocore
 from photogram.formats.column_words import KINDS_OF_UNITS, UNITS
 from photogram.formats.columns import Units
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 
 AXES = ("x", "y", "z")
 ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
 POSE = (*AXES, *ROTATIONS)  # Components of poses: small rotations are about the axes of the photo
 VELOCITY, RATE = ("vx", "vy", "vz"), ("rate_x", "rate_y", "rate_z")
-BIAS = ("bias_x", "bias_y", "bias_z")
 BASES = ("position", "rotation")  # Corrections of a trajectory
 FACTORS = ("factor_0", "factor_1", "factor_2", "factor_3")
 """Factors of neighbouring coefficients in an observed sum."""
@@ -29,6 +46,7 @@ ANGLES: Mapping[str, tuple[str, ...]] = {
 """Columns of each representation of attitudes."""
 OPK = ANGLES["omega_phi_kappa"]  # Representation in written files
 ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
+ANGULAR = frozenset((*ALL_ANGLES[:9], *ROTATIONS))  # Columns with a unit of angles
 
 
 def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
@@ -45,32 +63,8 @@ def deviation_columns(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"sd_{name}" for name in names)
 
 
-@dataclass(frozen=True)
-class Schema:
-    """A table."""
-
-    required: tuple[str, ...]  # Required columns
-    texts: tuple[str, ...]  # Allowed columns: names and words, and numbers
-    numbers: tuple[str, ...]
-    # Allowed numbers of standard deviations in `[sd]`; empty: not allowed
-    deviations: tuple[int, ...] = ()
-    # Whether coordinates may be in another system than the frame, with other headings
-    has_system: bool = False
-    # Alternatives to required columns
-    stands_in: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """All allowed columns."""
-        return self.texts + self.numbers
-
-    def needed(self, there: Collection[str]) -> tuple[str, ...]:
-        """Return the required columns of a table that has some columns."""
-        return tuple(each for each in self.required if self.stands_in.get(each) not in there)
-
-
+ENDS = ("from", "to")
 SD_AXES, SD_ROTATIONS = deviation_columns(AXES), deviation_columns(ROTATIONS)
-ENDS, DIFFERENCE = ("from", "to"), ("dx", "dy", "dz")
 DEVICE = ("sx", "sy", "alpha_rad")  # Scales and obliqueness of a scanner
 CURVES = tuple(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj")
 """Coefficients of its polynomials."""
@@ -79,337 +73,191 @@ GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
 FILM_MODELS = ("affine", "conformal", "bilinear", "projective")
 BENDS = ("bend_x", "bend_y")  # Deflections of a board
 PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a board
-_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])  # For angles about axes
-_PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
-_ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
-_CLOCK = ("time_offset", "sd_time_offset")
-_OF_BASES = tuple(
-    name
-    for of in BASES
-    for name in (
-        *(f"{of}_{what}" for what in ("degree", "every", "reference", "scale")),
-        *(f"{sd}{of}{what}" for sd in ("", "sd_") for what in ("_smooth", "_correlation")),
-        f"sd_{of}",
-    )
-)
-_COMMON = tuple(
-    f"{sd}{kind}_{axis}" for kind in ("lever", "shift", "drift") for sd in ("", "sd_") for axis in AXES
-)
 
-TABLES: Mapping[str, Schema] = {
-    "cameras": Schema(
-        ("camera",),
-        ("camera", "model", "for_each", "weights", "calibration", "shutter", "readout_direction"),
-        (
-            *("width", "height", "pixel_mm", *_PARAMETERS, *deviation_columns(_PARAMETERS)),
-            *("readout", "sd_readout", "readout_begin", "readout_end", "pitch_x", "pitch_y"),
-        ),
-    ),
-    "photos": Schema(
-        ("photo",),
-        (
-            *("photo", "camera", "group", "strip", "frame", "use"),
-            *("trajectory", "rig", "sensor", "clock", "scan"),
-            *("film", "scanner", "mirrored", "certificate", "flown"),
-        ),
-        (
-            *(*AXES, *ALL_ANGLES, *SD_AXES, *_SD_ANGLES, *SD_ROTATIONS, "time"),
-            *(*VELOCITY, *RATE, *deviation_columns((*VELOCITY, *RATE))),
-            *(*_CLOCK, "line_rate", "sd_line_rate"),
-            *("start_t1", "start_t2", "start_theta", "seam_column", "seam_row"),
-        ),
-        deviations=(1, 3),
-        has_system=True,
-    ),
-    "images": Schema(
-        ("photo", "point"),
-        ("photo", "point", "use", "camera"),
-        ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row", "level", "correlation"),
-        deviations=(1, 2),
-    ),
-    "points": Schema(
-        ("point", *AXES),
-        ("point",),
-        (*AXES, *SD_AXES),
-        deviations=(1, 3),
-        has_system=True,
-    ),
-    "fiducials": Schema(
-        ("camera", "fiducial", "x", "y"),
-        ("camera", "fiducial", "use"),
-        ("x", "y", "sd", "sd_x", "sd_y"),
-        deviations=(1, 2),
-    ),
-    "fiducial_images": Schema(
-        ("photo", "fiducial"),
-        ("photo", "fiducial", "use"),
-        ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row"),
-        deviations=(1, 2),
-    ),
-    "films": Schema(
-        ("film",),
-        ("film", "model", "pattern"),
-        (
-            *("m", "sd_m", "sd_photo_m", "sd_b1", "sd_b2", "sd_h1", "sd_h2", "sd_g1", "sd_g2"),
-            *("half_format_mm", *GRID),
-            *(*(f"sd_w{k}" for k in range(1, 11)), "sd_smooth"),
-        ),
-    ),
-    "scanners": Schema(
-        ("scanner", "pitch_mm", "origin_column", "origin_row"),
-        ("scanner", "rows_down", "calibration"),
-        (
-            *("pitch_mm", "origin_column", "origin_row", *DEVICE, *CURVES, "hx", "hy"),
-            *deviation_columns((*DEVICE, *CURVES)),
-        ),
-    ),
-    "control": Schema(
-        ("point",),
-        ("point", "use", "cover"),
-        (*AXES, "sd", *SD_AXES, *covariance_columns(AXES)),
-        deviations=(1, 3),
-        has_system=True,
-    ),
-    "distances": Schema(
-        (*ENDS, "distance"),
-        (*ENDS, "instrument"),
-        ("distance", "sd"),
-        deviations=(1,),
-    ),
-    "ranges": Schema(
-        ("photo", "point", "range"),
-        ("photo", "trajectory", "point", "instrument", "clock"),
-        ("range", "sd", "time", "lever_x", "lever_y", "lever_z", *_CLOCK),
-        deviations=(1,),
-        stands_in={"photo": "trajectory"},
-    ),
-    "lengths": Schema(
-        ("line", *ENDS, "length"),
-        ("line", *ENDS),
-        ("length", "sd", "temperature"),
-        deviations=(1,),
-    ),
-    "instruments": Schema(
-        ("instrument",),
-        ("instrument",),
-        ("scale", "constant", "sd_scale", "sd_constant"),
-    ),
-    "height_differences": Schema(
-        (*ENDS, "dz"),
-        ENDS,
-        ("dz", "sd"),
-        deviations=(1,),
-    ),
-    "coordinate_differences": Schema(
-        (*ENDS, *DIFFERENCE),
-        ENDS,
-        (*DIFFERENCE, "sd", *deviation_columns(DIFFERENCE), *covariance_columns(DIFFERENCE)),
-        deviations=(1, 3),
-    ),
-    "levels": Schema(("level",), ("level",), ("z", "sd")),
-    "level_points": Schema(
-        ("level", "point"),
-        ("level", "point"),
-        ("dz", "sd"),
-        deviations=(1,),
-    ),
-    "planes": Schema(
-        ("plane",),
-        ("plane",),
-        (*AXES, "nx", "ny", "nz", "sd_distance", "sd_rotation_x", "sd_rotation_y"),
-    ),
-    "plane_points": Schema(
-        ("plane", "point"),
-        ("plane", "point"),
-        ("distance", "sd"),
-        deviations=(1,),
-    ),
-    "lines": Schema(
-        ("line",),
-        ("line",),
-        (*AXES, *DIFFERENCE, "sd_x", "sd_y", "sd_rotation_x", "sd_rotation_y"),
-    ),
-    "line_points": Schema(
-        ("line", "point"),
-        ("line", "point"),
-        _ACROSS,
-        deviations=(1,),
-    ),
-    "plumb_lines": Schema(
-        ("plumb_line",),
-        ("plumb_line",),
-        (*AXES, "sd_x", "sd_y"),
-    ),
-    "plumb_line_points": Schema(
-        ("plumb_line", "point"),
-        ("plumb_line", "point"),
-        _ACROSS,
-        deviations=(1,),
-    ),
-    "trajectories": Schema(
-        ("trajectory",),
-        ("trajectory", *BASES, "interpolation", "attitude_interpolation", "position_axes", "angles"),
-        _OF_BASES,
-        deviations=(2,),
-    ),
-    "trajectory_positions": Schema(
-        ("trajectory", "time", *AXES),
-        ("trajectory",),
-        ("time", *AXES, *VELOCITY),
-    ),
-    "trajectory_attitudes": Schema(
-        ("trajectory", "time"),
-        ("trajectory",),
-        ("time", *ALL_ANGLES),
-    ),
-    "trajectory_knots": Schema(
-        ("trajectory", "of", "knot"),
-        ("trajectory", "of"),
-        ("knot",),
-    ),
-    "trajectory_coefficients": Schema(
-        ("trajectory", "of", "k"),
-        ("trajectory", "of"),
-        ("k", *AXES, *SD_AXES),
-    ),
-    "smoothness": Schema(
-        ("trajectory", "of", "k", FACTORS[0]),
-        ("trajectory", "of"),
-        ("k", *FACTORS, *AXES, "sd", *SD_AXES, *covariance_columns(AXES)),
-    ),
-    "body_rotations": Schema(
-        ("trajectory", "time"),
-        ("trajectory",),
-        ("time", *ALL_ANGLES),
-    ),
-    "line_times": Schema(
-        ("photo", "line", "time", "seconds_per_line"),
-        ("photo",),
-        ("line", "time", "seconds_per_line"),
-    ),
-    "gnss": Schema(
-        ("photo", *AXES),
-        ("photo", "trajectory", "group"),
-        (*AXES, "sd", *SD_AXES, *covariance_columns(AXES), "time"),
-        deviations=(1, 3),
-        has_system=True,
-        stands_in={"photo": "trajectory"},
-    ),
-    "velocities": Schema(
-        ("photo", *VELOCITY),
-        ("photo", "trajectory", "group"),
-        ("time", *VELOCITY, "sd", *deviation_columns(VELOCITY), *covariance_columns(VELOCITY)),
-        deviations=(1, 3),
-        stands_in={"photo": "trajectory"},
-    ),
-    "gnss_groups": Schema(
-        ("group",),
-        ("group", "lever", "shift", "drift", "drift_epoch", "clock"),
-        (*_COMMON, *_CLOCK),
-    ),
-    "attitudes": Schema(
-        ("photo",),
-        ("photo", "trajectory", "group"),
-        ("time", *ALL_ANGLES, *_SD_ANGLES, *SD_ROTATIONS, *covariance_columns(ROTATIONS)),
-        deviations=(1, 3),
-        stands_in={"photo": "trajectory"},
-    ),
-    "rates": Schema(
-        ("photo", *RATE),
-        ("photo", "trajectory", "group"),
-        ("time", *RATE, "sd", *deviation_columns(RATE), *covariance_columns(RATE)),
-        deviations=(1, 3),
-        stands_in={"photo": "trajectory"},
-    ),
-    "attitude_groups": Schema(
-        ("group",),
-        ("group", "boresight", "clock", "bias"),
-        (*ALL_ANGLES, *SD_ROTATIONS, *_CLOCK, *BIAS, *deviation_columns(BIAS)),
-    ),
-    "relative_poses": Schema(
-        (*ENDS, *AXES),
-        ENDS,
-        (*AXES, *ALL_ANGLES, *SD_AXES, *SD_ROTATIONS, *covariance_columns(POSE)),
-    ),
-    "rigs": Schema(
-        ("rig",),
-        ("rig", "camera", "sensor", "clock"),
-        (*AXES, *ALL_ANGLES, *SD_AXES, *SD_ROTATIONS, *_CLOCK),
-    ),
-    "frames": Schema(
-        ("frame", "rig", "photo"),
-        ("frame", "rig", "photo", "sensor"),
-        ("time",),
-    ),
-    "boards": Schema(
-        ("board", "kind"),
-        ("board", "kind", "shape", "regularise"),
-        (
-            *("columns", "rows", *PITCHES),
-            *(*BENDS, *deviation_columns(BENDS)),
-        ),
-    ),
-    "knots": Schema(
-        ("camera", "i", "j", "dx", "dy"),
-        ("camera",),
-        ("i", "j", "dx", "dy", "sd_radial", "sd_tangential"),
-    ),
-    "bases": Schema(
-        ("rig", *ENDS, "distance"),
-        ("rig", *ENDS),
-        ("distance", "sd"),
-        deviations=(1,),
-    ),
-    "covariances": Schema(
-        ("kind", "name", "first", "second", "covariance"),
-        ("kind", "name", "first", "second"),
-        ("covariance",),
-    ),
+REQUIRED, SETTINGS = "required", "[sd]"  # Defaults of cells that may not be empty, or that the settings fill
+_TEXTS = frozenset(("text", "point", "photo", "shared", "group", "subject"))
+_GROUPS = {
+    "@parameters": {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
+    - {"f", "fx", "fy", "c", "cx", "cy", "x0", "y0", "s0"},
+    "@curves": CURVES,
 }
-"""Tables in the order of reading and writing."""
+"""Names in `tables.csv` of many columns: other parameters of all cameras, and coefficients of polynomials."""
 
-_OF_IMAGES = ("images", "fiducial_images")
-_IMAGE_UNITS = frozenset(("f", "fx", "fy", "c", "cx", "cy", "x0", "y0"))
-"""Parameters of cameras in the unit of images."""
-_OTHER_UNITS = frozenset(
-    (
-        "rates",
-        "velocities",
-        "smoothness",
-        "trajectory_coefficients",
-        "films",
-        "scanners",
-        "knots",
-        "covariances",
-    )
-)
-"""Tables without one unit for all lengths."""
-_LENGTHS = frozenset(
-    (
-        *(*AXES, *DIFFERENCE, *BENDS, *PITCHES, "distance", "range", "length", "constant"),
-        *(f"{kind}_{axis}" for kind in ("lever", "shift") for axis in AXES),
-    )
-)
-_ANGLES = frozenset((*ALL_ANGLES[:9], *ROTATIONS))
+
+class Column(NamedTuple):
+    """The columns of one quantity; those without content are not in the reference."""
+
+    table: str
+    components: tuple[str, ...]  # Columns, or their names without the prefix `sd_`
+    kind: str
+    unit: str
+    default: str
+    field: str  # Argument of the object that a row makes, or table that contains the objects of the column
+    unknown: str
+    heading: str  # Names in the reference, unless these are all columns
+    content: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns."""
+        names = self.components
+        if self.kind == "sd":
+            return deviation_columns(names) or ("sd",)
+        if self.kind in ("attitude", "turn", "mounting"):
+            return ALL_ANGLES
+        if not self.kind.endswith("matrix"):
+            return names
+        single = () if names and names[-1] == "rotation_z" else ("sd",)
+        return (*single, *deviation_columns(names), *covariance_columns(names))
+
+    @property
+    def number(self) -> float:
+        """The value of an empty cell; NaN without default."""
+        try:
+            return float(self.default)
+        except ValueError:
+            return math.nan
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of a column; covariances and quaternions have none."""
+        angular = name.removeprefix("sd_") in ANGULAR
+        if name.startswith("cov_") or (self.unit == "angle" and not angular):
+            return ""
+        return "angle" if self.unit and angular else self.unit
+
+    def described(self) -> tuple[str, str, str]:
+        """Return columns, content and default for the reference."""
+        names, more = self.names, {"time": " (s)", "mm": " (mm)"}.get(self.unit, "")
+        heading = self.heading or ", ".join(f"`{name}`" for name in names)
+        if names == ALL_ANGLES:
+            heading = "angles"
+        elif self.kind.endswith("matrix") and len(names) > 1:
+            covariances = list(covariance_columns(self.components))
+            heading = "`sd`, " if names[0] == "sd" else ""
+            heading += f"`sd_{self.components[0]}` .., `{covariances[0]}` .."
+        default = f"`[sd] {self.table}`" if self.default == SETTINGS else self.default
+        if self.kind == "sd":
+            default = {"0": "0 (fixed)", "inf": "empty: free"}.get(default, default)
+        return heading, self.content + more, default
+
+
+class Parameter(NamedTuple):
+    """A shared unknown of each row: columns of its name, values and standard deviations.
+
+    It exists in each row with the rule `row`; with `name` if its cell is true or a name; with `sd` if it is
+    not fixed, otherwise its value is an array; with `any` if a cell is not the default.
+    """
+
+    class_name: str
+    field: str  # Argument of observations
+    rule: str
+    columns: tuple[Column, ...]
+
+    @property
+    def name(self) -> str:
+        """The column of the name."""
+        return self.columns[0].names[0]
+
+    @property
+    def values(self) -> list[Column]:
+        """The columns of values by quantity."""
+        return [column for column in self.columns[1:] if column.kind != "sd"]
+
+    @property
+    def sd(self) -> list[str]:
+        """The columns of the standard deviations."""
+        return [name for column in self.columns if column.kind == "sd" for name in column.names]
+
+
+@dataclass(frozen=True)
+class Schema:
+    """A table."""
+
+    all_columns: tuple[Column, ...]
+    class_name: str = ""  # Of the observations of its rows
+    # Allowed numbers of standard deviations in `[sd]`; empty: not allowed
+    deviations: tuple[int, ...] = ()
+    # Whether coordinates may be in another system than the frame, with other headings
+    has_system: bool = False
+
+    @cached_property
+    def parts(self) -> tuple[Column | Parameter, ...]:
+        """The columns, with those of an unknown in one part."""
+        found: list[Column | Parameter] = []
+        for unknown, group in groupby(self.all_columns, lambda column: column.unknown):
+            columns = tuple(group)
+            if unknown:
+                class_name, field, rule = unknown.split()
+                found.append(Parameter(class_name, field, rule, columns))
+            else:
+                found += columns
+        return tuple(found)
+
+    @property
+    def unknowns(self) -> list[Parameter]:
+        """The unknowns of a row."""
+        return [part for part in self.parts if isinstance(part, Parameter)]
+
+    def unknown(self, field: str) -> Parameter:
+        """Return the unknown with a field."""
+        return next(part for part in self.unknowns if part.field == field)
+
+    @cached_property
+    def required(self) -> tuple[str, ...]:
+        """Required columns."""
+        columns = (column for column in self.all_columns if column.default == REQUIRED)
+        return tuple(name for column in columns for name in column.components)
+
+    @cached_property
+    def texts(self) -> tuple[str, ...]:
+        """Allowed columns of names and words."""
+        return self._names(text=True)
+
+    @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Allowed columns of numbers."""
+        return self._names(text=False)
+
+    def _names(self, *, text: bool) -> tuple[str, ...]:
+        columns = [column for column in self.all_columns if (column.kind in _TEXTS) is text]
+        return tuple(dict.fromkeys(name for column in columns for name in column.names))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All allowed columns."""
+        return self.texts + self.numbers
+
+    def needed(self, there: Collection[str]) -> tuple[str, ...]:
+        """Return the required columns of a table that has some columns."""
+        of_trajectories = "trajectory" in there and self.class_name
+        return tuple(name for name in self.required if name != "photo" or not of_trajectories)
+
+
+def _declared() -> Iterator[tuple[str, Schema]]:
+    """Yield the tables of the file."""
+    text = (Path(__file__).parent / "tables.csv").read_text(encoding="utf-8")
+    _, *rows = csv.reader(text.splitlines())
+    for name, group in groupby(rows, lambda row: row[0]):
+        (_, _, class_name, system, deviations, *_), *own = group
+        columns = []
+        for _, names, *cells in own:
+            components = [each for word in names.split() for each in _GROUPS.get(word, (word,))]
+            columns.append(Column(name, tuple(components), *cells))
+        yield name, Schema(tuple(columns), class_name, tuple(map(int, deviations.split())), system == "crs")
+
+
+TABLES: Mapping[str, Schema] = dict(_declared())
+"""Tables in the order of reading and writing."""
 
 
 def column_units(name: str, length: str = "m", angle: str = "deg", image: str = "px") -> Units:
     """Return unit type and size of each numeric column of a table."""
-    metres, radians = UNITS[length], KINDS_OF_UNITS["angle"].get(angle, KINDS_OF_UNITS["angle"]["deg"])
-    of_image = ("pixel", 1.0) if image == "px" else ("length", UNITS[image])
-    found = dict.fromkeys(TABLES[name].numbers, ("", 1.0))
-    for column in found:
-        value = column.removeprefix("sd_")
-        if name in _OF_IMAGES or (name == "cameras" and value in _IMAGE_UNITS):
-            found[column] = of_image if value not in ("level", "correlation") else ("", 1.0)
-        elif name == "fiducials":
-            found[column] = "length", UNITS["mm"]
-        elif value in ("time", "time_offset", "readout"):
-            found[column] = "time", 1.0
-        elif name in _OTHER_UNITS or name == "cameras":
-            continue
-        elif value in _LENGTHS or value == "sd":
-            found[column] = "length", metres
-        elif value in _ANGLES:
-            found[column] = "angle", radians
-    return found
+    units = {
+        "length": ("length", UNITS[length]),
+        "angle": ("angle", KINDS_OF_UNITS["angle"].get(angle, KINDS_OF_UNITS["angle"]["deg"])),
+        "image": ("pixel", 1.0) if image == "px" else ("length", UNITS[image]),
+        "mm": ("length", UNITS["mm"]),
+        "time": ("time", 1.0),
+    }
+    columns = [column for column in TABLES[name].all_columns if column.kind not in _TEXTS]
+    return {each: units.get(column.unit_of(each), ("", 1.0)) for column in columns for each in column.names}

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import difflib
-import math
 import os
 from collections.abc import Mapping
-from datetime import date, datetime
+from datetime import date
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from photogram.errors import InputError, message_of
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes
-from photogram.formats.plain.schema import ANGLES, FILM_MODELS, TABLES
-from photogram.formats.plain.statement_settings import KEYS, read_asked
-from photogram.formats.project import DatumName, Frame, Options
-from photogram.io.toml import Document, Table, day_of, read_document
+from photogram.formats.plain.keys import KEYS, read_keys
+from photogram.formats.plain.schema import TABLES
+from photogram.formats.project import Frame, Options
+from photogram.io.toml import Table, read_document
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
 from photogram.results.features import KINDS, Definition
@@ -28,40 +27,16 @@ WITH_SD = {name: each.deviations for name, each in TABLES.items() if each.deviat
 """Check points have the standard deviations of the table of control."""
 ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
 
-LENGTHS = ("m", "km", "mm", "ft", "us-ft")
-_CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
-    ("frame", "kind"): ("cartesian", "topocentric", "geocentric", "geographic"),
-    ("units", "length"): LENGTHS,
-    ("units", "angle"): ("deg", "gon", "rad", "dms"),
-    ("units", "image"): ("px", "mm", "um"),
-    ("axes", "image_y"): ("down", "up"),
-    ("axes", "pixel_origin"): ("corner", "center"),
-    ("axes", "attitude"): tuple(ANGLES),
-    ("axes", "rotation"): ("object_to_photo", "photo_to_object"),
-    ("axes", "photo"): ("y_up", "y_down"),
-    ("time", "scale"): ("none", "utc", "gps", "tai", "et"),
-    ("film", "model"): FILM_MODELS,
-    ("film", "interior"): ("inside", "before"),
-    ("adjust", "datum"): ("control", "minimum", "inner"),
-    ("adjust", "loss"): ("none", "huber", "cauchy"),
-    ("adjust", "unit_variance"): ("constrained", "unity", "redundancy", "free"),
-}
-"""Allowed words of a key; the first is the default."""
-_KEYS: Mapping[str, tuple[str, ...] | None] = {
-    "project": ("format", "name"),
-    "frame": ("kind", "crs", "origin", "ellipsoid"),
-    "units": ("length", "angle", "image"),
-    "axes": ("image_y", "pixel_origin", "attitude", "rotation", "photo"),
-    "time": ("origin", "scale"),
+LENGTHS = next(key.words for key in KEYS if key.field == "length").split()
+_SECTIONS: dict[str, tuple[str, ...] | None] = {
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
-    "film": ("model", "interior", "certificate", "flown"),
-    "adjust": ("datum", "loss", "unit_variance", "iterations", "max_bias_ratio"),
-    **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
-    "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
     "features": None,
-    **KEYS,
+    **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
 }
+"""Names of the keys of each section; None: any."""
+for _key in KEYS:
+    _SECTIONS[_key.section] = (*(_SECTIONS.get(_key.section) or ()), _key.name)
 
 
 @dataclass(frozen=True)
@@ -118,57 +93,31 @@ class Settings:
 def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
     """Read a file of settings, and find its tables, named or in its folder."""
     wishes = wishes or Wishes()
-    file = read_document(path, _KEYS, wishes.settings)
-    project, frame, adjust = (file.optional(name) for name in ("project", "frame", "adjust"))
+    file = read_document(path, _SECTIONS, wishes.settings)
+    project = file.optional("project")
     if project.value("format", "") is not VERSION:
         raise project.value_error("format", "plain.version", version=VERSION)
-    length = _word(file, "units", "length")
-    # Defaults of the keys are the defaults of the settings.
-    words: dict[str, Any] = {
-        key: _word(file, section, key)
-        for section in ("units", "axes")
-        for key in _KEYS[section] or ()
-        if key in file.optional(section)
-    }
-    axes = tuple(frame.numbers("ellipsoid", 2)) if "ellipsoid" in frame else Frame().ellipsoid
-    if not 0 < axes[1] <= axes[0] < math.inf:
-        raise frame.value_error("ellipsoid", "plain.ellipsoid")
-    datum, loss = (_word(file, "adjust", key) for key in ("datum", "loss"))
-    basis = _word(file, "adjust", "unit_variance")
+    values = read_keys(file)
+    options, photo_files = values["options"], values["photo_files"]
+    photo_files |= {"crs": photo_files.get("crs") or None}
+    if options.get("loss") == "none":
+        del options["loss"]
+    if options.get("unit_variance") == "free":  # Earlier versions wrote this word for the default.
+        del options["unit_variance"]
     return Settings(
         path=path,
-        name=project.text("name", ""),
-        frame=Frame(_word(file, "frame", "kind"), frame.text("crs", ""), _origin(frame), (axes[0], axes[1])),
-        options=Options(
-            cast("DatumName", datum) if "datum" in adjust else None,
-            cast("Any", None if loss == "none" else loss),
-            # Earlier versions wrote `free` for the default.
-            cast("Any", "constrained" if basis == "free" else basis),
-            adjust.count("iterations", low=1) if "iterations" in adjust else None,
-            adjust.positive("max_bias_ratio") if "max_bias_ratio" in adjust else None,
-        ),
-        **words,
-        time_origin=_time_origin(file.optional("time")),
-        time_scale=_word(file, "time", "scale"),
+        frame=Frame(**values["frame"]),
+        options=Options(**options),
+        **values[""],
         sd=_deviations(file.optional("sd")) | dict(wishes.sd),
         tables=_tables(file.optional("tables")),
         crs={name: file.table(name).text("crs") for name in WITH_CRS if "crs" in file.optional(name)},
         columns={name: _columns(file.table(name)) for name in WITH_CRS if name in file}
         | ({} if wishes.columns == PLAIN else {"control": wishes.columns}),
         features=_features(file.optional("features")),
-        photo_files=_photo_files(file.optional("photos")),
-        statement=read_asked(file, length),
-        film=_word(file, "film", "model"),
-        interior=_word(file, "film", "interior"),
-        certificates=_certificates(file.optional("film")),
-        flown=_flown(file.optional("film")),
+        photo_files=PhotoFiles(**photo_files) if photo_files.get("directory") else None,
+        statement=values["statement"],
     )
-
-
-def _word(file: Document, section: str, key: str) -> str:
-    """Return the allowed word of a key."""
-    words = _CHOICES[section, key]
-    return file.optional(section).choice(key, words, words[0])
 
 
 def _columns(table: Table) -> Columns:
@@ -182,35 +131,6 @@ def _columns(table: Table) -> Columns:
         raise (error if error.file else table.error(key, message_of(error))) from None
 
 
-def _photo_files(table: Table) -> PhotoFiles | None:
-    """Return the folder of photographs whose files have positions."""
-    antenna = table.switch("mrk_antenna", False)
-    directory, crs = table.text("directory", ""), table.text("directory_crs", "")
-    if not directory:
-        return None
-    if not (table.file.parent / directory).is_dir():
-        raise table.error("directory", phrase("error.absent", kind="folder", name=directory))
-    return PhotoFiles(table.file.parent / directory, crs or None, antenna)
-
-
-def _certificates(table: Table) -> tuple[Path, ...]:
-    """Return the certificate files of film cameras: one text, or a list."""
-    value = table.values.get("certificate", [])
-    names = [value] if isinstance(value, str) else table.texts("certificate") if value else []
-    paths = tuple(table.file.parent / name for name in dict.fromkeys(names))
-    for path in paths:
-        if not path.is_file():
-            raise table.error("certificate", phrase("error.absent", kind="file", name=path.name))
-    return paths
-
-
-def _flown(table: Table) -> date | None:
-    try:
-        return day_of(table.values["flown"]) if "flown" in table else None
-    except ValueError:
-        raise table.value_error("flown", "error.day") from None
-
-
 def _features(table: Table) -> dict[str, Definition]:
     """Return the type and the points of each feature."""
     features: dict[str, Definition] = {}
@@ -222,27 +142,6 @@ def _features(table: Table) -> dict[str, Definition]:
             raise table.error(name, unknown_name("kind of features", kind, KINDS))
         features[name] = kind, table.table(name).texts(kind)
     return features
-
-
-def _origin(table: Table) -> tuple[float, float, float] | None:
-    if "origin" not in table:
-        return None
-    latitude, longitude, height = table.numbers("origin", 3)
-    if not (abs(latitude) <= 90 and abs(longitude) <= 360 and math.isfinite(height)):
-        raise table.value_error("origin", "plain.origin")
-    return latitude, longitude, height
-
-
-def _time_origin(table: Table) -> float | str:
-    """Return a number of seconds, or a date as text."""
-    value = table.values.get("origin", 0.0)
-    if isinstance(value, int | float):
-        return table.number("origin", 0.0)
-    try:
-        # TOML has a date type.
-        return value.isoformat() if isinstance(value, date) else datetime.fromisoformat(value).isoformat()
-    except (TypeError, ValueError):
-        raise table.value_error("origin", "plain.time-origin") from None
 
 
 def _deviations(table: Table) -> dict[str, tuple[float, ...]]:

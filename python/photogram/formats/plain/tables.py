@@ -18,8 +18,8 @@ from photogram.formats.images import Y_DOWN, is_rotation
 from photogram.formats.plain.schema import (
     ALL_ANGLES,
     ANGLES,
+    ANGULAR,
     AXES,
-    POSE,
     TABLES,
     column_units,
     covariance_columns,
@@ -73,18 +73,13 @@ class Shared:
         column: str,
         kind: type[_Kind],
         name: str,
-        *given: Any,
-        **more: Any,
+        **fields: Any,
     ) -> _Kind:
         """Return the object of a name, shared by all rows with this name."""
-        new = made(table, row, kind, name, *given, **more)
+        new = made(table, row, kind, name, **fields)
         own = self._known.setdefault((kind, name), new)
-        same = own is new or (
-            own.row()[1:] == new.row()[1:]
-            and own.is_open == new.is_open
-            and all(np.array_equal(getattr(own, each), value) for each, value in more.items())
-        )
-        if not same:
+        pairs = [(each.row()[1:], each.is_open, getattr(each, "epoch", None)) for each in (own, new)]
+        if pairs[0] != pairs[1]:
             raise table.cell_error(row, column, "plain.other-values", name=name)
         assert isinstance(own, kind)
         return own
@@ -203,10 +198,14 @@ class Tables:
     def known_matrices(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) attitudes A, photo to object, all required."""
         found = self.matrices(table)
-        unknown = np.isnan(found).any(axis=(1, 2))
+        self.check_known(table, found)
+        return found
+
+    def check_known(self, table: ColumnTable, matrices: Floats) -> None:
+        """Reject missing attitudes."""
+        unknown = np.isnan(matrices).any(axis=(1, 2))
         if unknown.any():
             raise table.error(int(np.argmax(unknown)), phrase("plain.no-angles"))
-        return found
 
     @property
     def radians(self) -> float:
@@ -228,12 +227,10 @@ class Tables:
         found: Floats = table.vectors(names, default) @ self.flip
         return found
 
-    def pose_covariances(self, table: ColumnTable, sd: Floats) -> Floats:
-        """Return (rows, 6, 6) covariances of poses in internal units."""
-        found = covariances_of(sd, table, POSE, (1.0,) * 3 + (self.radians,) * 3)
-        signs = np.tile(np.diag(self.flip), 2)
-        turned: Floats = found * signs * signs[:, np.newaxis]
-        return turned
+    def sd(self, table: ColumnTable, column: str, default: float = math.nan) -> Floats:
+        """Return (rows,) standard deviations of a column in internal units."""
+        read = self.angle if column.removeprefix("sd_") in ANGULAR else None
+        return table.numbers(column, default, infinite=True, read=read)
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
         """Reject invalid quaternions and matrices, with their rows."""
@@ -259,10 +256,9 @@ class Tables:
         common = table.numbers("sd", infinite=True) if "sd" in table and kind != "photos" else None
         found = np.empty((table.count, len(columns)))
         for k, column in enumerate(columns):
-            if column not in table and common is None:
-                found[:, k] = defaults[k]
-                continue
-            own = table.numbers(column, infinite=True)
+            if given is not None and column.removeprefix("sd_") in ANGULAR:
+                defaults[k] = self.angle(repr(defaults[k]))
+            own = self.sd(table, column)
             if common is not None:
                 own = np.where(np.isnan(own), common, own)
             found[:, k] = np.where(np.isnan(own), defaults[k], own)
@@ -334,11 +330,16 @@ def vectors_of(
 ) -> Floats:
     """Return (rows, k) numbers, complete in each row or NaN; reject incomplete rows."""
     values: Floats = table.vectors(columns, read=read)
+    check_complete(table, columns, values)
+    return values
+
+
+def check_complete(table: ColumnTable, columns: Sequence[str], values: Floats) -> None:
+    """Reject rows with only some of the numbers of a vector."""
     partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
     if partly.any():
         row = int(np.flatnonzero(partly)[0])
         raise table.error(row, phrase("plain.all-or-none", columns=list(columns)))
-    return values
 
 
 def correlations(
@@ -370,9 +371,11 @@ def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
 
 
 def angles_of(matrices: Floats, block: Block) -> Floats:
-    """Return (n, 3) omega, phi, kappa (degrees) of photo axes as columns."""
+    """Return (n, 3) omega, phi, kappa (degrees) of photo axes as columns; NaN for NaN."""
     kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-    return degrees_typed(Attitudes(matrices).values(kind), MATRIX_ROUNDING)
+    found, known = np.full((len(matrices), 3), np.nan), ~np.isnan(matrices).any(axis=(1, 2))
+    found[known] = degrees_typed(Attitudes(matrices[known]).values(kind), MATRIX_ROUNDING)
+    return found
 
 
 class Transform:

@@ -13,14 +13,15 @@ from photogram.formats.block_contents import correlated_control
 from photogram.formats.images import by_camera, to_tables
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
 from photogram.formats.plain.cameras import knots_table
+from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films_written import WrittenFilms
+from photogram.formats.plain.keys import asked_files, key_tables
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
-from photogram.formats.plain.observed_poses import observed_tables
+from photogram.formats.plain.observations import observation_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
-from photogram.formats.plain.statement_settings import asked_files, asked_tables
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import columns_of, correlations, places_written
 from photogram.formats.plain.trajectories_written import lost_smoothness, smoothness_table, trajectory_tables
@@ -113,7 +114,10 @@ def write(project: Project) -> Mapping[str, bytes]:
         **trajectory_tables(block),
         "smoothness": smoothness_table(block),
         "line_times": line_times_table(block),
-        **observed_tables(block, cameras, rigs, films),
+        **observation_tables(block),
+        **rigs.tables(block),
+        **films.tables(),
+        **covariance_tables(block, cameras, rigs, films.covariances()),
         "boards": boards_table(project.boards, block, project.details.get(REGULARISED)),
         "knots": knots_table(cameras),
         "lengths": lengths_table(project.statement.get("lengths", ())),
@@ -163,31 +167,26 @@ def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
     block, frame, options, spheroid = project.block, project.frame, project.options, project.block.spheroid
     unit = block.linear_unit if block.linear_unit in LENGTHS else "m"
     settings = project.details.get("settings")
-    time = {}
-    if isinstance(settings, Settings) and settings.times:
-        time = {"origin": settings.time_origin, "scale": settings.time_scale}
-    tables: dict[str, Mapping[str, Any]] = {
-        "project": {"format": VERSION, "name": block.title},
-        "frame": {
-            "kind": frame.kind,
-            "crs": frame.crs or None,
-            "origin": frame.origin,
-            "ellipsoid": None if spheroid is None else (spheroid.a, spheroid.b),
-        },
-        "units": {"length": unit, "angle": "deg", "image": camera_unit(block)},
-        "axes": {"image_y": image_y, "rotation": "photo_to_object" if block.photo_to_ground else None},
-        "time": time,
-        "film": {"interior": "before"} if films.before else {},
-        "adjust": {
-            "datum": options.datum,
-            "loss": options.loss or "none",
-            "unit_variance": options.unit_variance,
-            "iterations": options.max_iterations,
-            "max_bias_ratio": options.max_bias_ratio,
-        },
-        "features": {quoted_text(name): {kind: points} for name, (kind, points) in project.features.items()},
+    values: dict[str, Any] = {
+        "format": VERSION,
+        "name": block.title,
+        "frame.crs": frame.crs or None,
+        "frame.ellipsoid": None if spheroid is None else (spheroid.a, spheroid.b),
+        "length": unit,
+        "angle": "deg",
+        "image": camera_unit(block),
+        "image_y": image_y,
+        "rotation": "photo_to_object" if block.photo_to_ground else None,
+        "interior": "before" if films.before else None,
+        "options.loss": options.loss or "none",
     }
-    text = toml_text(tables | asked_tables(project.statement, unit))
+    values |= {f"frame.{name}": getattr(frame, name) for name in ("kind", "origin")}
+    names = ("datum", "unit_variance", "max_iterations", "max_bias_ratio")
+    values |= {f"options.{name}": getattr(options, name) for name in names}
+    if isinstance(settings, Settings) and settings.times:
+        values |= {"time_origin": settings.time_origin, "time_scale": settings.time_scale}
+    features = {quoted_text(name): {kind: points} for name, (kind, points) in project.features.items()}
+    text = toml_text(key_tables(values, project.statement, unit) | {"features": features})
     if isinstance(settings, Settings) and settings.path.suffix == ".toml" and settings.path.is_file():
         return with_comments(text, read_text(settings.path))
     return text
