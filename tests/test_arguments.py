@@ -26,6 +26,7 @@ PACKAGES = (
     "photogram.giant",
     "photogram.perspective_center",
     "photogram.network.refraction",
+    "photogram.network.simulation_options",
     "photogram.adjustment.robust",
     "photogram.stellar",
 )
@@ -40,6 +41,7 @@ MADE_BY_THE_LIBRARY = {
     "photogram.giant": "ErrorWarning ImageFrame Project",
     "photogram.perspective_center": "Cycle PerspectiveCenter Run Stop",
     "photogram.stellar": "CalibratedNight Result",
+    "photogram.network.simulation_options": "check_options option LONGEST",
     "photogram.adjustment.robust": "remark loss_row",
 }
 """Results and what readers make: nobody calls them with values of their own."""
@@ -188,8 +190,9 @@ def good(tmp_path_factory):
             "plan": {"patterns": {"one": block}},
             "predict": {"block": block},
             "resect": {"object_points": resected, "image_xy": seen, "principal_distance": -150.0},
-            "simulate": dict(SMALL),
+            "simulate": {"options": photogram.network.SimulationOptions(**SMALL)},
         },
+        "photogram.network.simulation_options": {"SimulationOptions": dict(SMALL)},
         "photogram.absolute_orientation": {
             "Similarity": {
                 name: getattr(oriented.similarity, name)
