@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.arrays import argument_error, shaped
+from photogram.arguments.fields import options_of
 from photogram.arguments.objects import kind_error, require, require_kind
-from photogram.arguments.options import options_of
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import MISSING
 from typing import TYPE_CHECKING, Literal, get_args
 
-from photogram.arguments.options import check_options, option
+from photogram.arguments.fields import Checked, check_fields, option
 from photogram.lazy_dataclasses import dataclass, field
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class RollingShutter:
         from photogram.arguments.arrays import one_of
         from photogram.network.moving_photos import Direction
 
-        check_options(self)
+        check_fields(self)
         one_of("direction", self.direction, get_args(Direction))
 
     @property
@@ -120,7 +120,7 @@ class LineScanner:
         from photogram.arguments.objects import kind_error
         from photogram.network.trajectories import Polynomial, Spline
 
-        check_options(self)
+        check_fields(self)
         for name in ("position", "rotation"):
             basis = getattr(self, name)
             if not isinstance(basis, Polynomial | Spline):
@@ -138,7 +138,7 @@ class LineScanner:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulationOptions:
+class SimulationOptions(Checked):
     """Options of :func:`photogram.simulate`, which are also options of `photogram simulate`.
 
     Attributes
@@ -240,9 +240,6 @@ class SimulationOptions:
     start_cameras: Sequence[Camera] | None = None
     motion: RollingShutter | LineScanner | None = None
     seed: int | np.random.Generator = option(0, 0, kind=int)
-
-    def __post_init__(self) -> None:
-        check_options(self)
 
     @property
     def footprint(self) -> float:

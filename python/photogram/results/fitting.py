@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, probability, value_field
 from photogram.errors import AdjustmentError, InputError, message_of
 from photogram.messages import Message, unknown_name
@@ -142,6 +141,3 @@ def _fitted(
     known = math.isinf(freedom)
     log = log_chi_square(statistic, beyond) if known else log_fisher(statistic / beyond, beyond, freedom)
     return replace(found, statistic=statistic, freedom=beyond, probability=math.exp(float(log)))
-
-
-check_arguments(globals(), ["features"])

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -305,6 +304,3 @@ def group_sums(
         test = global_test(q * r / s, r * r / s, own) if testable[g] and s > 0 else None
         found.append(GroupSum(name, int(counts[g]), q, r, s, test))
     return GroupSums(tuple(found), level)
-
-
-check_arguments(globals(), ["group_sums"])
