@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +13,12 @@ import typer
 from rich.markup import render
 
 import photogram
-from photogram import simulate as simulate_function
 from photogram.cli import app
 from photogram.cli.commands import application
-from photogram.cli.simulate import MotionOptions
+from photogram.cli.simulate import OfPython
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.giant import read_project
+from photogram.network import SimulationOptions
 from photogram.words import Phrase
 
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
@@ -313,17 +312,12 @@ def test_as_a_process(project):
 # simulate
 
 
-def test_the_options_of_simulate_are_the_arguments_of_the_function():
-    arguments = inspect.signature(simulate_function).parameters
+def test_the_options_of_simulate_are_the_options_of_the_function():
     options = inspect.signature(simulate_command).parameters
-    refraction = {"air_refraction", "water_refraction", "water_level", "water_index"}
-    motion = {each.name for each in fields(MotionOptions)}
-    assert set(options) - set(arguments) == {"out", "overwrite", "quiet", *refraction, *motion}
-    # GIANT files hold no lenses.
-    of_python = {"refraction", "cameras", "start_cameras", "motion"}
-    assert set(arguments) - set(options) == of_python
-    for name in set(arguments) - {"spheroid", *of_python}:
-        assert options[name].default == arguments[name].default
+    for name, field in SimulationOptions.__dataclass_fields__.items():
+        if name not in OfPython.names:
+            assert options[name].default == field.default
+    assert "motion" not in options
 
 
 @pytest.mark.giant("1", "fictitious data generator: simulated projects")
@@ -365,9 +359,10 @@ def test_simulate_in_geographic_space(run):
 
 
 def test_simulate_refuses_impossible_blocks(run, tmp_path):
-    result = run("simulate", "block", "--strips", "0")
-    assert result.exit_code == 1
-    assert result.stderr == f"error: strips: {Phrase('error.least', {'low': 1, 'value': 0})}\n"
+    for option, value in (("--strips", "0"), ("--image-sd", "0"), ("--forward-overlap", "0.5")):
+        result = run("simulate", "block", option, value)
+        assert result.exit_code == 2
+        assert option in result.stderr
     result = run("simulate", "block", *SMALL, "--control-sd", "0")
     assert result.exit_code == 1
     assert "must not be fixed" in result.stderr

@@ -570,7 +570,7 @@ def test_what_plan_refuses(run, tmp_path):
         result = run("plan", *arguments)
         assert result.exit_code == 2, arguments
         assert said in result.stderr
-    assert run("plan", *SMALL, "--strips", "0").exit_code == 1
+    assert run("plan", *SMALL, "--strips", "0").exit_code == 2
     assert run("plan", "nothing").exit_code == 1
     result = run("plan", *SMALL, "--against", "none")
     assert result.exit_code == 3

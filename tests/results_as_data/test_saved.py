@@ -26,7 +26,7 @@ from photogram import (
     simulate,
 )
 from photogram import collection as collections
-from photogram.arguments.annotations import check_members
+from photogram.arguments.fields import check_members
 from photogram.io.seals import seal
 from photogram.network import Level, OnLevel, Shift
 from photogram.results.unknowns import AdjustedCamera

@@ -6,7 +6,6 @@ from photogram.absolute_orientation.models import Model, Strip, relative_model, 
 from photogram.absolute_orientation.similarity import Similarity, read_similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.absolute_orientation.stream import transform_file
-from photogram.arguments.annotations import check_arguments
 
 __all__ = [
     "Model",
@@ -20,7 +19,3 @@ __all__ = [
     "strip_of",
     "transform_file",
 ]
-
-check_arguments(
-    globals(), ["read_cards", "read_csv", "read_similarity", "relative_model", "strip_of", "transform_file"]
-)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,8 @@ from photogram.absolute_orientation.hints import Fit, find, undecided, unit_of
 from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import names as names_of
+from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.messages import Message
@@ -111,6 +111,8 @@ def orient(
     KeyboardInterrupt
         If interrupted by Ctrl-C.
     """
+    one_of("method", method, get_args(Method))
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
     start = ("auto" if method == "rigorous" else "report") if start is None else start
     rejected = tuple(names_of("reject", reject))
     positive = {
@@ -328,6 +330,3 @@ def _named(
     if kind == "scale":
         return AdjustmentError(phrase("orientation.scale"))
     return failure_of_core(kind, message)
-
-
-check_arguments(globals(), ["orient"])

@@ -12,6 +12,7 @@ from photogram.absolute_orientation.stations import (
     MODEL_SD_COLUMNS,
     Stations,
 )
+from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.places import Place, at_place
@@ -58,6 +59,7 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         If the file cannot be read, a column is missing or unknown, or a field is not a number. The message
         contains file, record and text.
     """
+    path = path_of("path", path)
     table = Table.read(path, comment="#", spelling=spelling)
     _check_header(table)
     rows = list(table.rows())

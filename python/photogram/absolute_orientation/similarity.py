@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import is_covariance, number, numbers, shaped
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
@@ -235,6 +236,7 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     InputError
         If the file cannot be read, is not such a document, or the orientation is rejected.
     """
+    path = path_of("path", path)
     with json.holding("result of an absolute orientation", path):
         found = orjson.loads(read_bytes(path))
         is_refused, centres = usable and not found["usable"], found["centres"]

@@ -14,7 +14,6 @@ import numpy as np
 
 from photogram.adjustment.components import Settings, of_grouping, scaled
 from photogram.adjustment.snooping import snoop
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.components import VarianceComponents
@@ -197,6 +196,3 @@ def _changed(found: VarianceComponents, names: Sequence[str], factors: Floats) -
 
 def _out(snooped: Snooped) -> set[str]:
     return {entry.name for entry in snooped.removed}
-
-
-check_arguments(globals(), ["clean"])

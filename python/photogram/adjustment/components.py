@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust, adjusted_again, at_least
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import probability
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats
@@ -211,6 +210,3 @@ def _without_nothing(found: Estimate) -> Estimate:
     messages = [each for each in found.messages if keep[-1] or each.fields.get("name") != OTHERS]
     matrix = found.matrix[np.ix_(keep, keep)]
     return replace(found, components=components, messages=messages, matrix=matrix, factors=found.factors[:-1])
-
-
-check_arguments(globals(), ["variance_components"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.adjustment.adjustment import UnitVariance, adjust
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import probability
 from photogram.arguments.objects import kind_error
 from photogram.errors import InputError
@@ -145,6 +144,3 @@ def _without(block: Block, test: TermsTest) -> Block:
     changed = camera.replace(parameters={**camera.parameters, **zero}, sd={**sd, **zero})
     cameras = [changed if k == place else each for k, each in enumerate(block.cameras)]
     return block.replace(cameras=cameras)
-
-
-check_arguments(globals(), ["eliminate_terms"])

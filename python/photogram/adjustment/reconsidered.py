@@ -16,7 +16,6 @@ import numpy as np
 from photogram.adjustment.a_priori import Known
 from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_values import FirstValues, first_values
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools
 from photogram.errors import AdjustmentError
 from photogram.messages import Message
@@ -135,6 +134,3 @@ def _returned(first: FirstValues, last: FirstValues) -> list[Message]:
     images, photos = aside - int(last.set_aside.sum()), missing - len(last.missing)
     messages = [Message(phrase("first.returned.images", n=images, all=aside))] if images > 0 else []
     return messages + ([Message(phrase("first.returned.photos", n=photos, all=missing))] if photos else [])
-
-
-check_arguments(globals(), ["adjust_started"])

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from photogram.adjustment.adjustment import at_least
 from photogram.adjustment.components import Weighing
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, shaped
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
@@ -155,6 +154,3 @@ def _bins(
         middle = float(np.average(factors[inside]))
         found.append(Bin.of(each, float(values[inside].mean()), middle))
     return tuple(found)
-
-
-check_arguments(globals(), ["variance_function"])

@@ -68,6 +68,38 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
     return found
 
 
+def whole_numbers(name: str, value: ArrayLike) -> NDArray[np.int64]:
+    """Return an array of integers of any shape, possibly the caller's array."""
+    array = _of_kind(name, value, "iu", "whole numbers")
+    if array.dtype.kind == "u" and array.size and array.max() >= 2**63:
+        raise refused(name, value, "an array of whole numbers of 64 bits")
+    return array.astype(np.int64, copy=False)
+
+
+def truth_values(name: str, value: ArrayLike) -> NDArray[np.bool_]:
+    """Return an array of truth values of any shape, possibly the caller's array."""
+    return _of_kind(name, value, "b", "truth values").astype(np.bool_, copy=False)
+
+
+def _of_kind(name: str, value: ArrayLike, kinds: str, of: str) -> NDArray[Any]:
+    array = _plain(name, value, of)
+    if array.size and array.dtype.kind not in kinds:
+        raise refused(name, value, f"an array of {of}")
+    if is_masked(value):
+        raise InputError(phrase("argument.masked", name=name))
+    return array
+
+
+def elements(name: str, value: object, count: int | None = None) -> list[Any]:
+    """Return the elements of a sequence, possibly of a required number."""
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise refused(name, value, "a sequence")
+    found = np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else list(value)
+    if count is not None and len(found) != count:
+        raise refused(name, value, f"a sequence of {count}")
+    return found
+
+
 def _no_array(name: str, of: str, reason: str | Phrase) -> InputError:
     return InputError(phrase("argument.array", name=name, of=of, reason=reason))
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import TypeVar
 
-from photogram.arguments.arrays import argument_error
+from photogram.arguments.arrays import argument_error, refused
 from photogram.errors import InputError
 from photogram.messages import unknown_name
 from photogram.words import Phrase
@@ -32,6 +34,18 @@ def instances(name: str, values: object, kind: type[_Kind]) -> tuple[_Kind, ...]
         if not isinstance(value, kind):
             raise kind_error(f"{name}[{row}]", kind.__name__, value)
     return tuple(values)
+
+
+def path_of(name: str, value: object) -> Path:
+    """Return a path from a string or a path-like object."""
+    try:
+        text = os.fspath(value)  # type: ignore[call-overload]
+        os.fsencode(text)
+    except (TypeError, UnicodeEncodeError):
+        raise refused(name, value, "a path") from None
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise refused(name, value, "a path without NUL characters" if text else "a path")
+    return value if isinstance(value, Path) else Path(text)
 
 
 def require(condition: object, name: str, code: str, /, **fields: object) -> None:

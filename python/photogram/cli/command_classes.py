@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from copy import copy
+from dataclasses import Field
 from functools import cache, partial
 from inspect import Parameter
 from pathlib import Path
@@ -52,6 +54,17 @@ def declared(parameter: Parameter, owner: str) -> Parameter:
         info.metavar, info.help, info.rich_help_panel = placeholder, text, panel
     others = [mark for mark in marks if mark not in options]
     return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[(kind, info, *others)])
+
+
+def option_of(field: Field[Any], kind: type) -> Parameter:
+    """Return the option of a field of a class of options; the help shows limits of whole numbers."""
+    hint: Any = field.metadata.get("kind") or eval(str(field.type), vars(sys.modules[kind.__module__]))
+    if hint is int:
+        limits = (("min", field.metadata.get("low")), ("max", field.metadata.get("high")))
+        closed: dict[str, Any] = {name: limit for name, limit in limits if isinstance(limit, int)}
+        hint = Annotated[int, typer.Option(**closed)] if closed else int
+    parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hint)
+    return declared(parameter, kind.__name__)
 
 
 class _Params:

@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from datetime import UTC, datetime
 from enum import Enum
 from functools import wraps
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from photogram.cli.command_classes import declared, misuse
+from photogram.cli.command_classes import declared, misuse, option_of
 from photogram.cli.console import errors, failures, print_report, print_written
 from photogram.messages import Message
 from photogram.words import phrase
@@ -319,17 +319,16 @@ def _holds_path(kind: object) -> bool:
     return kind is Path or any(_holds_path(part) for part in get_args(kind))
 
 
-def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[str]]]]:
+def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[Parameter]]]]:
     """Return options and arguments of a command, and its option classes."""
     options: list[Parameter] = []
-    grouped: dict[str, tuple[type, list[str]]] = {}
+    grouped: dict[str, tuple[type, list[Parameter]]] = {}
     for parameter in signature(command, eval_str=True).parameters.values():
         kind, *marks = get_args(parameter.annotation) or (parameter.annotation,)
         if isinstance(kind, type) and is_dataclass(kind):
             without = [name for mark in marks if isinstance(mark, Without) for name in mark.names]
-            fields = signature(kind, eval_str=True).parameters.values()
-            own = [declared(field, kind.__name__) for field in fields if field.name not in without]
-            grouped[parameter.name] = kind, [field.name for field in own]
+            own = [option_of(each, kind) for each in fields(kind) if each.name not in without]
+            grouped[parameter.name] = kind, own
             options += own
         elif parameter.name != "job":
             options.append(declared(parameter, command.__name__))
@@ -366,14 +365,28 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
             quiet=values.get("quiet", False),
             options=_given(own, values),
         )
-        for name, (kind, names) in grouped.items():
-            values[name] = kind(**{each: values.pop(each) for each in names if each in values})
         with job:
+            for name, (kind, fields) in grouped.items():
+                values[name] = _made(kind, fields, values)
             command(job=job, **values)
 
     with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)
     with_one.__annotations__ = {parameter.name: parameter.annotation for parameter in own}
     return with_one
+
+
+def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> Any:
+    """Return an object of a class of options; errors of its constructor name the option."""
+    from photogram.errors import InputError
+
+    names = {each.name: _option(each) for each in options}
+    try:
+        return kind(**{name: values.pop(name) for name in names if name in values})
+    except InputError as error:
+        known = error.phrase.fields if error.phrase else {}
+        if known.get("what") not in names:
+            raise
+        raise typer.BadParameter(str(known["message"]), param_hint=names[known["what"]]) from None
 
 
 def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[str, str]:

@@ -13,24 +13,28 @@ from photogram.cli.check import EXAMPLE as GALVESTON
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import output, print_remark
 from photogram.cli.documents import TEXT, OfPrograms
-from photogram.cli.job import Job, OutputFolder, Reads, with_job
+from photogram.cli.job import Job, OutputFolder, Reads, Without, with_job
 from photogram.cli.options import Quiet
-from photogram.cli.simulate import Control, MotionOptions, NetworkOptions
+from photogram.cli.simulate import MotionOptions, OfPython, SpaceOptions
 from photogram.lazy_dataclasses import replace
+from photogram.network.simulation_options import ControlPattern, SimulationOptions
 
 if TYPE_CHECKING:
     from photogram import Block
+
+OfPlans = Without(*OfPython.names, "check_points", "blunders", "blunder_size")
 
 
 @with_job
 def plan(
     job: Job,
     *,
-    network: NetworkOptions,
+    network: Annotated[SimulationOptions, OfPlans],
+    space: SpaceOptions,
     moves: MotionOptions,
     projects: Annotated[list[Path] | None, Reads.PROJECT] = None,
     packaged: Annotated[bool, typer.Option("--example")] = False,
-    against: Control = "corners",
+    against: ControlPattern = "corners",
     against_spacing: int | None = None,
     against_position_sd: float | None = None,
     out: OutputFolder = None,
@@ -51,7 +55,9 @@ def plan(
         out = out or (Path("example-planned") if documents.plots else None)
     pictures = documents.announce(job, out, TEXT, picture="plan")
     if projects:
-        _check_alone(network, moves, against, against_spacing, against_position_sd)
+        simulated = network, space, moves, against, against_spacing, against_position_sd
+        if simulated != (SimulationOptions(), SpaceOptions(), MotionOptions(), "corners", None, None):
+            raise misuse("DIR", "simulation")
         patterns = _adjusted(projects)
     else:
         second = replace(
@@ -60,7 +66,7 @@ def plan(
             control_spacing=network.control_spacing if against_spacing is None else against_spacing,
             position_sd=network.position_sd if against_position_sd is None else against_position_sd,
         )
-        patterns = _simulated(moves, network, second)
+        patterns = _simulated(space, moves, network, second)
     made = predict(patterns)
     texts = {} if out is None else {out / TEXT: made.report().encode()}
     page = documents.page(job, "plan", out, made.document)
@@ -71,19 +77,19 @@ def plan(
     )
 
 
-def _simulated(moves: MotionOptions, *networks: NetworkOptions) -> dict[str, Block]:
+def _simulated(space: SpaceOptions, moves: MotionOptions, *networks: SimulationOptions) -> dict[str, Block]:
     """Simulate networks with true positions and without observations."""
     from photogram.network.simulation import simulate
 
     patterns = {
-        _name(network): simulate(check_points=0, **network.arguments(moves)).truth for network in networks
+        _name(network): simulate(space.of(network, moves), check_points=0).truth for network in networks
     }
     if len(patterns) < len(networks):
         raise misuse("--against", "same-pattern", pattern=next(iter(patterns)))
     return patterns
 
 
-def _name(network: NetworkOptions) -> str:
+def _name(network: SimulationOptions) -> str:
     """Return a name of a pattern from its distinctive properties."""
     spacing = network.control_spacing
     names = {
@@ -93,15 +99,6 @@ def _name(network: NetworkOptions) -> str:
     }
     weighted = math.isfinite(network.position_sd)
     return names[network.control] + (f", positions {network.position_sd:g} m" if weighted else "")
-
-
-def _check_alone(
-    network: NetworkOptions, moves: MotionOptions, against: Control, *others: float | None
-) -> None:
-    """Reject options of simulated networks in combination with projects."""
-    simulated = network != NetworkOptions() or moves != MotionOptions()
-    if simulated or against != "corners" or any(each is not None for each in others):
-        raise misuse("DIR", "simulation")
 
 
 def _adjusted(projects: list[Path]) -> dict[str, Block]:

@@ -4,82 +4,55 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.markup import escape
 
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import output, print_remark
-from photogram.cli.job import Job, Writes, with_job
+from photogram.cli.job import Job, Without, Writes, with_job
 from photogram.cli.options import AirModel, Quiet, WaterModel
-from photogram.lazy_dataclasses import dataclass, fields
+from photogram.lazy_dataclasses import asdict, dataclass, replace
+from photogram.network.simulation_options import LineScanner, RollingShutter, SimulationOptions
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from photogram.giant.common import Common
     from photogram.messages import Message
     from photogram.network.block import Block
-    from photogram.network.simulated_motion import LineScanner, RollingShutter
     from photogram.network.simulation import Simulation
 
 
-Control = Literal["perimeter", "corners", "none"]
-
-
 @dataclass(frozen=True)
-class NetworkOptions:
-    """The network of a simulated block; see :func:`photogram.simulate`."""
+class SpaceOptions:
+    """Object space of a simulated block, and its refraction."""
 
-    strips: int = 4
-    photos_per_strip: int = 10
-    forward_overlap: float = 0.6
-    side_overlap: float = 0.3
-    principal_distance: float = -152.74
-    frame_size: float = 230.0
-    flying_height: float = 4500.0
-    relief: float = 150.0
-    points_per_photo: float = 100.0
-    crab: float = 0.03
-    tilt: float = 0.01
-    control: Control = "perimeter"
-    control_spacing: int = 4
-    control_sd: float = 0.05
-    image_sd: float = 0.010
-    position_sd: float = math.inf
-    attitude_sd: float = math.inf
-    position_error: float = 30.0
-    attitude_error: float = 0.01
     spheroid: Literal["none", "clarke1866", "wgs84"] = "none"
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    photo_to_ground: bool = False
     air_refraction: AirModel | None = None
     water_refraction: WaterModel | None = None
     water_level: float = 0.0
     water_index: Annotated[float, typer.Option(min=1)] = 1.340
-    seed: Annotated[int, typer.Option(min=0)] = 0
 
-    def arguments(self, moves: MotionOptions) -> dict[str, Any]:
-        """Return the arguments of :func:`photogram.simulate`, of a network that moves so."""
+    def of(self, network: SimulationOptions, moves: MotionOptions) -> SimulationOptions:
+        """Return the options of a network in this space, of cameras that move so."""
         from photogram.network.geometry import Spheroid
         from photogram.network.refraction import Refraction
 
-        arguments: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
-        spheroids = {"clarke1866": Spheroid.clarke_1866, "wgs84": Spheroid.wgs84}
-        arguments["spheroid"] = spheroids[self.spheroid]() if self.spheroid in spheroids else None
-        if arguments["spheroid"]:
-            longitude, latitude, height = self.origin
-            arguments["origin"] = (math.radians(longitude), math.radians(latitude), height)
-        asked = arguments.pop("air_refraction"), arguments.pop("water_refraction")
-        air, water = (None if model == "none" else model for model in asked)
-        level, index = arguments.pop("water_level"), arguments.pop("water_index")
-        if moving := moves.motion():
-            arguments["motion"] = moving
-        if air or water:
-            arguments["refraction"] = Refraction(air, water, level, index)
-        return arguments
+        spheroid, (x, y, z) = None, self.origin
+        if self.spheroid != "none":
+            spheroid = Spheroid.wgs84() if self.spheroid == "wgs84" else Spheroid.clarke_1866()
+            x, y = math.radians(x), math.radians(y)
+        air = None if self.air_refraction == "none" else self.air_refraction
+        water = None if self.water_refraction == "none" else self.water_refraction
+        bent = Refraction(air, water, self.water_level, self.water_index) if air or water else None
+        return replace(network, spheroid=spheroid, origin=(x, y, z), refraction=bent, motion=moves.motion())
+
+
+OfPython = Without("spheroid", "origin", "refraction", "cameras", "start_cameras", "motion")
 
 
 @dataclass(frozen=True)
@@ -102,15 +75,12 @@ class MotionOptions:
 
     def motion(self) -> RollingShutter | LineScanner | None:
         """Return the motion of these options, if any."""
-        given = {each.name: getattr(self, each.name) for each in fields(self)}
-        given = {name: value for name, value in given.items() if value is not None and value is not False}
+        given = {name: value for name, value in asdict(self).items() if value is not None}
+        given |= {"scenes": True} if given.pop("scenes") else {}
         if not given:
             return None
         if ("readout" in given) == ("scanner" in given):
             raise misuse(_hint(given), "requires", options="either --readout or --scanner")
-        from photogram.network.simulated_motion import LineScanner, RollingShutter
-        from photogram.network.trajectories import Spline
-
         rolling = "readout" in given
         strange = given.keys() & (_OF_SCANNERS if rolling else _OF_SHUTTERS)
         if strange:
@@ -119,6 +89,8 @@ class MotionOptions:
             direction = given.pop("readout_direction", "down")
             return RollingShutter(direction=direction, **given)
         if "knots" in given:
+            from photogram.network.trajectories import Spline
+
             given["position"] = given["rotation"] = Spline(every=given.pop("knots"))
         return LineScanner(lines=given.pop("scanner"), **given)
 
@@ -127,7 +99,7 @@ _OF_SHUTTERS = {"readout_sd", "readout_direction", "speed_sd", "rate", "rate_sd"
 _OF_SCANNERS = {"view_angle", "pitch", "every", "knots", "scenes"}
 
 
-def _hint(names: set[str] | dict[str, Any]) -> str:
+def _hint(names: Iterable[str]) -> str:
     return ", ".join(f"--{name.replace('_', '-')}" for name in sorted(names))
 
 
@@ -136,11 +108,9 @@ def simulate(
     job: Job,
     *,
     out: Annotated[Path, Writes.DIRECTORY],
-    network: NetworkOptions,
+    network: Annotated[SimulationOptions, OfPython],
+    space: SpaceOptions,
     moves: MotionOptions,
-    check_points: int = 20,
-    blunders: int = 0,
-    blunder_size: float = 0.2,
     overwrite: bool = False,
     quiet: Quiet = False,
 ) -> None:
@@ -159,12 +129,7 @@ def simulate(
     from photogram.giant.project import project_files
     from photogram.network.simulation import simulate as make
 
-    simulation = make(
-        check_points=check_points,
-        blunders=blunders,
-        blunder_size=blunder_size,
-        **network.arguments(moves),
-    )
+    simulation = make(space.of(network, moves))
     block = simulation.block
     remarks: Sequence[Message] = ()
     if block.timed:

@@ -1,6 +1,5 @@
 """Collections of photos of unknown cameras: bundle adjustment "in the large"."""
 
-from photogram.arguments.annotations import check_arguments
 from photogram.collection.adjust import adjust
 from photogram.collection.collection import Collection
 from photogram.collection.formats import read, to_bytes
@@ -19,5 +18,3 @@ __all__ = [
     "simulate_turntable",
     "to_bytes",
 ]
-
-check_arguments(globals(), set(__all__) - {"AdjustedCollection", "PARAMETERS", "Simulation"})

@@ -4,8 +4,6 @@
 `correction.apply(xy_um)` corrects measurements.
 """
 
-from photogram.arguments.annotations import attach_checked
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach_checked(
-    __name__, __file__, given={"Correction", "Frame", "Grid", "Options", "Polynomial"}
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

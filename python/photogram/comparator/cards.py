@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.arguments.objects import path_of
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
 from photogram.comparator.readings import Reading, Session, collect_cases
 from photogram.errors import InputError
@@ -256,6 +257,7 @@ def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | No
     InputError
         If the file or a card cannot be read. The message names the record.
     """
+    path = path_of("path", path)
     source = Source.read(path)
     cards = (source.record(number) for number in range(1, len(source.lines) + 1))
     sessions = []

@@ -11,6 +11,7 @@ import numpy as np
 import orjson
 
 from photogram.arguments.arrays import argument_error, is_covariance
+from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.comparator.readings import Session
@@ -139,6 +140,7 @@ class Correction:
     identity: Identity | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name in ("scale_x", "scale_y"):
             if not 0 < (value := getattr(self, name)) < math.inf:
                 raise argument_error(name, "positive", value=value)

@@ -10,7 +10,8 @@ from typing import NoReturn
 
 import numpy as np
 
-from photogram.arguments.annotations import path
+from photogram.arguments.fields import check_fields
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
@@ -60,6 +61,7 @@ class Grid(Brief):
     expansion_per_k: float | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         values, counts = np.unique(self.points, return_counts=True)
         if (counts > 1).any():
             self._refuse("points", "error.repeated", kind="point", name=str(values[counts > 1][0]))
@@ -135,6 +137,7 @@ def read_grid(path: Path) -> Grid:
     InputError
         If the file cannot be read, is not such a table, or has an unknown setting.
     """
+    path = path_of("path", path)
     table = read_table(path, "point", keys=KEYS)
     points, xy = [], []
     for row in table.records.rows():
@@ -195,7 +198,7 @@ def find_grid(name: str) -> Grid:
     InputError
         If the name is neither a built-in number nor a plate file.
     """
-    file = path("name", name)
+    file = path_of("name", name)
     if is_whole_number(name) and not file.exists():
         return built_in_grid(Place().whole(name, "grid"))
     return read_grid(file)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from photogram.arguments.objects import path_of
 from photogram.comparator.cards import MAX_LEG, check_number, read_cards
 from photogram.comparator.csvfile import Setting, Table, read_table
 from photogram.comparator.grid import Grid, find_grid
@@ -43,7 +44,7 @@ def read(
     InputError
         If a file cannot be read, if tables and decks are mixed, or if no file is given.
     """
-    files = [Path(path) for path in paths]
+    files = [path_of("paths", path) for path in paths]
     if not files:
         raise InputError(phrase("comparators.files"))
     tables = [path for path in files if path.suffix.lower() == ".csv"]
@@ -89,7 +90,7 @@ def read_csv(
     """
     if not paths:
         raise InputError(phrase("comparators.files"))
-    tables = [read_table(path, "case", "point", keys=KEYS) for path in paths]
+    tables = [read_table(path_of("paths", path), "case", "point", keys=KEYS) for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
         plates = {grid.number: grid for table in tables for grid in _named_grids(table)}

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Literal
 
+from photogram.arguments.fields import Checked
 from photogram.lazy_dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(Checked):
     """Options of a calibration.
 
     The defaults follow the text of the report if its listing deviates.

@@ -11,6 +11,7 @@ from math import comb
 
 import numpy as np
 
+from photogram.arguments.fields import Checked
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
@@ -23,7 +24,7 @@ UM = 1e6  # Micrometres per metre
 
 
 @dataclass(frozen=True)
-class Frame:
+class Frame(Checked):
     """Origin and units of arguments: u = (x - centre) / half range, in micrometres."""
 
     centre_um: tuple[float, float]
@@ -69,7 +70,7 @@ def design(frame: Frame, xy_um: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Polynomial:
+class Polynomial(Checked):
     """Correction polynomials of x and y.
 
     Attributes

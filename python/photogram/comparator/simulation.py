@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.arrays import shaped
+from photogram.arguments.arrays import shaped, whole_number
 from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration, calibrate
 from photogram.comparator.case import exchanged
@@ -108,7 +108,7 @@ def simulate_calibration(
     rows = grid.rows_of(points)
     measured, places = [], exchanged(plate.xy_um, left_handed)
     places = places - (places.min(axis=0) + places.max(axis=0)) / 2
-    for k in range(cases):
+    for k in range(whole_number("cases", cases)):
         turned = places @ rotation_matrix(rotation_rad + k * math.pi / 2)
         exact = correction.invert(turned + centre_um)
         exact = exact + random_um * random.standard_normal(exact.shape)

@@ -26,7 +26,6 @@ from photogram.adjustment.adjustment import (
 from photogram.adjustment.first_features import started
 from photogram.adjustment.remarks import check_cameras
 from photogram.adjustment.robust import Loss
-from photogram.arguments.annotations import check_arguments
 from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
 from photogram.distributed.datum import Mover
 from photogram.distributed.division import Division
@@ -228,9 +227,6 @@ def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None)
     settings = Encoder(STANDS).fields(block, ["title", *IN_TABLES])
     digest.update(orjson.dumps(settings))
     return digest.hexdigest()
-
-
-check_arguments(globals(), ["adjust_in_parts", "plan_in_parts"])
 
 
 @dataclass(frozen=True)

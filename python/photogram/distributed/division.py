@@ -6,8 +6,8 @@ import re
 from os import PathLike
 from typing import Any
 
-from photogram.arguments.annotations import path
 from photogram.arguments.arrays import shown, whole_number
+from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
@@ -74,7 +74,7 @@ class Division:
         if self.memory is not None:
             bytes_of(self.memory)
         if self.folder is not None:
-            path("folder", self.folder)
+            path_of("folder", self.folder)
 
     @property
     def memory_bytes(self) -> int | None:

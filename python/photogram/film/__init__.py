@@ -1,5 +1,5 @@
 """Calibration certificates of film and plate cameras, comparison over years, interior orientation."""
 
-from photogram.arguments.annotations import attach_checked
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach_checked(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from photogram.arguments.annotations import check_arguments
+from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import DatumName, Options, Project
@@ -52,7 +52,7 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
         BLOCK: read_block_result,
         COLLECTION: read_collection_result,
     }
-    folder = Path(directory)
+    folder = path_of("directory", directory)
     document = read_summary(folder)
     kind = document["kind"]
     if kind not in readers:
@@ -101,5 +101,3 @@ def _project(path: Path, wishes: Wishes) -> Project:
 
 
 FORMAT = Format(name="results", title=TITLE, recognises=is_result, read=_project)
-
-check_arguments(globals(), ["read_result"])

@@ -1,7 +1,5 @@
 """Files of GIANT (Elassal and Malhotra, NOAA 1987)."""
 
-from photogram.arguments.annotations import attach_checked
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach_checked(
-    __name__, __file__, given={"Camera", "Common", "Frame", "GroundPoint", "Limits"}
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

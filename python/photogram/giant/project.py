@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.giant.assembly import assemble
 from photogram.giant.common import Common, parse_common
@@ -88,7 +89,7 @@ def read_project(directory: str | os.PathLike[str]) -> Project:
         If a file is missing or ambiguous, or a record cannot be read. The error names file, record number and
         record.
     """
-    directory = Path(directory)
+    directory = path_of("directory", directory)
     files = find_files(directory)
     sources = [Source.read(files["COMMON"])]
     common = parse_common(sources[0])
@@ -144,4 +145,4 @@ def write_project(project: Project, directory: str | os.PathLike[str], *, overwr
     OSError
         If the files cannot be written.
     """
-    write_whole(project_files(project, Path(directory), overwrite=overwrite))
+    write_whole(project_files(project, path_of("directory", directory), overwrite=overwrite))

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.annotations import check_members
+from photogram.arguments.fields import check_members
 from photogram.errors import InputError, message_of
 from photogram.words import phrase
 

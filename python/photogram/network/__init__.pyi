@@ -48,12 +48,13 @@ from .passages import Bend as Bend
 from .passages import Figure as Figure
 from .projecting import projected as projected
 from .rigs import Mount as Mount
-from .simulated_motion import LineScanner as LineScanner
-from .simulated_motion import RollingShutter as RollingShutter
 from .simulated_observations import with_distances as with_distances
 from .simulated_observations import with_gnss as with_gnss
 from .simulated_observations import with_inertial as with_inertial
 from .simulated_observations import with_rig as with_rig
+from .simulation_options import LineScanner as LineScanner
+from .simulation_options import RollingShutter as RollingShutter
+from .simulation_options import SimulationOptions as SimulationOptions
 from .structuring import Structure as Structure
 from .structuring import structure as structure
 from .trajectories import Clock as Clock

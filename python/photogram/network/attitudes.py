@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import frozen, length, numbers, one_of, shaped
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
@@ -229,6 +228,3 @@ def _boresight(mounting: Mounting | ArrayLike) -> Floats:
     boresight = shaped("mounting", mounting, (3, 3))
     _check_orthonormal(boresight[None])
     return frozen(boresight)
-
-
-check_arguments(globals(), ["Attitudes"])

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import length, shaped
+from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -53,6 +53,7 @@ class Spheroid:
     b: float
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not (math.isfinite(self.a) and 0 < self.b <= self.a):
             raise InputError(phrase("block.spheroid", a=self.a, b=self.b))
 
@@ -291,6 +292,3 @@ def refraction_shift(
 
 def _floats(values: ArrayLike) -> Floats:
     return np.asarray(values, dtype=np.float64)
-
-
-check_arguments(globals(), __all__)

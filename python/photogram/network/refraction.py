@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Literal, get_args
 
-from photogram.arguments.annotations import check_arguments
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import require
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import Phrase
@@ -51,6 +51,7 @@ class Refraction:
     refractive_index: float = 1.340
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name, choices in (("air", get_args(Air)), ("water", get_args(Water))):
             value = getattr(self, name)
             good = value is None or value in choices
@@ -88,6 +89,3 @@ def metres_per_unit(linear_unit: str) -> float:
     known = linear_unit in METRES_PER_UNIT
     require(known, "linear_unit with refraction", "choice", names=list(METRES_PER_UNIT), value=linear_unit)
     return METRES_PER_UNIT[linear_unit]
-
-
-check_arguments(globals(), ["Refraction", "metres_per_unit"])

@@ -13,10 +13,8 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
-from photogram.network.geometry import Spheroid
-from photogram.network.refraction import Refraction
 from photogram.network.simulated_layout import Layout, candidates, photo_ids
-from photogram.network.simulated_motion import RollingShutter
+from photogram.network.simulation_options import RollingShutter, SimulationOptions
 from photogram.network.tables import checked_cameras
 from photogram.words import phrase
 
@@ -48,16 +46,9 @@ class Taken:
 
 
 def photograph(
-    plan: Layout,
-    ground: Floats,
-    poses: tuple[Floats, Floats],
-    principal_distance: float,
-    frame_size: float,
-    spheroid: Spheroid | None,
-    photo_to_ground: bool,
-    refraction: Refraction | None,
+    plan: Layout, ground: Floats, poses: tuple[Floats, Floats], options: SimulationOptions, side: float
 ) -> Taken:
-    """Project (n, 3) grid points into square frames, in the unit of the principal distance.
+    """Project (n, 3) grid points into square frames with a side, in the unit of the principal distance.
 
     `poses` are (P, 3) positions and attitudes of the photos. Points with fewer than two images are removed.
     """
@@ -68,31 +59,26 @@ def photograph(
             ground[points],
             positions[photos],
             attitudes[photos],
-            np.full(len(photos), principal_distance),
-            spheroid=spheroid,
-            photo_to_ground=photo_to_ground,
-            refraction=refraction,
+            np.full(len(photos), options.principal_distance),
+            spheroid=options.spheroid,
+            photo_to_ground=options.photo_to_ground,
+            refraction=options.refraction,
         )
-        seen = (np.abs(xy) <= frame_size / 2).all(axis=1)
+        seen = (np.abs(xy) <= side / 2).all(axis=1)
         found.append((photos[seen], points[seen], xy[seen]))
     photos, points, xy = (np.concatenate(each) for each in zip(*found, strict=True))
     seen = np.bincount(points)[points] >= 2
     return Taken(photo_ids(plan), positions, attitudes, photos[seen], points[seen], xy[seen])
 
 
-def seen_side(
-    frame_size: float,
-    principal_distance: float,
-    motion: RollingShutter | None,
-    height: float,
-    half_angle: float,
-) -> float:
+def seen_side(options: SimulationOptions, motion: RollingShutter | None, half_angle: float) -> float:
     """Return the side of the part of the frame that images do not leave during the readout."""
     if motion is None:
-        return frame_size
-    side = frame_size - 2 * abs(principal_distance) * motion.margin(height, half_angle)
-    if not side > frame_size / 2:
-        raise InputError(phrase("simulation.readout", share=(1 - side / frame_size) / 2))
+        return options.frame_size
+    margin = motion.margin(options.flying_height - options.relief, half_angle)
+    side = options.frame_size - 2 * abs(options.principal_distance) * margin
+    if not side > options.frame_size / 2:
+        raise InputError(phrase("simulation.readout", share=(1 - side / options.frame_size) / 2))
     return side
 
 

@@ -19,7 +19,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import available_memory
 from photogram.network import geometry
-from photogram.network.geometry import Spheroid
+from photogram.network.simulation_options import SimulationOptions
 from photogram.words import phrase
 
 _FAR_MORE = 10.0  # Maximum ratio of generated to requested points
@@ -57,20 +57,14 @@ class Layout:
         return self.base / self.columns_per_base, self.separation / self.rows_per_strip
 
 
-def laid_out(
-    strips: int,
-    photos_per_strip: int,
-    forward_overlap: float,
-    side_overlap: float,
-    footprint: float,
-    points_per_photo: float,
-    reach: float,
-) -> Layout:
-    """Lay out strips; lengths in metres, `footprint` is the side of a frame on the ground.
+def laid_out(options: SimulationOptions, reach: float) -> Layout:
+    """Lay out strips; lengths in metres.
 
     InputError if there are many more image points than requested, or too many for the memory.
     """
-    base, separation = (1 - forward_overlap) * footprint, (1 - side_overlap) * footprint
+    strips, photos_per_strip = options.strips, options.photos_per_strip
+    footprint, points_per_photo = options.footprint, options.points_per_photo
+    base, separation = (1 - options.forward_overlap) * footprint, (1 - options.side_overlap) * footprint
     # Correct for points that only one photo of one strip sees, because they are removed.
     photos = strips * photos_per_strip
     lost = _covered_once(photos_per_strip, base, footprint) * _covered_once(strips, separation, footprint)
@@ -129,7 +123,7 @@ def candidates(plan: Layout) -> Iterator[tuple[Indices, Indices]]:
         yield np.broadcast_to(some[:, None, None], points.shape).ravel(), points.ravel()
 
 
-def ground_points(plan: Layout, relief: float, footprint: float, random: np.random.Generator) -> Floats:
+def ground_points(plan: Layout, options: SimulationOptions, random: np.random.Generator) -> Floats:
     """Generate ground points in the plan, (n, 3), column by column: a jittered grid on waves."""
     dx, dy = plan.cell
     columns, rows = grid(plan)
@@ -140,32 +134,28 @@ def ground_points(plan: Layout, relief: float, footprint: float, random: np.rand
     x, y = x + dx * jitter[0], y + dy * jitter[1]
     waves = 8
     heading, phase = random.uniform(0, 2 * math.pi, (2, waves))
-    wave_number = 2 * math.pi / (footprint * random.uniform(1.0, 5.0, waves))
+    wave_number = 2 * math.pi / (options.footprint * random.uniform(1.0, 5.0, waves))
     z = np.zeros_like(x)
     for h, k, p in zip(heading, wave_number, phase, strict=True):
-        z += relief / waves * np.sin(k * (math.cos(h) * x + math.sin(h) * y) + p)
+        z += options.relief / waves * np.sin(k * (math.cos(h) * x + math.sin(h) * y) + p)
     return np.stack([x, y, z], axis=-1).reshape(-1, 3)
 
 
-def flight(
-    plan: Layout, flying_height: float, crab: float, tilt: float, random: np.random.Generator
-) -> tuple[Floats, Floats]:
+def flight(plan: Layout, options: SimulationOptions, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Return projection centres in the plan and rotations from the plan to the photos."""
     strip, number = np.divmod(np.arange(plan.strips * plan.photos_per_strip), plan.photos_per_strip)
     x, y = number * plan.base - plan.length / 2, strip * plan.separation - plan.width / 2
-    deviation = random.uniform(-1.0, 1.0, (len(strip), 3)) * [tilt, tilt, crab]
+    deviation = random.uniform(-1.0, 1.0, (len(strip), 3)) * [options.tilt, options.tilt, options.crab]
     deviation[:, 2] += math.pi * (strip % 2)
-    return np.stack([x, y, np.full(len(x), flying_height)], axis=1), geometry.rotation_matrix(deviation)
+    positions = np.stack([x, y, np.full(len(x), options.flying_height)], axis=1)
+    return positions, geometry.rotation_matrix(deviation)
 
 
 def into_object_space(
-    plan_positions: Floats,
-    rotations: Floats | None,
-    origin: tuple[float, float, float],
-    spheroid: Spheroid | None,
-    photo_to_ground: bool,
+    plan_positions: Floats, rotations: Floats | None, options: SimulationOptions
 ) -> tuple[Floats, Floats]:
     """Transform positions and, if given, rotations from the plan to the object space."""
+    origin, spheroid = options.origin, options.spheroid
     positions = plan_positions + np.asarray(origin)
     if spheroid is not None:
         tangent_point = np.array([[origin[0], origin[1], 0.0]])
@@ -182,7 +172,8 @@ def into_object_space(
         convergence = np.zeros_like(positions)
         convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
         rotations = rotations @ geometry.rotation_matrix(convergence)
-    return positions, geometry.rotation_angles(rotations.transpose(0, 2, 1) if photo_to_ground else rotations)
+    matrices = rotations.transpose(0, 2, 1) if options.photo_to_ground else rotations
+    return positions, geometry.rotation_angles(matrices)
 
 
 def control_pattern(plan: Layout, terrain: Floats, pattern: str, spacing: int) -> NDArray[np.bool_]:

@@ -7,16 +7,10 @@ from their prior. Both match the model of the adjustment, so that errors agree w
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import partial
-from typing import get_args
 
 import numpy as np
 
-from photogram.arguments.arrays import argument_error, number, one_of, truth_value, whole_number
-from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats, Indices
-from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.network import geometry
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
@@ -24,127 +18,12 @@ from photogram.network.moving_photos import Direction, Shutter, Timed
 from photogram.network.observations import Attitude
 from photogram.network.projecting import camera_of, projected_images
 from photogram.network.simulated_layout import Layout
-from photogram.network.trajectories import Polynomial, Readout, Spline
+from photogram.network.simulation_options import GUSTS, RollingShutter
+from photogram.network.trajectories import Readout
 
-__all__ = ["LineScanner", "RollingShutter", "photo_angles", "rolled", "rotations_of"]
+__all__ = ["photo_angles", "rolled", "rotations_of"]
 
-_GUSTS = 0.03  # Standard deviation of a velocity component, relative to the speed
 _STARTS = 0.5  # Initial value of an unknown readout time, relative to the true one
-
-
-@dataclass(frozen=True)
-class RollingShutter:
-    """Simulated rolling shutter: rows are exposed in sequence while the camera moves.
-
-    Parameters
-    ----------
-    readout
-        Time from the first row to the last, seconds.
-    speed
-        Speed along the strips, metres per second; velocities of photos differ from it by a few percent.
-    rate
-        Standard deviation of the true rotation rate of a photo about each axis, radians per second.
-    readout_sd
-        Standard deviation of the readout time and of its initial error, seconds. Infinite: free, with half of
-        the true value as initial value. 0: fixed.
-    speed_sd, rate_sd
-        Standard deviations of the components of observed velocities (GNSS, metres per second) and rotation
-        rates (gyroscope, radians per second), used for noise and in the block. Infinite: not observed.
-    direction
-        Direction in which rows or columns are read. Strips are flown along x of the photos: `right` and
-        `left` read along and against the flight, `down` and `up` across it.
-    """
-
-    readout: float
-    speed: float = 9.0
-    rate: float = 0.1
-    readout_sd: float = math.inf
-    speed_sd: float = 0.05
-    rate_sd: float = 0.02
-    direction: Direction = "down"
-
-    def __post_init__(self) -> None:
-        one_of("direction", self.direction, get_args(Direction))
-        within = {"readout": (0, 10), "speed": (0, 1e5), "rate": (0, 10)}
-        _check_numbers(self, within, ("readout_sd", "speed_sd", "rate_sd"))
-
-    @property
-    def turned(self) -> float:
-        """Practical upper bound of the rotation of a photo during readout, radians."""
-        return 5 * self.rate * self.readout
-
-    def margin(self, height: float, half_angle: float) -> float:
-        """Return the maximum image motion during readout, in principal distances."""
-        flown = (1 + 5 * _GUSTS) * self.speed * self.readout / height
-        return (flown + self.turned) * (1 + math.tan(half_angle) ** 2)
-
-
-@dataclass(frozen=True)
-class LineScanner:
-    """Simulated line scanner: sensor lines across the flight direction behind one lens.
-
-    Parameters
-    ----------
-    lines
-        1: nadir; 2: forward and backward; 3: forward, nadir and backward. Each gives one image per strip.
-    view_angle
-        Angle between the nadir and the forward or backward view, radians.
-    pitch
-        Millimetres between samples. The ground distance of lines equals the ground distance of samples.
-    speed
-        Flying speed, metres per second.
-    every
-        Seconds between trajectory records, and between GNSS and inertial records.
-    position, rotation
-        Basis of the trajectory errors; the coefficients are drawn and weighted.
-    scenes
-        True: each photo of the layout is a scene with the length of a frame, on a trajectory of its own (e.g.
-        from orbit). False: each strip is one scene.
-    """
-
-    lines: int = 3
-    view_angle: float = 0.35
-    pitch: float = 0.01
-    speed: float = 70.0
-    every: float = 1.0
-    position: Polynomial | Spline = field(default_factory=partial(Spline, every=4.0))
-    rotation: Polynomial | Spline = field(default_factory=partial(Spline, every=4.0))
-    scenes: bool = False
-
-    def __post_init__(self) -> None:
-        lines = whole_number("lines", self.lines)
-        require(lines in (1, 2, 3), "lines", "whole-range", low=1, high=3, value=lines)
-        truth_value("scenes", self.scenes)
-        within = {"view_angle": (0, 1.2), "pitch": (1e-6, 10), "speed": (1e-3, 1e5), "every": (1e-6, 1e6)}
-        _check_numbers(self, within, ())
-        for name in ("position", "rotation"):
-            basis = getattr(self, name)
-            if not isinstance(basis, Polynomial | Spline):
-                raise kind_error(f"{name} of a scanner", "a Polynomial or a Spline", basis)
-            if isinstance(basis, Spline) and (basis.smooth or basis.correlation):
-                where, other = f"{name} of a scanner", "a simulation, which draws independent coefficients"
-                raise argument_error(where, "not-applicable", name="smooth or correlation", other=other)
-
-    @property
-    def views(self) -> dict[str, float]:
-        """Names of the lines and their forward viewing angles, radians."""
-        ahead = {"forward": self.view_angle, "nadir": 0.0, "backward": -self.view_angle}
-        chosen = {1: ["nadir"], 2: ["forward", "backward"], 3: list(ahead)}[self.lines]
-        return {name: ahead[name] for name in chosen}
-
-
-def _check_numbers(
-    given: RollingShutter | LineScanner,
-    within: Mapping[str, tuple[float, float]],
-    deviations: tuple[str, ...],
-) -> None:
-    for name in (each.name for each in fields(given)):
-        value = getattr(given, name)
-        if name in within:
-            low, high = within[name]
-            require(low <= number(name, value) <= high, name, "range", low=low, high=high, value=value)
-        elif name in deviations:
-            require(number(name, value) >= 0, name, "not-negative", value=value)
 
 
 def photo_angles(axes: Floats, photo_to_ground: bool) -> Floats:
@@ -173,7 +52,7 @@ def rolled(
     count = len(truth.photo_ids)
     strip, along = np.divmod(np.arange(count), layout.photos_per_strip)
     sense = 1.0 - 2.0 * (strip % 2)
-    velocities = _GUSTS * shutter.speed * random.standard_normal((count, 3))
+    velocities = GUSTS * shutter.speed * random.standard_normal((count, 3))
     velocities[:, 0] += sense * shutter.speed
     rates = shutter.rate * random.standard_normal((count, 3))
     nominal = np.column_stack([sense * shutter.speed, np.zeros((count, 2))])

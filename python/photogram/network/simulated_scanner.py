@@ -16,7 +16,8 @@ from photogram.network.observations import Attitude, Observation, Position
 from photogram.network.projecting import projected, standing
 from photogram.network.simulated_images import Taken
 from photogram.network.simulated_layout import Layout, grid, photo_ids, window
-from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
+from photogram.network.simulated_motion import photo_angles, rotations_of
+from photogram.network.simulation_options import LineScanner, SimulationOptions
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
 _BETWEEN = 60.0  # Minimum time between two passes, seconds
@@ -28,43 +29,30 @@ many lines."""
 
 
 @dataclass(frozen=True)
-class Flown:
-    """Flight of a scanner: plan in metres, camera in millimetres, angles in radians.
-
-    Sensor lines have the length of the frame. `crab` and `tilt` are the maximum deviations from heading and
-    vertical. `image_sd` refers to the focal plane. `errors` and `sd` belong to the coefficients of positions
-    and rotations, and to their observations. `origin` (3,) is the plan origin in the object space.
-    """
+class _Flight:
+    """Flight of a scanner."""
 
     scanner: LineScanner
-    principal_distance: float
-    frame_size: float
-    height: float
-    crab: float
-    tilt: float
-    image_sd: float
-    errors: tuple[float, float]
-    sd: tuple[float, float]
-    origin: Floats
-    photo_to_ground: bool
+    options: SimulationOptions
 
     @property
     def line(self) -> float:
         """Seconds between lines, for equal ground distances of lines and samples."""
-        c = abs(self.principal_distance)
-        return self.scanner.pitch * self.height / c / self.scanner.speed
+        c = abs(self.options.principal_distance)
+        return self.scanner.pitch * self.options.flying_height / c / self.scanner.speed
 
     @property
     def ahead(self) -> float:
         """Maximum ground distance ahead of the camera in view of a line, metres."""
-        return self.height * math.tan(max(self.scanner.views.values()))
+        return self.options.flying_height * math.tan(max(self.scanner.views.values()))
 
     def sensors(self) -> dict[str, LineSensor]:
         """Return the sensor lines by name, each with the length of the frame."""
         pitch = self.scanner.pitch
-        middle = round(self.frame_size / pitch) / 2
+        middle = round(self.options.frame_size / pitch) / 2
+        distance = -self.options.principal_distance
         return {
-            name: LineSensor((pitch, 0.0), middle, y0=-self.principal_distance * math.tan(angle))
+            name: LineSensor((pitch, 0.0), middle, y0=distance * math.tan(angle))
             for name, angle in self.scanner.views.items()
         }
 
@@ -86,10 +74,17 @@ class _Pass:
     points: Indices
 
 
-def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Generator) -> Taken:
+def scanned(
+    layout: Layout,
+    options: SimulationOptions,
+    scanner: LineScanner,
+    ground: Floats,
+    random: np.random.Generator,
+) -> Taken:
     """Scan (n, 3) grid points of a layout in the object space with a line scanner."""
+    flown = _Flight(scanner, options)
     sensors = flown.sensors()
-    cameras = [Camera("perspective", {"c": flown.principal_distance}, name=name) for name in sensors]
+    cameras = [Camera("perspective", {"c": options.principal_distance}, name=name) for name in sensors]
     ids: list[str] = []
     poses: list[tuple[Floats, Floats]] = []
     found: list[tuple[Indices, Floats, Floats]] = []
@@ -105,7 +100,7 @@ def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Gene
             ids.append(each.name if len(cameras) == 1 else f"{each.name} {name}")
             for photos, trajectory in zip(timed, both, strict=True):
                 photos.append(Timed(ids[-1], trajectory, lines=lines, line_sensor=sensor))
-            found.append(_images(each, timed[0][-1], camera, ground, flown.image_sd))
+            found.append(_images(each, timed[0][-1], camera, ground, options.image_sd))
             poses.append(pose)
     of = np.repeat(np.arange(len(ids)), [len(points) for points, _, _ in found])
     points, xy, per_error = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -118,7 +113,7 @@ def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Gene
     return Taken(
         ids,
         np.array([place for place, _ in poses]),
-        photo_angles(np.array([axes for _, axes in poses]), flown.photo_to_ground),
+        photo_angles(np.array([axes for _, axes in poses]), options.photo_to_ground),
         of[tied],
         points[tied],
         xy[tied],
@@ -128,11 +123,11 @@ def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Gene
     )
 
 
-def _passes(layout: Layout, flown: Flown) -> Iterator[_Pass]:
+def _passes(layout: Layout, flown: _Flight) -> Iterator[_Pass]:
     """Yield strips, or scenes, in sequence."""
     columns, rows = window(layout)
     all_columns, all_rows = grid(layout)
-    half = flown.frame_size / 2 / abs(flown.principal_distance) * flown.height
+    half = flown.options.footprint / 2
     scenes = flown.scanner.scenes
     digits = max(2, len(str(layout.strips)))
     strips = [f"{strip:0{digits}d}" for strip in range(1, layout.strips + 1)]
@@ -152,28 +147,32 @@ def _passes(layout: Layout, flown: Flown) -> Iterator[_Pass]:
         start = math.ceil(start + seconds + _BETWEEN)
 
 
-def _trajectories(each: _Pass, flown: Flown, random: np.random.Generator) -> tuple[Trajectory, Trajectory]:
+def _trajectories(each: _Pass, flown: _Flight, random: np.random.Generator) -> tuple[Trajectory, Trajectory]:
     """Return the true trajectory and the known one, with the same table and other coefficients."""
-    scanner = flown.scanner
+    scanner, options = flown.scanner, flown.options
     times = np.arange(-1.0, math.ceil(each.seconds / scanner.every) + 2) * scanner.every + each.start
     along = each.first + each.sense * scanner.speed * (times - each.start)
-    places = np.column_stack([along, np.full(len(times), each.across), np.full(len(times), flown.height)])
+    places = np.column_stack(
+        [along, np.full(len(times), each.across), np.full(len(times), options.flying_height)]
+    )
     # Samples are to the right of the flight direction, y of the camera is ahead.
-    heading = random.uniform(-flown.crab, flown.crab) - each.sense * math.pi / 2
+    heading = random.uniform(-options.crab, options.crab) - each.sense * math.pi / 2
     vectors = np.zeros((len(times), 3))
     for axis in (0, 1):
         periods, phases = random.uniform(*_PERIODS, 3), random.uniform(0, 2 * math.pi, 3)
         waves = np.sin(2 * math.pi * times[:, np.newaxis] / periods + phases)
-        vectors[:, axis] = flown.tilt * waves.mean(axis=1)
+        vectors[:, axis] = options.tilt * waves.mean(axis=1)
     axes = rotations_of(np.array([[0.0, 0.0, heading]])) @ rotations_of(vectors)
-    table = Table(times, places + flown.origin, times, axes)
+    table = Table(times, places + np.asarray(options.origin), times, axes)
     true: list[Polynomial | Spline | None] = [None, None]
     given = true.copy()
     # Images would not determine the last coefficients of a spline that extends beyond them.
     beyond = _BEYOND * flown.line
-    for which, (basis, error, sd) in enumerate(
-        zip((scanner.position, scanner.rotation), flown.errors, flown.sd, strict=True)
-    ):
+    bases = (
+        (scanner.position, options.position_error, options.position_sd),
+        (scanner.rotation, options.attitude_error, options.attitude_sd),
+    )
+    for which, (basis, error, sd) in enumerate(bases):
         # Fixed or errorless trajectories need no corrections.
         if error and sd:
             placed = basis.over(each.start - beyond, each.start + each.seconds + beyond)
@@ -187,7 +186,7 @@ def _trajectories(each: _Pass, flown: Flown, random: np.random.Generator) -> tup
 
 
 def _records(
-    each: _Pass, both: tuple[Trajectory, Trajectory], flown: Flown, random: np.random.Generator
+    each: _Pass, both: tuple[Trajectory, Trajectory], flown: _Flight, random: np.random.Generator
 ) -> tuple[list[Observation], list[Observation]]:
     """Return errorless and noisy observations of positions and attitudes of a pass."""
     every = flown.scanner.every
@@ -195,7 +194,7 @@ def _records(
     times = np.asarray(each.start + every * (np.arange(count) + 0.5), dtype=np.float64)
     places, axes = given_poses(both[0], times)
     parts: tuple[list[Observation], list[Observation]] = ([], [])
-    position_sd, attitude_sd = flown.sd
+    position_sd, attitude_sd = flown.options.position_sd, flown.options.attitude_sd
     draws = random.standard_normal((2, len(times), 3))
     for part, trajectory, error in zip(parts, both, (0.0, 1.0), strict=True):
         if 0 < position_sd < math.inf:

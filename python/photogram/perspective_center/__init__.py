@@ -1,6 +1,5 @@
 """Perspective centre of a projector (USGS Computer Contribution 2, 1969)."""
 
-from photogram.arguments.annotations import check_arguments
 from photogram.perspective_center.batch import Run, Stop, run_deck
 from photogram.perspective_center.deck import read_deck
 from photogram.perspective_center.grid import Coordinatograph, Grid, joined, reduce
@@ -19,5 +18,3 @@ __all__ = [
     "reduce",
     "run_deck",
 ]
-
-check_arguments(globals(), set(__all__) - {"Cycle", "PerspectiveCenter", "Run", "Stop"})

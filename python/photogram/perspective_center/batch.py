@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import get_args
 
+from photogram.arguments.arrays import one_of
+from photogram.arguments.objects import path_of
 from photogram.errors import InputError, PhotogramError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
@@ -96,6 +99,8 @@ def run_deck(
     InputError
         If the deck cannot be read at all, or `together` and `as_published` are combined.
     """
+    path = path_of("path", path)
+    one_of("weights", weights, get_args(Weights))
     if together and as_published:
         raise InputError(phrase("projector.published-sets"))
     deck = Deck(path)

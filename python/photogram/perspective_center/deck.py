@@ -20,6 +20,7 @@ from pathlib import Path
 import fortranformat
 import numpy as np
 
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.io.records import Record, Source
 from photogram.lazy_dataclasses import dataclass
@@ -267,4 +268,5 @@ def read_deck(path: Path) -> list[Grid]:
         the plate, it contains `ERROR - CARDS ARE OUT OF ORDER AT POINT NO.` and the expected number, as in
         the report.
     """
+    path = path_of("path", path)
     return list(Deck(path).grids())

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.arrays import names, number, shaped
+from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -29,7 +30,7 @@ def single(values: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Coordinatograph:
+class Coordinatograph(Checked):
     """Correction factors of a coordinatograph.
 
     Attributes
@@ -104,6 +105,7 @@ class Grid(Brief):
     number: int = 1
 
     def __post_init__(self) -> None:
+        check_fields(self)
         count = len(names("ids", self.ids))
         shapes: dict[str, tuple[int, ...]] = {
             "plate_xy": (count, 2),

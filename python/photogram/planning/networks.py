@@ -9,7 +9,6 @@ import numpy as np
 
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
-from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -115,6 +114,3 @@ def plan(
                 phrase("error.at", what=name, message=message_of(error)), error.photos, error.points
             ) from None
     return Plan(tuple(made))
-
-
-check_arguments(globals(), ["plan"])

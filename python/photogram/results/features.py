@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, probability, value_field
 from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
@@ -398,6 +397,3 @@ def _fitted(
     known = math.isinf(freedom)
     log = log_chi_square(statistic, beyond) if known else log_fisher(statistic / beyond, beyond, freedom)
     return replace(found, statistic=statistic, freedom=beyond, probability=math.exp(float(log)))
-
-
-check_arguments(globals(), ["features"])

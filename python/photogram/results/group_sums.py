@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
@@ -492,6 +491,3 @@ def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, st
     return Grouping(
         groups, images, points, photos, observations, of.commons, len(of.camera_names), of.records
     )
-
-
-check_arguments(globals(), ["group_sums"])

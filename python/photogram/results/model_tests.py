@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
@@ -416,6 +415,3 @@ def _is_within(small: Result, large: Result) -> bool:
         a.given.model == b.given.model and set(a.estimated) <= set(b.estimated)
         for a, b in zip(small.cameras, large.cameras, strict=True)
     )
-
-
-check_arguments(globals(), ["compare", "score_test", "terms_test"])

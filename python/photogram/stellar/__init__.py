@@ -1,23 +1,5 @@
 """Stellar camera calibration with plates (NOAA Technical Report NOS 55, 1972) or digital exposures."""
 
-from photogram.arguments.annotations import attach_checked
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach_checked(
-    __name__,
-    __file__,
-    given={
-        "Air",
-        "Axis",
-        "BrownCamera",
-        "Catalogue",
-        "Earth",
-        "Effects",
-        "Exposure",
-        "Night",
-        "Options",
-        "PlateCamera",
-        "Problem",
-        "Site",
-        "SkyCamera",
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

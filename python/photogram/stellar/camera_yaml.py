@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
+from photogram.arguments.arrays import one_of
+from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.io.json import Tree
 from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
@@ -57,6 +59,7 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
     matrix = np.array([[values["fx"], 0, values["cx"]], [0, values["fy"], values["cy"]], [0, 0, 1]], float)
     coefficients = [values.get(term, 0.0) for term in terms]
     width, height = round(frame[0]), round(frame[1])
+    one_of("form", form, get_args(YamlForm))
     if form == "ros":
         return camera_info(name, (width, height), matrix, (model, coefficients))
     order = ("fx", "fy", "cx", "cy", *terms)
@@ -86,6 +89,7 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
     InputError
         If the file cannot be read, has another format, or contains unsupported lens terms.
     """
+    path = path_of("path", path)
     content = Tree(read_yaml_text(path), path)
     matrix = _member(content, *_MATRIX)
     values = matrix.get("data", None).numbers(9).reshape(3, 3)

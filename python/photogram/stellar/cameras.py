@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
+from photogram.arguments.fields import Checked
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.json import read_json, to_json
@@ -32,7 +33,7 @@ _POWERS = {"rad": 0, "m": 1, "m^-1": -1, "m^-2": -2, "m^-3": -3, "m^-4": -4, "m^
 
 
 @dataclass(frozen=True, eq=False)
-class PlateCamera:
+class PlateCamera(Checked):
     """Calibrated plate camera.
 
     Attributes
@@ -195,7 +196,7 @@ def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> C
     InputError
         If the file cannot be read, or is not a camera.
     """
-    file = Path(path)
+    file = path_of("path", path)
     document = read_json(file)
     if "nonorthogonality_rad" in document or "correction" in document:
         raise InputError(phrase("stars.correction"), file=file)
@@ -243,6 +244,3 @@ def camera_document(result: Result) -> bytes:
         },
     }
     return to_json(document)
-
-
-check_arguments(globals(), ["camera_from"])

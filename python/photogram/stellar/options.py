@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from photogram.arguments.fields import check_fields
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, fields
 from photogram.show.angles import ARCSEC
@@ -95,6 +96,7 @@ class Options:
     as_published: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.pre_run and not self.minimum_stars:
             raise InputError(phrase("error.requires", name="pre_run", other="minimum_stars"))
         largest = {"movement_time": _DAYS}

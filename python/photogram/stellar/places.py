@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.fields import Checked
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
 
 
 @dataclass(frozen=True)
-class Earth:
+class Earth(Checked):
     """Earth orientation parameters of the IERS.
 
     Attributes

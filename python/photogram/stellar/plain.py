@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Bools, Floats
 from photogram.io.places import Place, at_place
 from photogram.io.rows import Row, read_rows
@@ -68,6 +69,7 @@ def read_plain(path: Path) -> Problem:
     path
         TOML file. It names the CSV files of stars and images, relative to its folder.
     """
+    path = path_of("path", path)
     document = read_document(path, _TABLES)
     with at_place(Place(path)):
         return _problem(document)

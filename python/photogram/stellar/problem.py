@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -27,7 +28,7 @@ def default_parameters(principal_distance: float) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class Axis(Checked):
     """Known external direction of the camera (option 2, equation 72).
 
     Attributes
@@ -109,6 +110,7 @@ class Problem(Brief):
     labels: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         stars, images = len(self.star_ids), len(self.image_points)
         shapes = {
             "star_places": (stars, 2),

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import shaped
+from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -51,6 +52,7 @@ class Air:
     pressure: float = 760.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         low, high = TEMPERATURES
         if not low <= self.temperature <= high:
             raise InputError(phrase("stars.temperature", value=self.temperature, low=low, high=high))
@@ -98,7 +100,7 @@ def refraction(
 
 
 @dataclass(frozen=True)
-class Effects:
+class Effects(Checked):
     """Effects included in apparent positions; others are neglected.
 
     Attributes
@@ -125,7 +127,7 @@ class Effects:
 
 
 @dataclass(frozen=True)
-class Site:
+class Site(Checked):
     """Station for sky observations.
 
     Attributes

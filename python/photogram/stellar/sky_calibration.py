@@ -14,6 +14,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import LARGEST_SD, length, shaped
+from photogram.arguments.fields import Checked
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -35,7 +36,7 @@ _PER_IMAGE = 2000  # Memory per image, bytes
 
 
 @dataclass(frozen=True, eq=False)
-class Exposure:
+class Exposure(Checked):
     """Digital exposure with star images.
 
     Attributes

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.json import Tree, read_json, to_json
@@ -98,6 +99,7 @@ class SkyCamera:
     common_scale: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         count = len(lens_named(self.lens).names)
         if np.shape(self.values) != (count,) or np.shape(self.covariance) != (count, count):
             shapes = {"values": np.shape(self.values), "covariance": np.shape(self.covariance)}

@@ -1,7 +1,5 @@
 """Target calibration of cameras and rigs from board corners in images."""
 
-from photogram.arguments.annotations import attach_checked
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach_checked(
-    __name__, __file__, given={"Board", "Calibration", "Candidate", "Corners", "WorthOptions"}
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

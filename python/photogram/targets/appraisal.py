@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust, adjusted_again
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error
 from photogram.arguments.types import Bools
 from photogram.errors import InputError, RankError, message_of
@@ -198,6 +197,3 @@ def median_distance(calibrated: Calibrated, camera: int) -> float:
     """Return the median distance of board centre and camera, rounded to two digits."""
     housing, own = housing_of(calibrated, camera)
     return float(f"{np.median(housing.board_distances(own)):.{DISTANCE_FIGURES}g}")
-
-
-check_arguments(globals(), ["cross_validate"])

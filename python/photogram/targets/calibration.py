@@ -11,7 +11,6 @@ import numpy as np
 from photogram.adjustment.adjustment import Progress, adjust, adjusted_again
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.snooping import snoop
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, one_of
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError, RankError
@@ -299,6 +298,3 @@ def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:
         raise InputError(phrase("targets.no-image", corner=corners.title(row)))
     errors = calibration.sd0 * corners.sd[:, np.newaxis] * random.standard_normal(xy.shape)
     return calibration.replace(corners=corners.replace(xy=xy + errors))
-
-
-check_arguments(globals(), ["simulate_corners"])

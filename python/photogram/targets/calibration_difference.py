@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
@@ -194,6 +197,7 @@ def compared(
     them. `radius` limits the pixels of the fit about the centre. Without it, all weighted pixels are used if
     both covariances are known, else a sixth of the shorter side. The grid is pixels across and down.
     """
+    one_of("criterion", criterion, get_args(Criterion))
     columns, rows, pixels = image_grid(size, grid)
     known = a.covariance is not None and b.covariance is not None
     reach = radius or (np.inf if known else min(size) / 6)

@@ -18,6 +18,7 @@ from typing import Literal, Self
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import whole_number
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.methods import Brief, Rows
@@ -82,7 +83,8 @@ def splits(views: int, into: str | int) -> list[tuple[list[int], list[int]]]:
         return [(numbers[::2], numbers[1::2])]
     if into == "halves":
         return [(numbers[: views // 2], numbers[views // 2 :])]
-    folds = [numbers[k :: int(into)] for k in range(int(into))]
+    count = whole_number("into", into)
+    folds = [numbers[k::count] for k in range(count)]
     return [(sorted(set(numbers) - set(fold)), fold) for fold in folds]
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, Shades, contours
@@ -291,6 +290,3 @@ def _with_vectors(panel: Panel, places: Floats, vectors: Floats, marked: Bools, 
     ]
     dots = Markers(places, ".", 3.0, FAINT)
     return replace(panel, marks=[dots, *arrows], bars=[(scale * length, BLUE, f"{length:g} px")])
-
-
-check_arguments(globals(), [name for name in __all__ if name.startswith("plot")] + __all__)

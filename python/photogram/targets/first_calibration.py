@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
@@ -325,6 +324,3 @@ def _of_views(made: Floats, rig: Rig, corners: Corners) -> Floats:
             agreeing = own & ~rig.apart if (own & ~rig.apart).any() else own
             found[view] = mean_pose(to_reference[agreeing & (of == of[agreeing].min())])
     return found
-
-
-check_arguments(globals(), ["nominal_camera"])

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from photogram.adjustment.components import variance_components
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -174,6 +173,3 @@ def corner_components(
             names = [f"{block.camera_names[k]}, {name}" for k, name in zip(own, names, strict=True)]
         groups = {"images": names}
     return variance_components(block, groups, threads=threads, progress=progress)
-
-
-check_arguments(globals(), ["corner_components", "residual_groups"])

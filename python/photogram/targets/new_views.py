@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.arguments.fields import Checked
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
@@ -30,7 +31,7 @@ MAX_RAY_ERROR = 1e-6  # of a reprojected image; beyond it the distortion is not 
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class Candidate(Checked):
     """Candidate view of the board.
 
     Attributes

@@ -7,11 +7,12 @@ T. It defines the motion tau = T db, (dt, w), of the camera axes for a change db
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
@@ -40,6 +41,7 @@ def datum_rows(
     For `image`, `fixed` contains (n, 3) fixed points in camera axes, their (n, 2, 2) weights W, and whether
     they are at finite distances.
     """
+    one_of("datum", datum, get_args(DatumName))
     found = np.zeros((6, housing.common + 6))
     own = housing.parameters(camera)
     if datum == "corners":

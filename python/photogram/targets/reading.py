@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import get_args
 
 import numpy as np
 
+from photogram.arguments.arrays import one_of
+from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
@@ -84,7 +87,9 @@ def read(
         If no known format is found, if corners lack a board, if there are several formats, or if a file is
         invalid. The message names file and record.
     """
-    path = Path(path)
+    path = path_of("path", path)
+    one_of("views", views, get_args(ViewBy))
+    one_of("pixel_origin", pixel_origin, ("corner", "center"))
     models, boards, corners = sorted_files(path)
     described = [board] if isinstance(board, Path) else boards if board is None else []
     own = board if isinstance(board, Board) else _only_board(described)

@@ -8,7 +8,6 @@ from itertools import product
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
@@ -158,6 +157,3 @@ def views_towards(
         words = (place, f"{distance} {board.unit}", tilt, turn)
         found.append(Candidate(", ".join(filter(None, words)), pose))
     return found
-
-
-check_arguments(globals(), ["suggest_views"])

@@ -12,13 +12,12 @@ points: averaging many points does not reduce them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import argument_error, length, shaped
+from photogram.arguments.arrays import argument_error, length, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -179,6 +178,7 @@ def triangulate(
     where = shaped("pixels", pixels, (length("pixels", pixels), len(numbers), 2))
     if not 0 < pixel_sd < np.inf:
         raise argument_error("pixel_sd", "positive", value=pixel_sd)
+    one_of("datum", datum, get_args(Axes))
     still = housing_rows(housing) if datum == "corners" else None
     return triangulated(housing, numbers, where, pixel_sd, still)
 
@@ -239,6 +239,3 @@ def _of_rig(result: Calibrated, cameras: Sequence[int | str]) -> tuple[Housing, 
     if not set(numbers) <= set(housed):
         raise InputError(phrase("targets.not-tied"))
     return housing_of(result, numbers[0])[0], [housed.index(each) for each in numbers]
-
-
-check_arguments(globals(), ["distance_uncertainty", "triangulate"])

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, length, shaped, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -251,8 +250,3 @@ def _side(given: object, camera: int | str, name: str) -> Side:
         covariance=housing.variance * housing.cofactors[columns, columns],
         rows=datum_rows(housing, own, "corners")[:, columns],
     )
-
-
-check_arguments(
-    globals(), ["difference", "projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"]
-)

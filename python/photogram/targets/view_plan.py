@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust
-from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error, whole_number
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
@@ -137,6 +136,3 @@ def _predicted(
     start = Calibration(board=board, corners=corners, cameras=[camera], poses=poses, sd0=sd0)
     result = adjust(weighted_block(start), unit_variance="unity", covariance="verdict")
     return Calibrated(calibration=start, result=result)
-
-
-check_arguments(globals(), __all__)

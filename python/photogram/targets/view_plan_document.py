@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.annotations import check_arguments
 from photogram.lazy_dataclasses import replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.hull import hull
@@ -122,6 +121,3 @@ def plot_planned_views(plan: ViewPlan) -> Plot:
     return Plot(
         PANEL_INCHES * PANELS_PER_ROW, rows * (0.3 + PANEL_INCHES * size[1] / size[0]), every, PANELS_PER_ROW
     )
-
-
-check_arguments(globals(), __all__)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from photogram.arguments.fields import Checked
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation, Into
@@ -15,7 +16,7 @@ from photogram.words import Phrase
 
 
 @dataclass(frozen=True)
-class WorthOptions:
+class WorthOptions(Checked):
     """Options of the assessment of a calibration.
 
     Attributes

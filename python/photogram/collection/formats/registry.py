@@ -7,6 +7,7 @@ from importlib import import_module
 from itertools import chain
 from pathlib import Path
 
+from photogram.arguments.objects import path_of
 from photogram.collection.collection import Collection
 from photogram.errors import InputError
 from photogram.io.packed_numbers import packed, pieces
@@ -52,6 +53,7 @@ def recognised(path: Path) -> tuple[Collection, Format]:
 
 def read(path: Path) -> Collection:
     """Read a collection, optionally packed by bzip2 or gzip; see `recognised`."""
+    path = path_of("path", path)
     return recognised(path)[0]
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction, partials_of
@@ -227,7 +228,7 @@ def compare(
         elif isinstance(each, RecordedCalibration):
             records.append(each)
         else:
-            records += RecordedCalibration.read(Path(each))
+            records += RecordedCalibration.read(path_of(f"calibrations[{number - 1}]", each))
     if len(records) < 2:
         raise InputError(phrase("comparators.two", count=len(records)))
     records.sort(key=lambda record: record.day)

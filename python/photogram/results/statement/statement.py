@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.annotations import check_arguments
 from photogram.errors import AdjustmentError, InputError
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
@@ -332,6 +331,3 @@ def statement(
         assumed=assumed,
         strict=strict,
     )
-
-
-check_arguments(globals(), ["statement"])

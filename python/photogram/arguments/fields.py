@@ -1,0 +1,155 @@
+"""Fields of dataclasses, declared once by their type and limits: arguments and options.
+
+A class of options is the parameter of a function of Python and of a command. This module imports no
+arrays, so that the help of a command needs none.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
+from typing import Any, Literal, TypeVar, get_args
+
+from photogram.lazy_dataclasses import field, fields, replace
+
+Options = TypeVar("Options")
+Check = Callable[[str, Any], Any]
+"""Function of name and value; returns the converted value or raises an error."""
+_TUPLE = re.compile(r"tuple\[((?:int|float|str|, )+)(, \.\.\.)?\]")
+
+
+def option(
+    default: Any,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    is_open: bool = False,
+    words: Sequence[str] = (),
+    kind: type | None = None,
+) -> Any:
+    """Return a field with its limits.
+
+    Parameters
+    ----------
+    default
+        Default value.
+    low, high
+        Smallest and largest value; excluded if `is_open`.
+    words
+        Allowed words.
+    kind
+        Type on the command line; None: the type of the field.
+    """
+    limits = {"low": low, "high": high, "open": is_open, "words": words, "kind": kind}
+    return field(default=default, metadata=limits)
+
+
+class Checked:
+    """Base class of a dataclass whose constructor checks and converts the fields by their types."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+def check_fields(made: Any) -> None:
+    """Convert fields of an object by their types; reject wrong types and values beyond their limits."""
+    kind: Any = type(made)
+    for name, check in _checks(kind):
+        value = getattr(made, name)
+        converted = check(name, value)
+        if converted is not value:
+            object.__setattr__(made, name, converted)
+
+
+def check_members(kind: type, members: Mapping[str, Any]) -> None:
+    """Reject members of a saved object of a class with wrong types."""
+    if hasattr(kind, "__dataclass_fields__"):
+        from photogram.arguments.arrays import refused
+
+        for name, check in _checks(kind):
+            if name in members:
+                converted = check(name, members[name])
+                if hasattr(converted, "dtype") and not hasattr(members[name], "dtype"):
+                    raise refused(name, members[name], "an array of numbers")
+
+
+@cache
+def _checks(kind: Any) -> list[tuple[str, Check]]:
+    """Return the checks of fields with a type that can be checked, by name."""
+    found = []
+    for each in fields(kind):
+        of, _, alternative = str(each.type).partition(" | ")
+        check = _check_of(of) if alternative in ("", "None") else None
+        if check is not None or each.metadata.get("words"):
+            found.append((each.name, _limited(check, each.metadata, of, optional=alternative == "None")))
+    return found
+
+
+def _check_of(of: str) -> Check | None:
+    """Return the check of a type; None if values of the type are not checked."""
+    from photogram.arguments import arrays
+
+    simple: dict[str, Check] = {
+        "int": arrays.whole_number,
+        "float": arrays.number,
+        "bool": arrays.truth_value,
+        "str": arrays.text,
+        "Floats": arrays.numbers,
+        "Indices": arrays.whole_numbers,
+        "Bools": arrays.truth_values,
+    }
+    if of.startswith("Literal["):
+        return partial(_word, get_args(eval(of, {"Literal": Literal})))
+    if (match := _TUPLE.fullmatch(of)) is None:
+        return simple.get(of)
+    inner = [simple[each] for each in match[1].split(", ")]
+
+    def elements(name: str, value: Any) -> tuple[Any, ...]:
+        values = arrays.elements(name, value, None if match[2] else len(inner))
+        checks = inner * len(values) if match[2] else inner
+        pairs = zip(checks, values, strict=True)
+        return tuple(check(f"{name}[{row}]", each) for row, (check, each) in enumerate(pairs))
+
+    return elements
+
+
+def _word(words: Sequence[str], name: str, value: Any) -> Any:
+    from photogram.arguments.arrays import one_of
+
+    one_of(name, value, words)
+    return value
+
+
+def _limited(check: Check | None, limits: Mapping[str, Any], of: str, *, optional: bool) -> Check:
+    """Return a check with limits and words of a field."""
+    from photogram.arguments.objects import require
+
+    low, high = limits.get("low", -math.inf), limits.get("high", math.inf)
+    code = "range" if high < math.inf else "least" if low else "not-negative"
+    code = "whole-range" if code == "range" and of == "int" else code
+
+    def limited(name: str, value: Any) -> Any:
+        if value is None and optional:
+            return None
+        if limits.get("words"):
+            _word(limits["words"], name, value)
+        if check is not None:
+            value = check(name, value)
+        if check is not None and (low, high) != (-math.inf, math.inf):
+            inside = low < value < high if limits["open"] else low <= value <= high
+            require(inside, name, code, low=low, high=high, value=value)
+        return value
+
+    return limited
+
+
+def options_of(kind: type[Options], options: Options | None, changes: Mapping[str, Any]) -> Options:
+    """Return options with changes by keyword; None: the defaults."""
+    if options is None:
+        return kind(**changes)
+    from photogram.arguments.objects import require_kind
+
+    require_kind("options", options, kind)
+    return replace(options, **changes)  # type: ignore[type-var]
