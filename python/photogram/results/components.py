@@ -73,8 +73,10 @@ class VarianceComponents(Judged, Documented, Brief):
             colour = MARKED if each.worth_changing else INK
             ends = np.column_stack([np.sqrt(each.interval), [place, place]])
             marks += [Line(ends, colour), Markers(at, "o", 6.0, colour)]
-        known = np.concatenate([mark.places[:, 0] for mark in marks if isinstance(mark, Line | Markers)])
-        known = np.append(known[np.isfinite(known) & (known > 0)], 1.0)
+        values = [each.factor_of_sd for each in self.components]
+        ends = [np.sqrt(each.interval) for each in self.components if not each.held]
+        known = np.concatenate([values, *ends, [1.0]])
+        known = known[np.isfinite(known) & (known > 0)]
         up = (len(self.components) - 0.5, -0.5)
         limits = np.column_stack([(known.min() / MARGIN, known.max() * MARGIN), up])
         given = Line(np.column_stack([[1.0, 1.0], up]), FAINT, 0.8)

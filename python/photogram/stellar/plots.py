@@ -101,14 +101,13 @@ def _refraction(result: Result) -> Plot:
     low, high = spread(change - error, change + error)
     for k, (group, found) in enumerate(every.items()):
         ends = np.degrees(found.zenith_distance[[0, -1]])
-        level = np.full(2, low - 0.06 * (k + 1) * (high - low))
-        line = np.column_stack([ends, level])
+        height = np.full(2, low - 0.06 * (k + 1) * (high - low))
+        line = np.column_stack([ends, height])
         marks.append(Line(line, COLOURS[group], 5.0, label=f"field of {GROUPS[group]}"))
     panel = curves(
         [*marks, level(0.0, FAINT, 0.8)],
         "observed zenith distance, degrees",
         "corrected minus given refraction, arcsec",
         "Refraction",
-        "upper left",
     )
     return Plot(7.5, 4.8, [panel])
