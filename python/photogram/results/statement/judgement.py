@@ -121,17 +121,13 @@ def judged(found: Statement) -> Judged:
         headline=texts(headline.code, **headline.fields),
         sentences=[
             (code, texts(code, **fields))
-            for part in (_asprs, _nssda, _lengths, _honest, _budgets)
+            for part in (_asprs, _nssda, _lengths, _honest)
             for code, fields in part(found)
-        ],
+        ]
+        + [("budget.line", texts("budget.line", **budget_fields(texts, each))) for each in found.taken_apart],
         assumptions=[(code, texts(code, **fields)) for code, fields in _assumptions(found)],
         remarks=remarks,
     )
-
-
-def _budgets(found: Statement) -> Iterator[Sentence]:
-    for each in found.taken_apart:
-        yield "budget.line", budget_fields(found.texts, each)
 
 
 def _whole(of_all: Figures) -> Prediction | None:
