@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
+from photogram.results.result import Result
 from photogram.results.statement import comparison
 from photogram.results.statement import lengths as length_tests
 from photogram.results.statement.figures import Figures, root_mean
@@ -31,9 +32,6 @@ from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import rmse_interval
-
-if TYPE_CHECKING:
-    from photogram import Result
 
 ASPRS_POINTS = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
 MOST_STEPS = 10  # Number of steps of 1,000 km2, after which the number of check points is constant

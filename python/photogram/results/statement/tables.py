@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
 from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.statement.budget import Budget, kind_of
@@ -262,29 +262,22 @@ def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
         kind_of(name): (int(counts[k]), float(redundancy[k]), float(squares[k]))
         for k, name in enumerate(grouping.groups.names)
     }
+    more = []
     for unknown in result.unknowns:
         sd, w = unknown.given.deviations, unknown.standardized  # w = v / (sd sqrt(r))
-        _add(found, unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, w**2 * unknown.redundancy)
+        squares = w**2 * unknown.redundancy
+        more.append((unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, squares))
     for camera in result.cameras:
-        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
         with np.errstate(all="ignore"):
             squares = ((camera.given.values - camera.values) / camera.given.deviations) ** 2
-        _add(found, "camera", weighted, camera.redundancy, squares)
+        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
+        more.append(("camera", weighted, camera.redundancy, squares))
+    for kind, weighted, redundancy, squares in more:
+        if weighted.any():
+            count, r, q = found.get(kind, (0, 0.0, 0.0))
+            r, q = r + float(redundancy[weighted].sum()), q + float(np.nansum(squares[weighted]))
+            found[kind] = count + int(weighted.sum()), r, q
     return found
-
-
-def _add(
-    found: dict[str, tuple[int, float, float]],
-    kind: str,
-    weighted: Bools,
-    redundancy: Floats,
-    squares: Floats,
-) -> None:
-    """Add the weighted components of a camera or common unknown."""
-    if weighted.any():
-        count, r, q = found.get(kind, (0, 0.0, 0.0))
-        total = float(np.nansum(squares[weighted]))
-        found[kind] = (count + int(weighted.sum()), r + float(redundancy[weighted].sum()), q + total)
 
 
 def _adjustment(result: Result) -> dict[str, Any]:
