@@ -28,7 +28,6 @@ from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import Result, _photocore
-    from photogram.arguments.types import Floats, Indices
 
 HELD = Phrase("test.held")  # Type of these tests
 SUSPECTED = 5  # Largest number of tested stations and points: those with the worst images
