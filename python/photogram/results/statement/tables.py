@@ -15,7 +15,7 @@ from photogram.io.csv_text import csv_text
 from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
-from photogram.results.statement.figures import Figures, Prediction, Sized
+from photogram.results.statement.figures import Figures, Prediction, Sized, point_tests
 from photogram.results.statement.request import lengths_in
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
@@ -69,17 +69,9 @@ def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> 
 def check_points(statement: Statement) -> Table:
     """Return the check points with their differences and tests."""
     texts, own, columns = statement.texts, statement.compared, Columns(statement.texts)
-    names, unit, n = own.names, statement.result.block.linear_unit, len(own)
-    tests = None if statement.of_all is None else statement.of_all.points
-    sd, adjusted, normalised = (
-        np.full((n, 3), np.nan) if tests is None else getattr(tests, name)
-        for name in ("sd_predicted", "sd_adjusted", "normalised")
-    )
-    T, p, others, p_others, ce90, le90 = (
-        np.full(n, np.nan) if tests is None else getattr(tests, name)
-        for name in ("T", "p", "others", "p_others", "ce90", "le90")
-    )
-    limit, decimals = 0.0 if tests is None else tests.limit, decimals_for(adjusted)
+    names, unit = own.names, statement.result.block.linear_unit
+    tests = point_tests(own) if statement.of_all is None else statement.of_all.points
+    decimals = decimals_for(tests.sd_adjusted)
     left_out = np.array([name in statement.asked.without for name in names], dtype=bool)
     covers = ["vegetated" if each else "open" for each in own.vegetated]
     plain, axes = partial(Quantity, kind="name"), tuple(map(Axis, DIRECTIONS))
@@ -90,16 +82,18 @@ def check_points(statement: Statement) -> Table:
         Quantity(own.given, member="given"),
         Quantity(statement.survey.checks, tuple(map(Axis, ("east", "north", "up"))), name=""),
         columns.directions("difference", own.differences, decimals, unit, name="d", member="difference"),
-        columns.directions("sd", sd, decimals, unit, name="sd", member="sd_predicted"),
-        Quantity(adjusted, axes, "deviation", "sd_adjusted", "sd_adjusted"),
+        columns.directions("sd", tests.sd_predicted, decimals, unit, name="sd", member="sd_predicted"),
+        Quantity(tests.sd_adjusted, axes, "deviation", "sd_adjusted", "sd_adjusted"),
         Quantity(own.survey_sd, axes, "deviation", "sd_survey", "sd_survey"),
-        columns.directions("normalised", normalised, 1, name="normalised"),
-        columns.number("T", T, 1, name="T"),
-        columns.number("p", p, kind="probability", name="p", marked=p < limit),
-        columns.number("others", others, 1, name="T_from_the_others", marked=p_others < limit),
-        Quantity(p_others, member="p_from_the_others"),
-        columns.number("CE90", ce90, decimals, unit, name="ce90_predicted"),
-        columns.number("LE90", le90, decimals, unit, name="le90_predicted"),
+        columns.directions("normalised", tests.normalised, 1, name="normalised"),
+        columns.number("T", tests.T, 1, name="T"),
+        columns.number("p", tests.p, kind="probability", name="p", marked=tests.p < tests.limit),
+        columns.number(
+            "others", tests.others, 1, name="T_from_the_others", marked=tests.p_others < tests.limit
+        ),
+        Quantity(tests.p_others, member="p_from_the_others"),
+        columns.number("CE90", tests.ce90, decimals, unit, name="ce90_predicted"),
+        columns.number("LE90", tests.le90, decimals, unit, name="le90_predicted"),
         plain(["no" if each else "yes" for each in left_out], name="used"),
         plain([statement.asked.without.get(name, "") for name in names], name="reason"),
     ]
