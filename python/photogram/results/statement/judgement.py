@@ -214,12 +214,12 @@ def _honest(found: Statement) -> Iterator[Sentence]:
     whole = _whole(of_all)
     high, low = _rejected(of_all)
     if whole is not None:
-        fields = {"n": whole.points, **_factor(whole.factor, whole.factor_interval)}
+        fields = {"n": whole.points, **_factor(whole.factor_of_sd, whole.factor_interval_95)}
         yield f"honest.{'high' if high else 'low' if low else 'yes'}", fields
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
         if own is not None and (own.rejected_high or own.rejected_low):
-            fields = _factor(own.factor, own.factor_interval)
+            fields = _factor(own.factor_of_sd, own.factor_interval_95)
             yield "honest.part", {"component": texts(f"component.{part}"), **fields}
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
     for part, shift in shifts:
@@ -268,9 +268,9 @@ def _remarks(found: Statement) -> Iterator[Sentence]:
     if (layout := found.layout) is not None:
         for holds, name, fields in (
             (not layout.even, "quadrants", {}),
-            (not layout.apart, "spacing", {"spacing": layout.least_spacing}),
-            (layout.far > 0, "far", {"percent": layout.far}),
-            (layout.beyond_control > 0, "outside", {"n": layout.beyond_control}),
+            (not layout.apart, "spacing", {"spacing": layout.least_spacing_over_diagonal}),
+            (layout.share_of_area_far > 0, "far", {"percent": layout.share_of_area_far}),
+            (layout.outside_control > 0, "outside", {"n": layout.outside_control}),
         ):
             if holds:
                 yield f"layout.{name}", fields
@@ -337,8 +337,8 @@ def _assumptions(found: Statement) -> Iterator[Sentence]:
         if "asprs-2023" in asked.standards:
             yield "assume.slopes", {}
     if layout is not None:
-        quadrants = " / ".join(map(texts.percent, layout.quadrants))
-        fields = {"spacing": layout.least_spacing, "diagonal": texts.length(layout.diagonal, 3)}
+        quadrants = " / ".join(map(texts.percent, layout.share_in_quadrants))
+        fields = {"spacing": layout.least_spacing_over_diagonal, "diagonal": texts.length(layout.diagonal, 3)}
         yield "assume.layout", {"n": layout.count, "quadrants": quadrants, **fields}
     if lengths is not None and lengths.expansion is not None:
         yield "lengths.reference", {"expansion": texts.significant(lengths.expansion, 3)}

@@ -222,7 +222,7 @@ def statement_members(found: Statement) -> dict[str, Any]:
         "nssda": standards.nssda_member if "nssda" in asked.standards else None,
         "lengths": standards.lengths and _lengths(found.texts, standards.lengths),
         "iso_19157": standards.iso_19157 or None,
-        "layout": found.layout and members(found.layout, **_LAYOUT),
+        "layout": found.layout and vars(found.layout),
         "camera": [
             members(each, "name", parameters="names", value="values") | members(each, "sd", "correlations")
             for each in result.cameras
@@ -237,15 +237,6 @@ def statement_members(found: Statement) -> dict[str, Any]:
 
 
 _HEAD = ("client", "firm", "project", "surveyor", "date")
-_LAYOUT = {
-    "count": "count",
-    "diagonal": "diagonal",
-    "share_in_quadrants": "quadrants",
-    "least_spacing_over_diagonal": "least_spacing",
-    "share_of_area_far": "far",
-    "share_of_heights": "heights",
-    "outside_control": "beyond_control",
-}
 
 
 def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
@@ -323,18 +314,11 @@ def _radial(own: Sized | None) -> dict[str, Any] | None:
     return None if own is None else members(own, "n", "rmse", "largest", largest_point="point")
 
 
-_PREDICTION = {
-    "rmse_interval": "rmse_interval_95",
-    "factor": "factor_of_sd",
-    "factor_interval": "factor_interval_95",
-}
-
-
 def _prediction(found: Prediction | None) -> dict[str, Any] | None:
     if found is None:
         return None
-    own = {_PREDICTION.get(name, name): value for name, value in vars(found).items()}
-    return own | {"rejected": "high" if found.rejected_high else "low" if found.rejected_low else None}
+    rejected = "high" if found.rejected_high else "low" if found.rejected_low else None
+    return {**vars(found), "rejected": rejected}
 
 
 def budget_member(found: Budget) -> dict[str, Any]:
