@@ -167,7 +167,7 @@ def _asprs(of: Statement) -> Iterator[Sentence]:
         elif figure is not None:
             yield f"asprs.{_CASES[found.verdicts[name]]}.{name}", {**own, "class": size}
         elif name != "3d":
-            yield f"asprs.none.{name}", {"class": size, f"loo_{name}": found.left_out[name]}
+            yield f"asprs.none.{name}", {"class": size, f"loo_{name}": found.leave_one_out[name]}
     if (vegetated := found.figures["vva"]) is not None:
         yield f"asprs.{wording(vegetated.count)}.vva", {"n": vegetated.count, "rmse_v": vegetated.rmse}
 
@@ -176,8 +176,8 @@ def _nssda(of: Statement) -> Iterator[Sentence]:
     found = of.standards.nssda
     if found is None or "nssda" not in of.asked.standards:
         return
-    if found.accuracy_r is not None:
-        yield f"nssda.{found.wording}.h", {"accuracy_r": found.accuracy_r, "n": found.count}
+    if found.accuracy_r_unequal is not None:
+        yield f"nssda.{found.wording}.h", {"accuracy_r": found.accuracy_r_unequal, "n": found.count}
     elif found.ce95 is not None and found.ratio is not None:
         yield "nssda.ce95", members(found, "ratio", "ce95")
     if found.accuracy_z is not None:
@@ -304,12 +304,12 @@ def _asprs_remarks(found: Statement, own: Asprs) -> Iterator[Sentence]:
     for n in [*counts, *([] if of_vegetated is None else [of_vegetated.n])]:
         if n < own.points_asked:
             yield "asprs.points", {"asked": own.points_asked, "n": n}
-    for name, good in own.survey.items():
+    for name, good in own.survey_good_enough.items():
         figure = own.figures[name]
         if not good and figure is not None:
             yield "asprs.survey", {"survey": figure.survey, "class": asked.classes[name]}
-    for name, good in own.control.items():
-        rmse = own.control_rmse["hv".index(name)]
+    for name, good in own.control_good_enough.items():
+        rmse = own.control_rmse[name]
         if not good and math.isfinite(rmse):
             # The limit is half a class; without vertical class, the full horizontal one.
             limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]

@@ -33,9 +33,8 @@ class Layout:
     # Share of the block's area that is farther from all points than a third of the diagonal; NaN if the block
     # is a line
     share_of_area_far: float
-    share_of_heights: (
-        float  # Range of the heights of the points over that of the block; NaN if the block is level
-    )
+    # Range of the heights of the points over that of the block; NaN if the block is level
+    share_of_heights: float
     outside_control: int  # The number of points outside the hull of the control points in plan
 
     @property
