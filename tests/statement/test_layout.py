@@ -26,12 +26,14 @@ def test_the_layout_of_the_golden_block_is_that_of_the_golden_statement():
     check, held = rows["check"][1], rows["control"][1]
     found = layout(check, np.vstack([check, held]), held)
     assert found.diagonal == pytest.approx(expected["diagonal_m"], rel=1e-12)
-    assert found.quadrants == pytest.approx(expected["share_in_quadrants"], rel=1e-12)
-    assert found.least_spacing == pytest.approx(expected["least_spacing_over_diagonal"], rel=1e-9)
+    assert found.share_in_quadrants == pytest.approx(expected["share_in_quadrants"], rel=1e-12)
+    assert found.least_spacing_over_diagonal == pytest.approx(
+        expected["least_spacing_over_diagonal"], rel=1e-9
+    )
     assert (found.count, found.even, found.apart) == (30, True, False)
-    assert found.far == 0.0
-    assert 0 < found.beyond_control < 30
-    assert 0.5 < found.heights <= 1.0
+    assert found.share_of_area_far == 0.0
+    assert 0 < found.outside_control < 30
+    assert 0.5 < found.share_of_heights <= 1.0
 
 
 def test_a_single_point_in_the_middle_leaves_the_corners_unchecked():
@@ -39,11 +41,11 @@ def test_a_single_point_in_the_middle_leaves_the_corners_unchecked():
     # A third of the diagonal is nearly the half of a side: a circle with four thin caps beyond the square.
     radius = math.hypot(100, 100) / 3
     assert radius < 50
-    assert found.far == pytest.approx(1 - math.pi * radius**2 / 100**2, abs=2e-3)
-    assert math.isnan(found.least_spacing)
-    assert (found.apart, found.even, found.beyond_control, found.heights) == (True, False, 0, 0.0)
+    assert found.share_of_area_far == pytest.approx(1 - math.pi * radius**2 / 100**2, abs=2e-3)
+    assert math.isnan(found.least_spacing_over_diagonal)
+    assert (found.apart, found.even, found.outside_control, found.share_of_heights) == (True, False, 0, 0.0)
     # On both middle lines: low.
-    assert found.quadrants == (1.0, 0.0, 0.0, 0.0)
+    assert found.share_in_quadrants == (1.0, 0.0, 0.0, 0.0)
 
 
 def test_only_the_area_within_the_hull_of_a_block_counts():
@@ -52,30 +54,30 @@ def test_only_the_area_within_the_hull_of_a_block_counts():
     radius = math.hypot(100, 100) / 3
     assert area_in_plan(triangle) == pytest.approx(5000)
     within = math.pi * radius**2 / 8  # of the circle about a corner of 45 degrees
-    assert layout(corner, triangle, triangle).far == pytest.approx(1 - within / 5000, abs=1e-2)
+    assert layout(corner, triangle, triangle).share_of_area_far == pytest.approx(1 - within / 5000, abs=1e-2)
 
 
 def test_points_outside_the_hull_of_control_are_counted():
     points = [[10.0, 10.0, 1.0], [90.0, 10.0, 1.0], [90.0, 90.0, 1.0]]
-    assert layout(points, SQUARE, SQUARE[[0, 1, 3]]).beyond_control == 1
-    assert layout(points, SQUARE, SQUARE[[0, 2]]).beyond_control == 1
-    assert layout(points, SQUARE, SQUARE[:1]).beyond_control == 3
-    assert layout(points, SQUARE, np.zeros((0, 3))).beyond_control == 3
+    assert layout(points, SQUARE, SQUARE[[0, 1, 3]]).outside_control == 1
+    assert layout(points, SQUARE, SQUARE[[0, 2]]).outside_control == 1
+    assert layout(points, SQUARE, SQUARE[:1]).outside_control == 3
+    assert layout(points, SQUARE, np.zeros((0, 3))).outside_control == 3
 
 
 def test_heights_that_are_not_known_do_not_count():
     points = [[10.0, 10.0, math.nan], [90.0, 10.0, 5.0], [90.0, 90.0, 15.0]]
-    assert layout(points, SQUARE, SQUARE).heights == pytest.approx(0.5)
+    assert layout(points, SQUARE, SQUARE).share_of_heights == pytest.approx(0.5)
     level = np.where([True, True, False], SQUARE, 3.0)
-    assert math.isnan(layout(points, level, SQUARE).heights)
-    assert math.isnan(layout([[1.0, 1.0, math.nan]], SQUARE, SQUARE).heights)
+    assert math.isnan(layout(points, level, SQUARE).share_of_heights)
+    assert math.isnan(layout([[1.0, 1.0, math.nan]], SQUARE, SQUARE).share_of_heights)
 
 
 def test_two_points_at_one_place_have_no_spacing():
-    assert layout([[1.0, 1.0, 0.0]] * 2, SQUARE, SQUARE).least_spacing == 0.0
-    assert layout([[0.0, 0.0, 0.0], [30.0, 40.0, 0.0], [60.0, 90.0, 0.0]], SQUARE, SQUARE).least_spacing == (
-        pytest.approx(50 / math.hypot(100, 100))
-    )
+    assert layout([[1.0, 1.0, 0.0]] * 2, SQUARE, SQUARE).least_spacing_over_diagonal == 0.0
+    assert layout(
+        [[0.0, 0.0, 0.0], [30.0, 40.0, 0.0], [60.0, 90.0, 0.0]], SQUARE, SQUARE
+    ).least_spacing_over_diagonal == (pytest.approx(50 / math.hypot(100, 100)))
 
 
 POINTS = st.lists(st.tuples(st.integers(-50, 50), st.integers(-50, 50)), min_size=3, max_size=30)

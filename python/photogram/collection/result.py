@@ -133,7 +133,6 @@ class AdjustedCollection(AdjustedNetwork):
         pose, camera = slice(0, len(POSE)), slice(len(POSE), None)
         places = [("X", "Y", "Z")] * len(points)
         return Adjusted(
-            network="collection",
             things={
                 "photo": Things(photos, [names] * count, values, sd, ("photo", "camera")),
                 "pose": Things(photos, [names[pose]] * count, values[:, pose], sd[:, pose], ("photo",)),

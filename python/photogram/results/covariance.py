@@ -66,7 +66,6 @@ class Things:
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    network: str  # Type of the network: block or collection
     things: Mapping[str, Things]  # By type
     numbered: bool = False  # Whether they are identified by number
 
@@ -137,7 +136,6 @@ def adjusted(result: Result) -> Adjusted:
     steps = (*places, "rho x", "rho y", "rho z")
     points = [places] * len(block.point_ids)
     return Adjusted(
-        network="block",
         things={
             "photo": Things(block.photo_ids, [unknowns_of_photo] * count, photos, sd),
             "step": Things(block.photo_ids, [steps] * count, photos, sd),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import RotationCoefficient
 from photogram.results.covariance import Failure, photo_components
 from photogram.words import Phrase, phrase
-
-if TYPE_CHECKING:
-    from photogram._photocore import BlockNetwork, BlockSolution
 
 ANGLES = tuple(name.removesuffix("_deg") for name in ATTITUDE_COLUMNS)
 TURNS = (*ANGLES, "rotation ")  # First words of names of rotations
@@ -100,7 +97,7 @@ def held_unknowns(held: Sequence[tuple[str, str]]) -> list[Phrase]:
 
 def datum_of(
     block: Block,
-    solution: BlockSolution,
+    solution: _photocore.BlockSolution,
     row: DatumRow | None = None,
     *,
     held: Sequence[tuple[int, int]] | None = None,
@@ -180,7 +177,7 @@ def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None
 
 
 def refused(
-    block: Block, network: BlockNetwork, state: _photocore.BlockState | None, error: Failure
+    block: Block, network: _photocore.BlockNetwork, state: _photocore.BlockState | None, error: Failure
 ) -> AdjustmentError | InputError:
     kind, message, _, points, *_ = error.args
     if kind == "left out":

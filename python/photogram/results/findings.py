@@ -119,6 +119,11 @@ def block_findings(result: Result) -> Findings:
         for point, reason in result.dropped.items()
         if reason in HARMFUL
     ]
+    checked = (result.used_points & (result.point_kinds == "check")).any()
+    unproved = [] if checked else [Phrase("advice.check-points")]
+    if few := int(np.count_nonzero(result.point_rays == 2)):
+        fields = {"n": few, "all": int(np.count_nonzero(result.used_points))}
+        unproved.append(Phrase("advice.two-rays", fields))
     return replace(
         found,
         undetermined=left_open(result),
@@ -136,7 +141,7 @@ def block_findings(result: Result) -> Findings:
         check=Phrase("how.check.network"),
         take_out=Phrase("advice.snoop") if tests_more else None,
         iterate=_iterated(result),
-        if_usable=_unproved(result),
+        if_usable=unproved,
     )
 
 
@@ -148,16 +153,6 @@ def _iterated(result: Result) -> Phrase | None:
     free = any(np.isinf(each.deviations).any() for each in result.block.cameras)
     code = "advice.iterate-or-fix" if weak and free else "advice.iterate"
     return Phrase(code, {"n": len(result.iterations)})
-
-
-def _unproved(result: Result) -> list[Phrase]:
-    """Return unverified properties of a block: no check points, two-ray points."""
-    found = []
-    if not (result.used_points & (result.point_kinds == "check")).any():
-        found.append(Phrase("advice.check-points"))
-    if few := int(np.count_nonzero(result.point_rays == 2)):
-        found.append(Phrase("advice.two-rays", {"n": few, "all": int(np.count_nonzero(result.used_points))}))
-    return found
 
 
 def left_open(result: AdjustedNetwork) -> list[str]:

@@ -28,7 +28,6 @@ from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import Result, _photocore
-    from photogram.arguments.types import Floats, Indices
 
 HELD = Phrase("test.held")  # Type of these tests
 SUSPECTED = 5  # Largest number of tested stations and points: those with the worst images
@@ -265,14 +264,6 @@ class Scores:
         """(k,) roots of the diagonal of B' B."""
         return np.asarray(np.sqrt(np.einsum("kmi,kmi->k", self.partials, self.partials)))
 
-    @property
-    def taken_up(self) -> bool:
-        """Whether unknowns absorb some scores, or images do not depend on them."""
-        if not (self.sizes > 0).all():
-            return True
-        scaled = self.matrix / np.outer(self.sizes, self.sizes)
-        return not (np.linalg.eigvalsh(scaled) > TAKEN_UP).all()
-
     def estimate(self, groups: Indices) -> tuple[float, float]:
         """Return the first-order estimate of the first unknown, and its sd.
 
@@ -302,7 +293,11 @@ class Scores:
 def score(factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> float | None:
     """Return T = c' C^-1 c; None if absorbed; see :meth:`Scores.of`."""
     found = Scores.of(factor, partials, residuals)
-    return None if found.taken_up else quadratic(found.matrix, found.vector)
+    if not (found.sizes > 0).all():  # No image depends on an unknown
+        return None
+    scaled = found.matrix / np.outer(found.sizes, found.sizes)
+    taken_up = not (np.linalg.eigvalsh(scaled) > TAKEN_UP).all()
+    return None if taken_up else quadratic(found.matrix, found.vector)
 
 
 def quadratic(matrix: Floats, vector: Floats) -> float:

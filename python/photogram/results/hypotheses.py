@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,17 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.unadjusted import Given
 from photogram.results.hypothesis_facts import NO_FACTS, Facts
+from photogram.results.network_trial import NamedSuspects, NetworkTrial
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
 from photogram.statistics.findings import Tested
-from photogram.statistics.snooping.suspects import Suspects
+from photogram.statistics.snooping.suspects import Suspects, Tests
 from photogram.words import Phrase, phrase
-
-if TYPE_CHECKING:
-    from photogram.network.unadjusted import Given
-    from photogram.results.network_trial import NamedSuspects, NetworkTrial
-    from photogram.statistics.snooping.suspects import Tests
 
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Smallest number of other points that it moves

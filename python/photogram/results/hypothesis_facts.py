@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.network.block import Block
 from photogram.network.strips import strips_of
-
-if TYPE_CHECKING:
-    from photogram.network.block import Block
 
 Facts = dict[str, Any]  # See `NetworkTrial.hypotheses`
 

@@ -149,7 +149,12 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
 def check_section(result: Result) -> Section:
     columns = check_points(result)
     table = _compared("check_points", "Check points one by one", columns)
-    parts = [_check_summary(result), table, _check_tests(result, columns)] if table.visible else []
+    statistic, p = named(columns, "statistic"), named(columns, "probability")
+    law = "T" if result.unit_variance == "unity" else "F"
+    tests = [columns[0], replace(statistic, head=law, decimals=2), replace(p, head="p", figures=2)]
+    rows = np.sort(np.argsort(np.nan_to_num(p.values, nan=2.0), kind="stable")[: COMPONENTS // 3])
+    together = Table("check-tests", "Tests of all components of a point together", tests, shown=rows)
+    parts = [_check_summary(result), table, together] if table.visible else []
     intro = about("check-points")
     checks = result.check_points
     if checks.assumed.any():
@@ -183,14 +188,6 @@ def _check_summary(result: Result) -> Table:
         Quantity(np.sqrt(mean((d / sd) ** 2)), head="rms of test values", decimals=2),
     ]
     return Table("check-summary", "Check points together", columns, about("check-summary"))
-
-
-def _check_tests(result: Result, columns: Sequence[Quantity]) -> Table:
-    statistic, p = named(columns, "statistic"), named(columns, "probability")
-    law = "T" if result.unit_variance == "unity" else "F"
-    tests = [columns[0], replace(statistic, head=law, decimals=2), replace(p, head="p", figures=2)]
-    rows = np.sort(np.argsort(np.nan_to_num(p.values, nan=2.0), kind="stable")[: COMPONENTS // 3])
-    return Table("check-tests", "Tests of all components of a point together", tests, shown=rows)
 
 
 def _compared(key: str, title: str, columns: Sequence[Quantity]) -> Table:

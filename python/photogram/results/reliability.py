@@ -41,7 +41,6 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.arguments.types import Bools, Floats
     from photogram.results.axes import Terms
 
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution

@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.hypotheses import Hypotheses
-from photogram.results.reliability import Inseparable, Reliability
+from photogram.results.reliability import Downweighted, Inseparable, Reliability
 from photogram.show.page import Part, Remarks, about
 from photogram.show.quantity import Quantities, Quantity, Table, column, members, records
 from photogram.statistics.reliability import TESTABLE
@@ -23,8 +23,6 @@ from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from photogram.results.reliability import Downweighted
 
 LISTED = 5  # Listed observations of each type
 PAIRS = 10  # Listed inseparable pairs

@@ -43,7 +43,7 @@ class Prediction:
     found_rmse: float
     # `tr(C)^2 / tr(C^2)`, and the resulting interval (95 percent) of the rmse
     effective_dof: float
-    rmse_interval: tuple[float, float]
+    rmse_interval_95: tuple[float, float]
     # d' C^-1 d and its upper probability (chi-square, C known)
     T: float
     p_high: float
@@ -51,8 +51,8 @@ class Prediction:
     p_low: float
     p_high_f: float
     # `sqrt(T / rows)`: ratio of differences to prediction, with its interval (95 percent)
-    factor: float
-    factor_interval: tuple[float, float]
+    factor_of_sd: float
+    factor_interval_95: tuple[float, float]
     sum_of_squares_without_correlations: float  # Sum of d^2 / C_ii
 
     @property
@@ -171,13 +171,13 @@ def prediction(found: Compared, part: str) -> Prediction | None:
         predicted_rmse_of_product=math.sqrt(float(np.trace(product)) / points),
         found_rmse=rmse,
         effective_dof=freedom,
-        rmse_interval=rmse_interval(rmse, freedom),
+        rmse_interval_95=rmse_interval(rmse, freedom),
         T=statistic,
         p_high=p_high,
         p_low=1.0 - p_high_f,
         p_high_f=p_high_f,
-        factor=math.sqrt(mean),
-        factor_interval=(low, high),
+        factor_of_sd=math.sqrt(mean),
+        factor_interval_95=(low, high),
         sum_of_squares_without_correlations=alone,
     )
 

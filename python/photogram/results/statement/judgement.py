@@ -121,17 +121,13 @@ def judged(found: Statement) -> Judged:
         headline=texts(headline.code, **headline.fields),
         sentences=[
             (code, texts(code, **fields))
-            for part in (_asprs, _nssda, _lengths, _honest, _budgets)
+            for part in (_asprs, _nssda, _lengths, _honest)
             for code, fields in part(found)
-        ],
+        ]
+        + [("budget.line", texts("budget.line", **budget_fields(texts, each))) for each in found.taken_apart],
         assumptions=[(code, texts(code, **fields)) for code, fields in _assumptions(found)],
         remarks=remarks,
     )
-
-
-def _budgets(found: Statement) -> Iterator[Sentence]:
-    for each in found.taken_apart:
-        yield "budget.line", budget_fields(found.texts, each)
 
 
 def _whole(of_all: Figures) -> Prediction | None:
@@ -171,7 +167,7 @@ def _asprs(of: Statement) -> Iterator[Sentence]:
         elif figure is not None:
             yield f"asprs.{_CASES[found.verdicts[name]]}.{name}", {**own, "class": size}
         elif name != "3d":
-            yield f"asprs.none.{name}", {"class": size, f"loo_{name}": found.left_out[name]}
+            yield f"asprs.none.{name}", {"class": size, f"loo_{name}": found.leave_one_out[name]}
     if (vegetated := found.figures["vva"]) is not None:
         yield f"asprs.{wording(vegetated.count)}.vva", {"n": vegetated.count, "rmse_v": vegetated.rmse}
 
@@ -180,8 +176,8 @@ def _nssda(of: Statement) -> Iterator[Sentence]:
     found = of.standards.nssda
     if found is None or "nssda" not in of.asked.standards:
         return
-    if found.accuracy_r is not None:
-        yield f"nssda.{found.wording}.h", {"accuracy_r": found.accuracy_r, "n": found.count}
+    if found.accuracy_r_unequal is not None:
+        yield f"nssda.{found.wording}.h", {"accuracy_r": found.accuracy_r_unequal, "n": found.count}
     elif found.ce95 is not None and found.ratio is not None:
         yield "nssda.ce95", members(found, "ratio", "ce95")
     if found.accuracy_z is not None:
@@ -218,12 +214,12 @@ def _honest(found: Statement) -> Iterator[Sentence]:
     whole = _whole(of_all)
     high, low = _rejected(of_all)
     if whole is not None:
-        fields = {"n": whole.points, **_factor(whole.factor, whole.factor_interval)}
+        fields = {"n": whole.points, **_factor(whole.factor_of_sd, whole.factor_interval_95)}
         yield f"honest.{'high' if high else 'low' if low else 'yes'}", fields
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
         if own is not None and (own.rejected_high or own.rejected_low):
-            fields = _factor(own.factor, own.factor_interval)
+            fields = _factor(own.factor_of_sd, own.factor_interval_95)
             yield "honest.part", {"component": texts(f"component.{part}"), **fields}
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
     for part, shift in shifts:
@@ -272,9 +268,9 @@ def _remarks(found: Statement) -> Iterator[Sentence]:
     if (layout := found.layout) is not None:
         for holds, name, fields in (
             (not layout.even, "quadrants", {}),
-            (not layout.apart, "spacing", {"spacing": layout.least_spacing}),
-            (layout.far > 0, "far", {"percent": layout.far}),
-            (layout.beyond_control > 0, "outside", {"n": layout.beyond_control}),
+            (not layout.apart, "spacing", {"spacing": layout.least_spacing_over_diagonal}),
+            (layout.share_of_area_far > 0, "far", {"percent": layout.share_of_area_far}),
+            (layout.outside_control > 0, "outside", {"n": layout.outside_control}),
         ):
             if holds:
                 yield f"layout.{name}", fields
@@ -308,12 +304,12 @@ def _asprs_remarks(found: Statement, own: Asprs) -> Iterator[Sentence]:
     for n in [*counts, *([] if of_vegetated is None else [of_vegetated.n])]:
         if n < own.points_asked:
             yield "asprs.points", {"asked": own.points_asked, "n": n}
-    for name, good in own.survey.items():
+    for name, good in own.survey_good_enough.items():
         figure = own.figures[name]
         if not good and figure is not None:
             yield "asprs.survey", {"survey": figure.survey, "class": asked.classes[name]}
-    for name, good in own.control.items():
-        rmse = own.control_rmse["hv".index(name)]
+    for name, good in own.control_good_enough.items():
+        rmse = own.control_rmse[name]
         if not good and math.isfinite(rmse):
             # The limit is half a class; without vertical class, the full horizontal one.
             limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
@@ -341,8 +337,8 @@ def _assumptions(found: Statement) -> Iterator[Sentence]:
         if "asprs-2023" in asked.standards:
             yield "assume.slopes", {}
     if layout is not None:
-        quadrants = " / ".join(map(texts.percent, layout.quadrants))
-        fields = {"spacing": layout.least_spacing, "diagonal": texts.length(layout.diagonal, 3)}
+        quadrants = " / ".join(map(texts.percent, layout.share_in_quadrants))
+        fields = {"spacing": layout.least_spacing_over_diagonal, "diagonal": texts.length(layout.diagonal, 3)}
         yield "assume.layout", {"n": layout.count, "quadrants": quadrants, **fields}
     if lengths is not None and lengths.expansion is not None:
         yield "lengths.reference", {"expansion": texts.significant(lengths.expansion, 3)}

@@ -28,23 +28,24 @@ class Layout:
     diagonal: float  # Diagonal of the block's bounding box in plan, linear unit
     # Shares of the points: x and y low, x high and y low, x low and y high, both high. Points on a middle
     # line count as low.
-    quadrants: tuple[float, float, float, float]
-    least_spacing: float  # Spacing of two points relative to the diagonal; NaN for one point
+    share_in_quadrants: tuple[float, float, float, float]
+    least_spacing_over_diagonal: float  # Spacing of two points relative to the diagonal; NaN for one point
     # Share of the block's area that is farther from all points than a third of the diagonal; NaN if the block
     # is a line
-    far: float
-    heights: float  # Range of the heights of the points over that of the block; NaN if the block is level
-    beyond_control: int  # The number of points outside the hull of the control points in plan
+    share_of_area_far: float
+    # Range of the heights of the points over that of the block; NaN if the block is level
+    share_of_heights: float
+    outside_control: int  # The number of points outside the hull of the control points in plan
 
     @property
     def even(self) -> bool:
         """Whether each quadrant has the required share of points."""
-        return min(self.quadrants) >= SHARE_ASKED
+        return min(self.share_in_quadrants) >= SHARE_ASKED
 
     @property
     def apart(self) -> bool:
         """Whether all points have the required spacing."""
-        return not self.least_spacing < SPACING_ASKED
+        return not self.least_spacing_over_diagonal < SPACING_ASKED
 
 
 def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:

@@ -323,7 +323,7 @@ def _figures(statement: Statement) -> list[Part]:
     decimals = declared.decimals_for(np.array(known))
     number = partial(columns.number, decimals=decimals)
     intervals = [
-        " – ".join(texts.number(limit, decimals) for limit in predicted.rmse_interval)
+        " – ".join(texts.number(limit, decimals) for limit in predicted.rmse_interval_95)
         for *_, predicted in shown
     ]
     # Parts in standards: RMSE of the survey, and combined with the RMSE of the differences.

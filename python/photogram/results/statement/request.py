@@ -65,10 +65,6 @@ def _sequence(name: str, value: Any) -> Sequence[Any]:
     return value
 
 
-def _quantities(name: str, value: Any) -> tuple[Any, ...]:
-    return (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
-
-
 def _three(name: str, value: Any) -> tuple[float, ...]:
     """Return one number, or three, for east, north and up."""
     values = tuple(np.atleast_1d(numbers(name, value)).ravel().tolist())
@@ -83,10 +79,6 @@ def _limit(name: str, value: Any) -> tuple[float, float, float]:
     if len(values) != 3 or not all(each >= 0 for each in values) or not math.isfinite(values[0] + values[1]):
         raise invalid(name, "request.limit", value)
     return values[0], values[1], values[2]
-
-
-def _lengths(name: str, value: Any) -> tuple[Mapping[str, Any], ...]:
-    return tuple(_length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value)))
 
 
 def _length(name: str, value: Any) -> dict[str, Any]:
@@ -171,10 +163,17 @@ class Asked:
     survey_common_in_control: bool = _option(truth_value, default=False)
     language: str = "en"
     text: Mapping[str, str] = _option(_by_name(_text), default_factory=dict)
-    budgets: tuple[Any, ...] | None = _option(_quantities)
+    budgets: tuple[Any, ...] | None = _option(
+        lambda name, value: (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
+    )
     coverage: float = _option(number, default=0.95)
     components: VarianceComponents | None = _option(_components)
-    lengths: tuple[Mapping[str, Any], ...] = _option(_lengths, default=())
+    lengths: tuple[Mapping[str, Any], ...] = _option(
+        lambda name, value: tuple(
+            _length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value))
+        ),
+        default=(),
+    )
     limit: tuple[float, float, float] | None = _option(_limit)
     expansion: float | None = _option(number)
     title: str = ""

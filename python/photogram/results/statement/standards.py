@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
+from photogram.results.result import Result
 from photogram.results.statement import comparison
 from photogram.results.statement import lengths as length_tests
 from photogram.results.statement.figures import Figures, root_mean
@@ -31,9 +32,6 @@ from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import rmse_interval
-
-if TYPE_CHECKING:
-    from photogram import Result
 
 ASPRS_POINTS = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
 MOST_STEPS = 10  # Number of steps of 1,000 km2, after which the number of check points is constant
@@ -202,12 +200,12 @@ class Asprs:
     area: float
     points_asked: int
     # Whether survey and control are accurate enough for the classes, by `h` and `v`
-    survey: Mapping[str, bool]
-    control: Mapping[str, bool]
+    survey_good_enough: Mapping[str, bool]
+    control_good_enough: Mapping[str, bool]
     # Root mean squares of the standard deviations of control, radial in plan, and in height; linear unit
-    control_rmse: tuple[float, float]
+    control_rmse: Mapping[str, float]
     remarks: tuple[Remark, ...]  # Means and differences to investigate first
-    left_out: Mapping[str, float]  # RMSE of control predicted by the others, `h` and `v`; NaN without
+    leave_one_out: Mapping[str, float]  # RMSE of control predicted by the others, `h` and `v`; NaN without
 
     def member(self, asked: Asked, metre: float) -> dict[str, Any]:
         found: dict[str, Any] = dict.fromkeys(_METRES_OF.values())
@@ -216,14 +214,11 @@ class Asprs:
             found |= {f"upper_{name}": each and each.upper, f"rmse_{name}": each and each.rmse}
         found |= {own: self.verdicts.get(name) for name, own in _NAMES.items()}
         return found | {
-            "words": self.words,
+            **members(self, "words", "survey_good_enough", "control_good_enough", "control_rmse"),
             "enough_points": self.words == "tested",
-            "survey_good_enough": dict(self.survey),
-            "control_good_enough": dict(self.control),
-            "control_rmse": {"h": self.control_rmse[0], "v": self.control_rmse[1]},
             "points_asked_for": {f"{self.area:g} km2": self.points_asked},
             "remarks": [vars(each) for each in self.remarks],
-            "leave_one_out": dict(self.left_out),
+            "leave_one_out": self.leave_one_out,
         }
 
 
@@ -233,7 +228,8 @@ class Nssda:
 
     count: int  # n
     ratio: float | None  # Smaller RMSE of an axis over the larger
-    accuracy_r: float | None  # Horizontal, by the mean RMSE of the axes; None if the ratio is below 0.6
+    # Horizontal, by the mean RMSE of the axes; None if the ratio is below 0.6
+    accuracy_r_unequal: float | None
     accuracy_r_equal: float | None  # Horizontal, by the radial RMSE, for equal RMSE of both axes
     # Radius of 95 % from the mean products of differences, for any ratio
     ce95: float | None
@@ -269,10 +265,8 @@ class Standards:
 
     @property
     def nssda_member(self) -> dict[str, Any] | None:
-        if self.nssda is None:
-            return None
-        more = {"accuracy_r_unequal": "accuracy_r", "ce95": "ce95", "accuracy_z": "accuracy_z"}
-        return members(self.nssda, "ratio", "accuracy_r_equal", **more)
+        names = ("ratio", "accuracy_r_equal", "accuracy_r_unequal", "ce95", "accuracy_z")
+        return None if self.nssda is None else members(self.nssda, *names)
 
 
 def asprs_figures(
@@ -307,17 +301,17 @@ def asprs_figures(
         words=wording(min(filter(None, counts), default=0)),
         area=km2,
         points_asked=points_asked_for(km2),
-        survey={
+        survey_good_enough={
             name: survey_good_enough(own.survey, size)
             for name, size in classes.items()
             if name != "3d" and (own := figures[name])
         },
-        control=control,
-        control_rmse=(plan, height),
+        control_good_enough=control,
+        control_rmse={"h": plan, "v": height},
         remarks=()
         if of_all is None
         else remarks(np.where(found.counted, found.differences, np.nan), classes.get("h"), classes.get("v")),
-        left_out={"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)},
+        leave_one_out={"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)},
     )
 
 

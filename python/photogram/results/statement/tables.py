@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
 from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
-from photogram.results.statement.figures import Figures, Prediction, Sized
+from photogram.results.statement.figures import Figures, Prediction, Sized, point_tests
 from photogram.results.statement.request import lengths_in
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
@@ -69,17 +69,9 @@ def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> 
 def check_points(statement: Statement) -> Table:
     """Return the check points with their differences and tests."""
     texts, own, columns = statement.texts, statement.compared, Columns(statement.texts)
-    names, unit, n = own.names, statement.result.block.linear_unit, len(own)
-    tests = None if statement.of_all is None else statement.of_all.points
-    sd, adjusted, normalised = (
-        np.full((n, 3), np.nan) if tests is None else getattr(tests, name)
-        for name in ("sd_predicted", "sd_adjusted", "normalised")
-    )
-    T, p, others, p_others, ce90, le90 = (
-        np.full(n, np.nan) if tests is None else getattr(tests, name)
-        for name in ("T", "p", "others", "p_others", "ce90", "le90")
-    )
-    limit, decimals = 0.0 if tests is None else tests.limit, decimals_for(adjusted)
+    names, unit = own.names, statement.result.block.linear_unit
+    tests = point_tests(own) if statement.of_all is None else statement.of_all.points
+    decimals = decimals_for(tests.sd_adjusted)
     left_out = np.array([name in statement.asked.without for name in names], dtype=bool)
     covers = ["vegetated" if each else "open" for each in own.vegetated]
     plain, axes = partial(Quantity, kind="name"), tuple(map(Axis, DIRECTIONS))
@@ -90,16 +82,18 @@ def check_points(statement: Statement) -> Table:
         Quantity(own.given, member="given"),
         Quantity(statement.survey.checks, tuple(map(Axis, ("east", "north", "up"))), name=""),
         columns.directions("difference", own.differences, decimals, unit, name="d", member="difference"),
-        columns.directions("sd", sd, decimals, unit, name="sd", member="sd_predicted"),
-        Quantity(adjusted, axes, "deviation", "sd_adjusted", "sd_adjusted"),
+        columns.directions("sd", tests.sd_predicted, decimals, unit, name="sd", member="sd_predicted"),
+        Quantity(tests.sd_adjusted, axes, "deviation", "sd_adjusted", "sd_adjusted"),
         Quantity(own.survey_sd, axes, "deviation", "sd_survey", "sd_survey"),
-        columns.directions("normalised", normalised, 1, name="normalised"),
-        columns.number("T", T, 1, name="T"),
-        columns.number("p", p, kind="probability", name="p", marked=p < limit),
-        columns.number("others", others, 1, name="T_from_the_others", marked=p_others < limit),
-        Quantity(p_others, member="p_from_the_others"),
-        columns.number("CE90", ce90, decimals, unit, name="ce90_predicted"),
-        columns.number("LE90", le90, decimals, unit, name="le90_predicted"),
+        columns.directions("normalised", tests.normalised, 1, name="normalised"),
+        columns.number("T", tests.T, 1, name="T"),
+        columns.number("p", tests.p, kind="probability", name="p", marked=tests.p < tests.limit),
+        columns.number(
+            "others", tests.others, 1, name="T_from_the_others", marked=tests.p_others < tests.limit
+        ),
+        Quantity(tests.p_others, member="p_from_the_others"),
+        columns.number("CE90", tests.ce90, decimals, unit, name="ce90_predicted"),
+        columns.number("LE90", tests.le90, decimals, unit, name="le90_predicted"),
         plain(["no" if each else "yes" for each in left_out], name="used"),
         plain([statement.asked.without.get(name, "") for name in names], name="reason"),
     ]
@@ -228,7 +222,7 @@ def statement_members(found: Statement) -> dict[str, Any]:
         "nssda": standards.nssda_member if "nssda" in asked.standards else None,
         "lengths": standards.lengths and _lengths(found.texts, standards.lengths),
         "iso_19157": standards.iso_19157 or None,
-        "layout": found.layout and members(found.layout, **_LAYOUT),
+        "layout": found.layout and vars(found.layout),
         "camera": [
             members(each, "name", parameters="names", value="values") | members(each, "sd", "correlations")
             for each in result.cameras
@@ -243,15 +237,6 @@ def statement_members(found: Statement) -> dict[str, Any]:
 
 
 _HEAD = ("client", "firm", "project", "surveyor", "date")
-_LAYOUT = {
-    "count": "count",
-    "diagonal": "diagonal",
-    "share_in_quadrants": "quadrants",
-    "least_spacing_over_diagonal": "least_spacing",
-    "share_of_area_far": "far",
-    "share_of_heights": "heights",
-    "outside_control": "beyond_control",
-}
 
 
 def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
@@ -262,29 +247,22 @@ def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
         kind_of(name): (int(counts[k]), float(redundancy[k]), float(squares[k]))
         for k, name in enumerate(grouping.groups.names)
     }
+    more = []
     for unknown in result.unknowns:
         sd, w = unknown.given.deviations, unknown.standardized  # w = v / (sd sqrt(r))
-        _add(found, unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, w**2 * unknown.redundancy)
+        squares = w**2 * unknown.redundancy
+        more.append((unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, squares))
     for camera in result.cameras:
-        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
         with np.errstate(all="ignore"):
             squares = ((camera.given.values - camera.values) / camera.given.deviations) ** 2
-        _add(found, "camera", weighted, camera.redundancy, squares)
+        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
+        more.append(("camera", weighted, camera.redundancy, squares))
+    for kind, weighted, redundancy, squares in more:
+        if weighted.any():
+            count, r, q = found.get(kind, (0, 0.0, 0.0))
+            r, q = r + float(redundancy[weighted].sum()), q + float(np.nansum(squares[weighted]))
+            found[kind] = count + int(weighted.sum()), r, q
     return found
-
-
-def _add(
-    found: dict[str, tuple[int, float, float]],
-    kind: str,
-    weighted: Bools,
-    redundancy: Floats,
-    squares: Floats,
-) -> None:
-    """Add the weighted components of a camera or common unknown."""
-    if weighted.any():
-        count, r, q = found.get(kind, (0, 0.0, 0.0))
-        total = float(np.nansum(squares[weighted]))
-        found[kind] = (count + int(weighted.sum()), r + float(redundancy[weighted].sum()), q + total)
 
 
 def _adjustment(result: Result) -> dict[str, Any]:
@@ -336,18 +314,11 @@ def _radial(own: Sized | None) -> dict[str, Any] | None:
     return None if own is None else members(own, "n", "rmse", "largest", largest_point="point")
 
 
-_PREDICTION = {
-    "rmse_interval": "rmse_interval_95",
-    "factor": "factor_of_sd",
-    "factor_interval": "factor_interval_95",
-}
-
-
 def _prediction(found: Prediction | None) -> dict[str, Any] | None:
     if found is None:
         return None
-    own = {_PREDICTION.get(name, name): value for name, value in vars(found).items()}
-    return own | {"rejected": "high" if found.rejected_high else "low" if found.rejected_low else None}
+    rejected = "high" if found.rejected_high else "low" if found.rejected_low else None
+    return {**vars(found), "rejected": rejected}
 
 
 def budget_member(found: Budget) -> dict[str, Any]:
