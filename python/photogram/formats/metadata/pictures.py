@@ -207,9 +207,8 @@ def said_by_packet(data: bytes, path: Path) -> Said | None:
     properties, place = _properties(data, path), Place(path)
     if not properties:
         return None
-    position, deviations, accuracies, angles = (
-        tuple(_number(properties, (space, name), place) for name in names)
-        for space, names in _PROPERTIES.values()
+    position, deviations, accuracies, (yaw, pitch, roll) = (
+        [_number(properties, (space, name), place) for name in names] for space, names in _PROPERTIES.values()
     )
     text = properties.get((DJI, "RtkFlag"))
     flag = None if text is None else place.whole(text, "RtkFlag", highest=1000)
@@ -224,7 +223,7 @@ def said_by_packet(data: bytes, path: Path) -> Said | None:
         sd=sd or usable_deviations(*accuracies),
         rtk=rtk,
         flag=flag,
-        angles=None if math.isnan(sum(angles)) else angles,
+        angles=None if math.isnan(yaw + pitch + roll) else (yaw, pitch, roll),
     )
 
 
