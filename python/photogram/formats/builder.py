@@ -153,9 +153,9 @@ class BlockBuilder:
         _add(self.point_rows, key, "point", place)
         self.point_ids.append(name)
 
-    def points(self, names: Sequence[str], starts: Floats | None = None, **fields: Floats | None) -> None:
+    def points(self, names: list[str], starts: Floats | None = None, **fields: Floats | None) -> None:
         """Set all points: their names, (n, 3) initial positions, and other fields of the block."""
-        self.point_ids, self._points = list(names), {"starts": starts, **fields}
+        self.point_ids, self._points = names, {"starts": starts, **fields}
 
     def start(self, key: Hashable, xyz: Floats, place: Failing | None = None, *, crs: str = "") -> None:
         """Set the initial position of a point."""
