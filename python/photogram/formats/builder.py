@@ -65,6 +65,7 @@ class BlockBuilder:
         self.point_rows: dict[Hashable, int] = {}
         self._photo_names, self._point_names = set[str](), set[str]()
         self.poses: dict[Hashable, tuple[Floats, Floats, str]] = {}
+        self.remarks_on_systems = True  # Whether assumptions on heights of systems are reported
         self.crs: str | None = ""  # System of the coordinates of the frame; None: another
         self._poses: tuple[Floats, Floats] | None = None
         self._points: dict[str, Any] = {}
@@ -152,9 +153,9 @@ class BlockBuilder:
         _add(self.point_rows, key, "point", place)
         self.point_ids.append(name)
 
-    def points(self, names: Sequence[str], starts: Floats | None = None, **fields: Floats | None) -> None:
+    def points(self, names: list[str], starts: Floats | None = None, **fields: Floats | None) -> None:
         """Set all points: their names, (n, 3) initial positions, and other fields of the block."""
-        self.point_ids, self._points = list(names), {"starts": starts, **fields}
+        self.point_ids, self._points = names, {"starts": starts, **fields}
 
     def start(self, key: Hashable, xyz: Floats, place: Failing | None = None, *, crs: str = "") -> None:
         """Set the initial position of a point."""
@@ -309,7 +310,8 @@ class BlockBuilder:
 
         xyz, covariances, remarks = to_frame(crs, xyz, covariances, self.frame)
         known = {message.phrase for message in self.messages}
-        self.messages += [Message(remark) for remark in remarks if remark not in known]
+        if self.remarks_on_systems:
+            self.messages += [Message(remark) for remark in remarks if remark not in known]
         return xyz, covariances
 
     def _located(self, located: Mapping[Any, _Located]) -> Iterator[tuple[Any, _Located, Floats, Floats]]:

@@ -15,38 +15,25 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.directions import image_directions
 from photogram.network.motion import on_shared
 from photogram.network.observations import Control, Position
+from photogram.network.rays import meet_rays
 from photogram.network.subset import kept_images
 from photogram.words import Phrase, phrase
-
-STEEPEST = 1e12  # Largest condition number of the normal equations of a point; larger ones mean parallel rays
 
 
 def intersected(project: Project, points: Indices) -> Floats:
     """Return (k, 3) intersections of the rays of points; NaN without."""
     block = project.block
-    found = np.full((len(points), 3), np.nan)
     if not len(points) or block.geographic:
-        return found
+        return np.full((len(points), 3), np.nan)
     places = np.full(len(block.point_ids), -1, dtype=np.int64)
     places[points] = np.arange(len(points))
     # The pose of a photo on a trajectory is only approximate.
     placed = ~on_shared(block)[block.image_photos]
-    rows = np.flatnonzero((places[block.image_points] >= 0) & placed)
-    own = kept_images(block, rows)
-    photos = own.image_photos
-    rays = np.einsum("nij,nj->ni", attitude_matrices(block)[photos], image_directions(own))
-    centres = block.photo_positions[photos]
+    own = kept_images(block, np.flatnonzero((places[block.image_points] >= 0) & placed))
+    rays = np.einsum("nij,nj->ni", attitude_matrices(block)[own.image_photos], image_directions(own))
+    centres = block.photo_positions[own.image_photos]
     good: Bools = np.asarray(np.isfinite(np.hstack([rays, centres])).all(axis=1))
-    across = np.eye(3) - rays[good, :, np.newaxis] * rays[good, np.newaxis, :]
-    owner = places[own.image_points[good]]
-    normal, right = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
-    np.add.at(normal, owner, across)
-    np.add.at(right, owner, np.einsum("nij,nj->ni", across, centres[good]))
-    counts = np.bincount(owner, minlength=len(points))
-    firm = np.flatnonzero(counts >= 2)
-    firm = firm[np.linalg.cond(normal[firm]) < STEEPEST]
-    found[firm] = np.linalg.solve(normal[firm], right[firm][..., np.newaxis])[..., 0]
-    return found
+    return meet_rays(places[own.image_points[good]], len(points), centres[good], rays[good])
 
 
 def complete_positions(project: Project) -> Floats:

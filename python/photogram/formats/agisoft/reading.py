@@ -39,6 +39,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     """Read the first or the requested chunk of a document."""
     root = read_stream(path, {}, "document")
     block = BlockBuilder(path, TITLE)
+    block.remarks_on_systems = False  # Metashape defines heights of its systems
     block.lacks.append(Phrase("read.ties"))
     chunk = _chunk(root, wishes.model, block.messages)
     _sensors(chunk, block)

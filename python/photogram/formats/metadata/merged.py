@@ -41,17 +41,33 @@ EXPOSURES = ".mrk"
 
 @dataclass
 class Found:
-    """Metadata of each photo by relative path, and the files read.
+    """Metadata of each photo by relative path or name, and the files read.
 
     `said` contains its sources in order of priority; `flights` its folder, and its .MRK file if the folder
     has several.
     """
 
+    path: Path
     said: dict[str, list[Said]] = field(default_factory=dict)
     flights: dict[str, str] = field(default_factory=dict)
     tables: list[Path] = field(default_factory=list)
     pictures: list[Path] = field(default_factory=list)
     messages: list[Message] = field(default_factory=list)
+
+    def metadata(self) -> Metadata:
+        """Return the record of each photo; the first source with a value has priority."""
+        photos, without_height = {}, []
+        for key, sources in self.said.items():
+            position = next((each for each in sources if each.is_located), None)
+            if position is None and any(each.position is not None for each in sources):
+                without_height.append(key)
+            deviations = next((each for each in sources if each.sd is not None), None)
+            photos[key] = PhotoRecord(key, self.flights[key], position, deviations)
+        remarks = list(self.messages)
+        if without_height:
+            remark = phrase("photos.heightless", n=len(without_height), names=without_height)
+            remarks.append(Message(remark, self.path))
+        return Metadata(self.path, photos, tuple(self.tables), tuple(self.pictures), tuple(remarks))
 
 
 def found_in(directory: Path, *, antenna: bool) -> Found:
@@ -63,7 +79,7 @@ def found_in(directory: Path, *, antenna: bool) -> Found:
         if not directory.is_dir():
             raise InputError(phrase("photos.folder"), file=directory)
         files = list(files_of(directory))
-    found = Found()
+    found = Found(directory)
     pictures = {_key(directory, path): path for path in files if path.suffix.lower() in ENDINGS}
     found.pictures = list(pictures.values())
     given = _tables(directory, files, found)
@@ -320,33 +336,7 @@ def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = Fals
     -----
     Section 6 of the specification of accuracy statements.
     """
-    path = Path(directory)
-    found = found_in(path, antenna=mrk_antenna)
-    return metadata_of(path, found.said, found.flights, found.tables, found.pictures, found.messages)
-
-
-def metadata_of(
-    path: Path,
-    said: Mapping[str, Sequence[Said]],
-    flights: Mapping[str, str],
-    tables: Sequence[Path],
-    pictures: Sequence[Path],
-    messages: Sequence[Message],
-) -> Metadata:
-    """Return the record of each photo; the first source with a value has priority."""
-    photos, without_height = {}, []
-    for key, sources in said.items():
-        position = next((each for each in sources if each.is_located), None)
-        if position is None and any(each.position is not None for each in sources):
-            without_height.append(key)
-        deviations = next((each for each in sources if each.sd is not None), None)
-        photos[key] = PhotoRecord(key, flights[key], position, deviations)
-    remarks = list(messages)
-    if without_height:
-        remarks.append(
-            Message(phrase("photos.heightless", n=len(without_height), names=without_height), path)
-        )
-    return Metadata(path, photos, tuple(tables), tuple(pictures), tuple(remarks))
+    return found_in(Path(directory), antenna=mrk_antenna).metadata()
 
 
 def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
@@ -378,20 +368,20 @@ def read_gnss_file(
     `directory`: folder of all photographs; None: the photos of the project. The order of photos assigns
     events to them. `mrk_antenna`: whether positions of .MRK files are antenna positions.
     """
-    messages: list[Message] = []
+    found = Found(path, tables=[path])
     first = next((place.text or "" for place in filled_lines(path)), "").strip()
     if path.suffix.lower() == EXPOSURES:
-        said = _of_exposures(path, photos, messages, antenna=mrk_antenna)
+        said = _of_exposures(path, photos, found.messages, antenna=mrk_antenna)
     elif is_events(path):
         said = _of_events(path, photos, directory)
     elif first.upper().startswith(SYSTEMS):
         said = read_geo_txt(path)
     elif is_reference(path):
-        said = read_reference(path, messages)
+        said = read_reference(path, found.messages)
     else:
         raise InputError(phrase("photos.positions"), file=path)
-    flights = dict.fromkeys(said, path.stem)
-    return metadata_of(path, {name: [one] for name, one in said.items()}, flights, [path], [], messages)
+    found.said, found.flights = {name: [one] for name, one in said.items()}, dict.fromkeys(said, path.stem)
+    return found.metadata()
 
 
 def _of_exposures(

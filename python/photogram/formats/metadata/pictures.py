@@ -43,6 +43,13 @@ RADIAL = (
 )
 DOP_ALONE = "GPSDOP of EXIF gives no metres: it is not taken"
 DJI, PIX4D = "http://www.dji.com/drone-dji/1.0", "http://pix4d.com/camera/1.0"
+_PROPERTIES = {
+    "position": (DJI, ("GpsLongitude", "GpsLatitude", "AbsoluteAltitude")),
+    "sd": (DJI, ("RtkStdLon", "RtkStdLat", "RtkStdHgt")),
+    "accuracies": (PIX4D, ("GPSXYAccuracy", "GPSXYAccuracy", "GPSZAccuracy")),
+    "angles": (DJI, ("GimbalYawDegree", "GimbalPitchDegree", "GimbalRollDegree")),
+}
+"""Namespaces and names of numbers in XMP packets."""
 LARGEST = 1 << 20  # Largest size of a packet in bytes; cameras write a few thousand
 _SPELLINGS = {"GpsLongtitude": "GpsLongitude"}  # Spelling of older cameras
 
@@ -197,47 +204,31 @@ def said_by_packet(data: bytes, path: Path) -> Said | None:
     east, north and height, unused without a solution. Heights are ellipsoidal if the receiver had
     corrections; otherwise their reference is unknown.
     """
-    properties = _properties(data, path)
+    properties, place = _properties(data, path), Place(path)
     if not properties:
         return None
-    dji = {name: text for (space, name), text in properties.items() if space == DJI}
-    accuracies = {name: text for (space, name), text in properties.items() if space == PIX4D}
-    place = Place(path)
-    flag = place.whole(dji["RtkFlag"], "RtkFlag", highest=1000) if "RtkFlag" in dji else None
-    sd = None if flag == 0 else _triple(dji, ("RtkStdLon", "RtkStdLat", "RtkStdHgt"), place)
+    position, deviations, accuracies, (yaw, pitch, roll) = (
+        [_number(properties, (space, name), place) for name in names] for space, names in _PROPERTIES.values()
+    )
+    text = properties.get((DJI, "RtkFlag"))
+    flag = None if text is None else place.whole(text, "RtkFlag", highest=1000)
+    sd = None if flag == 0 else usable_deviations(*deviations)
     rtk = sd is not None or flag not in (None, 0)
-    position = _position_of_packet(dji, place)
-    if sd is None:
-        sd = _triple(accuracies, ("GPSXYAccuracy", "GPSXYAccuracy", "GPSZAccuracy"), place)
-    yaw, pitch, roll = (_number(dji, f"Gimbal{each}Degree", place) for each in ("Yaw", "Pitch", "Roll"))
     return Said(
         "XMP",
         place,
         crs=ELLIPSOIDAL if rtk else UNSAID_SYSTEM,
         heights="" if rtk else UNSAID,
-        position=position,
-        sd=sd,
+        position=None if math.isnan(sum(position[:2])) else geographic_position(place, position),
+        sd=sd or usable_deviations(*accuracies),
         rtk=rtk,
         flag=flag,
         angles=None if math.isnan(yaw + pitch + roll) else (yaw, pitch, roll),
     )
 
 
-def _number(properties: Mapping[str, str], name: str, place: Place) -> float:
+def _number(properties: Mapping[tuple[str, str], str], key: tuple[str, str], place: Place) -> float:
     """Return a property as a number; NaN if it is missing."""
-    if name not in properties:
+    if key not in properties:
         return math.nan
-    return Place(place.file, text=f"{name} {properties[name]}").number(properties[name], name)
-
-
-def _triple(properties: Mapping[str, str], names: tuple[str, str, str], place: Place) -> Triple | None:
-    return usable_deviations(*(_number(properties, name, place) for name in names))
-
-
-def _position_of_packet(dji: Mapping[str, str], place: Place) -> Triple | None:
-    longitude, latitude, height = (
-        _number(dji, name, place) for name in ("GpsLongitude", "GpsLatitude", "AbsoluteAltitude")
-    )
-    if math.isnan(longitude) or math.isnan(latitude):
-        return None
-    return geographic_position(place, (longitude, latitude, height))
+    return Place(place.file, text=f"{key[1]} {properties[key]}").number(properties[key], key[1])
