@@ -65,7 +65,7 @@ def read_cameras(tables: Tables) -> Cameras:
     certificates = read_certificates(tables)
     found.certificates.update(certificates)
     in_mm = []
-    for row, own in enumerate(_rows(table)):
+    for row, own in enumerate(_rows(tables, table)):
         if found.lines[row] is not None:
             own = own.behind_a_lens(table, row)
         if own.each not in _EACH:
@@ -163,30 +163,16 @@ class _Row:
         return replace(self, model=model, values=values)
 
 
-def _rows(table: ColumnTable) -> Iterator[_Row]:
-    """Yield the rows; columns are read once for many cameras."""
-    words = [table.texts(name) for name in ("for_each", "model", "weights", "calibration")]
-    texts = [table.names_once("camera"), *words]
-    facts = [_present(table.numbers(name)) for name in ("width", "height", "pixel_mm")]
-    values = {name: _present(table.numbers(name)) for name in table.columns if name in _ALL}
-    deviations = {
-        name.removeprefix("sd_"): _present(table.numbers(name, infinite=True))
-        for name in table.columns
-        if name.startswith("sd_")
-    }
-    for row in range(table.count):
-        name, each, model, weights, calibration = (column[row] for column in texts)
-        width, height, pixel_mm = (column[row] for column in facts)
-        own, sd = (
-            {key: value for key, column in columns.items() if (value := column[row]) is not None}
-            for columns in (values, deviations)
-        )
-        kinds = (each or "all").lower(), model.lower(), (weights or "corrected").lower()
-        yield _Row(name, *kinds, calibration, width, height, pixel_mm, own, sd)
-
-
-def _present(values: Floats) -> list[float | None]:
-    return [None if math.isnan(value) else value for value in values.tolist()]
+def _rows(tables: Tables, table: ColumnTable) -> Iterator[_Row]:
+    """Yield the rows."""
+    for name, cells in zip(table.names_once("camera"), tables.records("cameras"), strict=True):
+        words = (("for_each", "all"), ("model", ""), ("weights", "corrected"))
+        each, model, weights = (cells.get(column, default).lower() for column, default in words)
+        width, height, pixel_mm = (cells.get(column) for column in ("width", "height", "pixel_mm"))
+        values = {column: value for column, value in cells.items() if column in _ALL}
+        sd = {column[3:]: value for column, value in cells.items() if column.startswith("sd_")}
+        calibration = cells.get("calibration", "")
+        yield _Row(name, each, model, weights, calibration, width, height, pixel_mm, values, sd)
 
 
 def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:

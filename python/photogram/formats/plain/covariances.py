@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.tables import DEGREE, Tables, made, word_of
+from photogram.formats.plain.tables import DEGREE, Tables, columns_of_rows, made, word_of
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import unknown_name
@@ -179,10 +179,8 @@ def covariance_tables(
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
     for kind, name, components, matrix in more:
         rows += _pairs(kind, name, components, matrix)
-    if not rows:
-        return {}
-    columns = ("kind", "name", "first", "second", "covariance")
-    return {"covariances": {name: [row[k] for row in rows] for k, name in enumerate(columns)}}
+    columns = columns_of_rows(("kind", "name", "first", "second", "covariance"), rows)
+    return {"covariances": columns} if rows else {}
 
 
 def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) -> dict[str, float]:

@@ -222,6 +222,12 @@ class Schema:
         columns = [column for column in self.all_columns if (column.kind in _TEXTS) is text]
         return tuple(dict.fromkeys(name for column in columns for name in column.names))
 
+    @cached_property
+    def defaults(self) -> dict[str, float]:
+        """Numbers of empty cells by column, if they are declared."""
+        columns = (column for column in self.all_columns if not math.isnan(column.number))
+        return {name: column.number for column in columns for name in column.names}
+
     @property
     def columns(self) -> tuple[str, ...]:
         """All allowed columns."""
