@@ -28,8 +28,7 @@ from photogram.formats.columns import Units
 from photogram.lazy_dataclasses import dataclass
 
 AXES = ("x", "y", "z")
-ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
-POSE = (*AXES, *ROTATIONS)  # Components of poses: small rotations are about the axes of the photo
+ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")  # Small rotations about the axes of the photo
 VELOCITY, RATE = ("vx", "vy", "vz"), ("rate_x", "rate_y", "rate_z")
 BASES = ("position", "rotation")  # Corrections of a trajectory
 FACTORS = ("factor_0", "factor_1", "factor_2", "factor_3")

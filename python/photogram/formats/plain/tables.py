@@ -319,6 +319,14 @@ def covariances_of(
     return found
 
 
+def signs_in_files(names: Sequence[str]) -> Floats:
+    """Return the signs of parameters of cameras in files relative to models.
+
+    A principal distance is positive in files, for the positive plane, and negative in models.
+    """
+    return np.array([-1.0 if name == "c" else 1.0 for name in names])
+
+
 def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind: str) -> Indices:
     """Return (rows,) the index of the named object of each row."""
     found = table.names(column)
