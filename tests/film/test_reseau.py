@@ -147,5 +147,5 @@ def test_a_local_reseau_needs_its_grid(tmp_path: Path) -> None:
         archive(tmp_path, WHOLE.removesuffix("6,6") + "11,11")
     with pytest.raises(InputError, match=r"column grid_rows: the pattern local requires values"):
         archive(tmp_path, WHOLE.removesuffix("6"))
-    with pytest.raises(InputError, match=r"column sd_w1, sd_w2: the pattern local requires values"):
+    with pytest.raises(InputError, match=r"column sd_w1: the pattern local requires values"):
         archive(tmp_path, WHOLE.replace("local,0.006", "local,"))

@@ -40,11 +40,11 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
         # Their positions are control points, which are read later.
         given["points"] = np.zeros((0, 3))
         return Board(**given)
-    lengths = {name: float(table.numbers(name)[row]) for name in PITCHES}
-    given |= {name: int(table.numbers(name, 0.0)[row]) for name in ("columns", "rows")}
-    given |= {name: lengths[name] for name in PITCHES[2:] if not np.isnan(lengths[name])}
+    cells = tables.records("boards")[row]
+    given |= {name: int(cells.get(name, 0)) for name in ("columns", "rows")}
+    given |= {name: cells[name] for name in PITCHES[2:] if name in cells}
     if "tag_size" not in given:
-        given["spacing"] = lengths["spacing_x"], lengths["spacing_y"]
+        given["spacing"] = tuple(cells.get(name, np.nan) for name in PITCHES[:2])
     return made(table, row, Board, **given)
 
 

@@ -14,7 +14,7 @@ from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
-from photogram.formats.plain.tables import Tables, columns_of, made
+from photogram.formats.plain.tables import Tables, columns_of, made, signs_in_files
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
@@ -65,7 +65,7 @@ def read_cameras(tables: Tables) -> Cameras:
     certificates = read_certificates(tables)
     found.certificates.update(certificates)
     in_mm = []
-    for row, own in enumerate(_rows(table)):
+    for row, own in enumerate(_rows(tables, table)):
         if found.lines[row] is not None:
             own = own.behind_a_lens(table, row)
         if own.each not in _EACH:
@@ -163,30 +163,16 @@ class _Row:
         return replace(self, model=model, values=values)
 
 
-def _rows(table: ColumnTable) -> Iterator[_Row]:
-    """Yield the rows; columns are read once for many cameras."""
-    words = [table.texts(name) for name in ("for_each", "model", "weights", "calibration")]
-    texts = [table.names_once("camera"), *words]
-    facts = [_present(table.numbers(name)) for name in ("width", "height", "pixel_mm")]
-    values = {name: _present(table.numbers(name)) for name in table.columns if name in _ALL}
-    deviations = {
-        name.removeprefix("sd_"): _present(table.numbers(name, infinite=True))
-        for name in table.columns
-        if name.startswith("sd_")
-    }
-    for row in range(table.count):
-        name, each, model, weights, calibration = (column[row] for column in texts)
-        width, height, pixel_mm = (column[row] for column in facts)
-        own, sd = (
-            {key: value for key, column in columns.items() if (value := column[row]) is not None}
-            for columns in (values, deviations)
-        )
-        kinds = (each or "all").lower(), model.lower(), (weights or "corrected").lower()
-        yield _Row(name, *kinds, calibration, width, height, pixel_mm, own, sd)
-
-
-def _present(values: Floats) -> list[float | None]:
-    return [None if math.isnan(value) else value for value in values.tolist()]
+def _rows(tables: Tables, table: ColumnTable) -> Iterator[_Row]:
+    """Yield the rows."""
+    for name, cells in zip(table.names_once("camera"), tables.records("cameras"), strict=True):
+        words = (("for_each", "all"), ("model", ""), ("weights", "corrected"))
+        each, model, weights = (cells.get(column, default).lower() for column, default in words)
+        width, height, pixel_mm = (cells.get(column) for column in ("width", "height", "pixel_mm"))
+        values = {column: value for column, value in cells.items() if column in _ALL}
+        sd = {column[3:]: value for column, value in cells.items() if column.startswith("sd_")}
+        calibration = cells.get("calibration", "")
+        yield _Row(name, each, model, weights, calibration, width, height, pixel_mm, values, sd)
 
 
 def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:
@@ -227,9 +213,8 @@ def _camera(
     if size is None and "w" in own:
         raise table.error(row, phrase("error.requires", name=f"the model {model}", other="width and height"))
     parameters = _spread(own, known)
-    if "c" in parameters:
-        # In files a principal distance is positive for the positive plane; in models it is negative.
-        parameters["c"] = -parameters["c"]
+    signs = signs_in_files([*parameters]).tolist()
+    parameters = {name: sign * parameters[name] for name, sign in zip(parameters, signs, strict=True)}
     deviations = _spread(own, given.deviations)
     if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
         raise table.error(row, unknown_name(f"parameter of the model {model}", strange[0], powers))
@@ -324,20 +309,19 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
     splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
     values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
     seen = set[tuple[str, float, float]]()
-    given = {name: table.numbers(name, 0.0, infinite=name in _SD) for name in ("dx", "dy", *_SD)}
-    where = zip(table.texts("camera"), table.numbers("i").tolist(), table.numbers("j").tolist(), strict=True)
-    for row, (name, i, j) in enumerate(where):
+    for row, cells in enumerate(tables.records("knots")):
+        name, i, j = cells.get("camera", ""), cells.get("i", math.nan), cells.get("j", math.nan)
         if name not in splined:
             raise table.unknown_error(row, "camera", "splined camera", name, splined)
-        rows, columns, _ = values[name].shape
-        if not (i in range(columns) and j in range(rows)):
-            fields = {"camera": name, "columns": columns, "rows": rows, "i": i, "j": j}
+        rows, count, _ = values[name].shape
+        if not (i in range(count) and j in range(rows)):
+            fields = {"camera": name, "columns": count, "rows": rows, "i": i, "j": j}
             raise table.error(row, phrase("plain.knot", **fields))
         if (name, i, j) in seen:
             raise table.error(row, phrase("error.repeated", kind="knot", name=f"{i:g}, {j:g}"))
         seen.add((name, i, j))
-        values[name][int(j), int(i)] = [given["dx"][row], given["dy"][row]]
-        sd[name][int(j), int(i)] = [given[each][row] for each in _SD]
+        for found, columns in ((values, ("dx", "dy")), (sd, _SD)):
+            found[name][int(j), int(i)] = [cells.get(column, 0.0) for column in columns]
     with at_place(Place(tables.settings.path)):
         return [
             each.replace(knots=values[each.name], knot_sd=sd[each.name]) if each.name in splined else each

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.tables import DEGREE, Tables, made, word_of
+from photogram.formats.plain.tables import DEGREE, Tables, columns_of_rows, made, signs_in_files, word_of
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import unknown_name
@@ -77,8 +77,8 @@ class Covariances:
             spelled.values[by_word[first], by_word[second]] = value
         names = [name for name in camera.names if any(name in pair for pair in spelled.values)]
         scale = 1e-3 if self.tables.settings.image == "um" else 1.0
-        # In files a principal distance is positive for the positive plane, in models negative.
-        units = {name: scale ** camera.powers[name] * (-1.0 if name == "c" else 1.0) for name in names}
+        signs = signs_in_files(names).tolist()
+        units = {name: sign * scale ** camera.powers[name] for name, sign in zip(names, signs, strict=True)}
         found = spelled.over(names, units)
         # Parameters without standard deviation are fixed, except those in the matrix.
         sd = {
@@ -167,8 +167,7 @@ def covariance_tables(
     for each in cameras:
         if each.covariance is not None:
             names, matrix = each.covariance
-            # In files a principal distance is positive for the positive plane, in models negative.
-            signs = np.array([-1.0 if name == "c" else 1.0 for name in names])
+            signs = signs_in_files(names)
             rows += _pairs(CAMERA, each.name, names, np.asarray(matrix) * signs * signs[:, np.newaxis])
     for prior in (each for each in block.observations if isinstance(each, Prior)):
         unknown = prior.unknown
@@ -179,10 +178,8 @@ def covariance_tables(
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
     for kind, name, components, matrix in more:
         rows += _pairs(kind, name, components, matrix)
-    if not rows:
-        return {}
-    columns = ("kind", "name", "first", "second", "covariance")
-    return {"covariances": {name: [row[k] for row in rows] for k, name in enumerate(columns)}}
+    columns = columns_of_rows(("kind", "name", "first", "second", "covariance"), rows)
+    return {"covariances": columns} if rows else {}
 
 
 def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) -> dict[str, float]:

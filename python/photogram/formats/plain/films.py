@@ -24,7 +24,7 @@ from photogram.formats.plain.film_readings import Lying, MarkReadings, ScannedPh
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
-from photogram.formats.plain.tables import Tables, made
+from photogram.formats.plain.tables import Tables, made, signs_in_files
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.cameras import Camera
@@ -313,7 +313,7 @@ def _positive(camera: Camera) -> Camera:
     covariance = camera.covariance
     if covariance is not None:
         names, matrix = covariance
-        signs = np.array([-1.0 if name == "c" else 1.0 for name in names])
+        signs = signs_in_files(names)
         covariance = names, np.asarray(matrix) * signs * signs[:, np.newaxis]
     parameters = {**camera.parameters, "c": -camera.parameters["c"]}
     return camera.replace(parameters=parameters, covariance=covariance)

@@ -28,6 +28,8 @@ from photogram.words import phrase
 
 _MOTION = (*VELOCITY, *RATE)
 _SD = deviation_columns(_MOTION)
+_FIELDS = ("velocity", "rotation_rate", "sd_velocity", "sd_rate")
+"""Fields of these columns in moving photos."""
 
 
 def read_timed(
@@ -94,10 +96,9 @@ def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
     sd = table.vectors(_SD, infinite=True)
     silent = np.isnan(values).all(axis=1) & np.isnan(sd).all(axis=1)
     values, sd = np.nan_to_num(values), np.where(np.isnan(sd), np.inf, sd)
-    fields = ("velocity", "rotation_rate", "sd_velocity", "sd_rate")
     rows = np.hstack([values, sd]).reshape(-1, 4, 3)
     return [
-        {} if none else dict(zip(fields, own, strict=True)) for none, own in zip(silent, rows, strict=True)
+        {} if none else dict(zip(_FIELDS, own, strict=True)) for none, own in zip(silent, rows, strict=True)
     ]
 
 
@@ -176,15 +177,13 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
 
 def _motion_columns(own: Sequence[Timed | None]) -> dict[str, Any]:
     """Return velocities and rates of photos with their own motion."""
-    values, sd = np.full((len(own), 6), np.nan), np.full((len(own), 6), np.nan)
+    values = np.full((len(own), len(_FIELDS), 3), np.nan)
     for row, each in enumerate(own):
         if each is not None and each.trajectory is None:
-            pairs = ((each.velocity, each.sd_velocity), (each.rotation_rate, each.sd_rate))
-            for k, (value, deviation) in enumerate(pairs):
-                values[row, 3 * k : 3 * k + 3], sd[row, 3 * k : 3 * k + 3] = value, deviation
-    if np.isnan(values).all():
-        return {}
-    return dict(zip((*_MOTION, *_SD), [*values.T.tolist(), *sd.T.tolist()], strict=True))
+            for k, field in enumerate(_FIELDS):
+                values[row, k] = getattr(each, field)
+    columns = values.reshape(len(own), -1).T.tolist()
+    return {} if np.isnan(values).all() else dict(zip((*_MOTION, *_SD), columns, strict=True))
 
 
 def line_times_table(block: Block) -> dict[str, Any]:

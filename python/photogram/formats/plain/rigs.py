@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.schema import AXES, TABLES
-from photogram.formats.plain.tables import Tables, indices_of, made
+from photogram.formats.plain.tables import Tables, columns_of_rows, indices_of, made
 from photogram.formats.plain.unknowns import read_unknowns, unknown_columns, value_columns
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.column_table import ColumnTable
@@ -224,29 +224,22 @@ class Rigs:
             frames += [
                 (frame, rig, each.photo, self._name(each)) for each in self._mounts if each.frame == frame
             ]
-        what = "camera" if self._by_camera else "sensor"
-        columns = ("frame", "rig", "photo") if self._by_camera else ("frame", "rig", "photo", "sensor")
-        clocks = [self.clock(row[2]) for row in rows]
+        names = ("rig", "camera" if self._by_camera else "sensor")
+        clocks = [self.clock(sensor) for *_, sensor in rows]
         found = {
             "rigs": {
-                "rig": [row[0] for row in rows],
-                what: [row[1] for row in rows],
+                **columns_of_rows(names, [row[:2] for row in rows]),
                 **value_columns(block, _SENSOR, [row[2] or _REFERENCE for row in rows]),
                 **unknown_columns(block, TABLES["rigs"].unknown("clock"), clocks, [""] * len(rows)),
             },
+            "frames": columns_of_rows(("frame", "rig", "photo", "sensor"), frames),
         }
-        if frames:
-            found["frames"] = {name: [row[k] for row in frames] for k, name in enumerate(columns)}
-            if self._times:
-                found["frames"]["time"] = [self._times.get(row[2]) for row in frames]
-        if self._bases:
-            names = ("rig", "from", "to")
-            found["bases"] = {
-                **{name: [row[k] for _, row in self._bases] for k, name in enumerate(names)},
-                "distance": np.array([each.length for each, _ in self._bases], dtype=float),
-                "sd": np.array([each.sd for each, _ in self._bases], dtype=float),
-            }
-        return found
+        if self._by_camera:
+            found["frames"].pop("sensor", None)
+        if frames and self._times:
+            found["frames"]["time"] = [self._times.get(row[2]) for row in frames]
+        bases = [(*row, float(each.length), float(each.sd)) for each, row in self._bases]
+        return found | {"bases": columns_of_rows(("rig", "from", "to", "distance", "sd"), bases)}
 
 
 def _clocks(block: Block) -> dict[int, Clock]:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.formats.plain.covariances import Covariances
-from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID
+from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID, TABLES, deviation_columns
 from photogram.formats.plain.tables import Tables, made
 from photogram.io.column_table import ColumnTable
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, Scanner, ScannerCurve, Weights
 from photogram.network.observations import KnownTogether
@@ -21,8 +22,7 @@ from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
 BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}  # Parameters of models that are not affine
-_BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
-_WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
+_NUMBERS = (*DEVICE, *CURVES)  # Numbers of a scanner
 UM = 1e-3  # In millimetres
 KNOWN = 1e-6  # Standard deviation of fixed components in a singular covariance (mm, a ratio, radians)
 LOCAL = "local"  # The pattern of films with a separate grid for each photo
@@ -65,19 +65,17 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
     table = tables.rows("scanners")
     names = table.names_once("scanner")
     counts = table.given(("pitch_mm", "origin_column", "origin_row"))
-    given = np.column_stack([table.numbers(name, float(name in ("sx", "sy"))) for name in (*DEVICE, *CURVES)])
-    sd = table.vectors([f"sd_{name}" for name in (*DEVICE, *CURVES)], 0.0, infinite=True)
-    half = np.column_stack([table.numbers(name, 1.0) for name in ("hx", "hy")])
     # Readings count rows downwards by default.
     down = table.flags("rows_down") if "rows_down" in table else np.ones(table.count, dtype=bool)
-    files = table.texts("calibration")
     found = {}
-    for row, name in enumerate(names):
-        if files[row]:
-            _check_alone(table, row, name, covariances)
-            numbers = _calibrated(table, row, files[row], tables.messages)
+    for row, (name, given) in enumerate(zip(names, tables.records("scanners"), strict=True)):
+        if "calibration" in given:
+            _check_alone(table, row, given, covariances)
+            numbers = _calibrated(table, row, given["calibration"], tables.messages)
         else:
-            numbers = _Numbers(given[row], sd[row], half[row])
+            cells = TABLES["scanners"].defaults | given
+            columns = _NUMBERS, deviation_columns(_NUMBERS), ("hx", "hy")
+            numbers = _Numbers(*(np.array([cells[each] for each in names]) for names in columns))
         pitch, *origin = counts[row].tolist()
         zero = numbers.zero / pitch * [1.0, -1.0 if down[row] else 1.0] + origin
         counted = pitch, tuple(zero.tolist()), bool(down[row]), tuple(numbers.half.tolist())
@@ -98,10 +96,11 @@ class _Numbers:
     covariance: Floats | None = None  # (21, 21); None without
 
 
-def _check_alone(table: ColumnTable, row: int, name: str, covariances: Covariances) -> None:
+def _check_alone(table: ColumnTable, row: int, cells: Mapping[str, Any], covariances: Covariances) -> None:
     """Reject other parameters in addition to a calibration file."""
-    for column in (*DEVICE, *CURVES, "hx", "hy", *(f"sd_{each}" for each in (*DEVICE, *CURVES))):
-        if not math.isnan(table.numbers(column, infinite=True)[row]):
+    name = cells["scanner"]
+    for column in (*_NUMBERS, "hx", "hy", *deviation_columns(_NUMBERS)):
+        if column in cells:
             raise table.cell_error(row, column, "plain.calibrated-scanner", scanner=name)
     if covariances.names("scanner", name):
         raise table.error(row, phrase("plain.scanner-covariance", scanner=name))
@@ -169,49 +168,37 @@ def _machine(
 
 def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[str, FilmKind]:
     """Read the table of films; films without a row have defaults."""
-    table = tables.rows("films")
-    found = {
-        name: FilmKind(Roll(name, 0.0, 5e-4), default, (1e-4,) * 3, _bends(default), None) for name in names
-    }
-    means, sd_means = table.numbers("m", 0.0), table.numbers("sd_m", 5e-4, infinite=True)
-    size = np.column_stack(
-        [table.numbers(f"sd_{name}", 1e-4, infinite=True) for name in ("photo_m", "b1", "b2")]
-    )
-    models = table.texts("model", default)
-    for row, name in enumerate(table.names_once("film")):
-        if models[row] not in FILM_MODELS:
-            raise table.unknown_error(row, "model", "film model", models[row], FILM_MODELS)
-        bends = _bends(models[row])
-        columns = [f"sd_{each}" for each in BENDS.get(models[row], ())]
-        own = tuple(
-            float(table.numbers(each, bends[k], infinite=True)[row]) for k, each in enumerate(columns)
-        )
-        local = table.texts("pattern")[row] == LOCAL
-        found[name] = FilmKind(
-            made(table, row, Roll, name, float(means[row]), float(sd_means[row])),
-            models[row],
-            (float(size[row, 0]), float(size[row, 1]), float(size[row, 2])),
-            (own[0], own[1]) if own else bends,
-            None if local else _pattern(table, row, name),
-            _reseau(table, row) if local else None,
-        )
+    table, defaults = tables.rows("films"), TABLES["films"].defaults
+    found = {name: _film_kind(name, {"model": default, **defaults}) for name in names}
+    table.names_once("film")
+    for row, cells in enumerate(tables.records("films")):
+        cells = {"model": default, "pattern": "none", **defaults, **cells}
+        for column, words in (("model", FILM_MODELS), ("pattern", (*PATTERNS, LOCAL))):
+            if cells[column] not in words:
+                kind = "film model" if column == "model" else "pattern"
+                raise table.unknown_error(row, column, kind, cells[column], words)
+        name, kind = cells["film"], cells["pattern"]
+        found[name] = made(table, row, _film_kind, name, cells)
+        if kind == LOCAL:
+            found[name] = replace(found[name], reseau=_reseau(table, row, cells))
+        elif kind != "none":
+            found[name] = replace(found[name], pattern=_pattern(table, row, cells))
     return found
 
 
-def _bends(model: str) -> tuple[float, float]:
-    sd = _BEND_SD.get(model, 0.0)
-    return sd, sd
+def _film_kind(name: str, cells: Mapping[str, Any]) -> FilmKind:
+    """Return the priors of a film without a pattern."""
+    bends = [cells[f"sd_{each}"] for each in BENDS.get(cells["model"], ())]
+    roll = Roll(name, cells["m"], cells["sd_m"])
+    size = cells["sd_photo_m"], cells["sd_b1"], cells["sd_b2"]
+    return FilmKind(roll, cells["model"], size, (bends[0], bends[1]) if bends else (0.0, 0.0), None)
 
 
-def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
-    """Return the pattern of a film; None without."""
-    kind = table.texts("pattern", "none")[row]
-    if kind not in PATTERNS:
-        raise table.unknown_error(row, "pattern", "pattern", kind, (*PATTERNS, LOCAL))
-    if kind == "none":
-        return None
-    count = {"w1 w2": 2, "ebner": 10}.get(kind, 2)
-    values, sd = _needed(table, row, kind, GRID if kind == "grid" else ("half_format_mm",), count)
+def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Pattern:
+    """Return the pattern of a film."""
+    kind, film = cells["pattern"], cells["film"]
+    count = 10 if kind == "ebner" else 2
+    values, sd = _needed(table, row, cells, GRID if kind == "grid" else ("half_format_mm",), count)
     if kind == "grid":
         nodes = int(values[4]) * int(values[5])
         own = [Weights(f"{film} node {k}", 0.0, sd) for k in range(1, nodes + 1)]
@@ -220,32 +207,23 @@ def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
     return made(table, row, Pattern, kind, values, own)
 
 
-def _reseau(table: ColumnTable, row: int) -> Callable[..., Reseau]:
+def _reseau(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Callable[..., Reseau]:
     """Return a function that creates the reseau of a photo."""
-    values, sd = _needed(table, row, LOCAL, GRID, 2)
-    smooth = float(table.numbers("sd_smooth", np.inf, infinite=True)[row])
+    values, sd = _needed(table, row, cells, GRID, 2)
 
     def own(photo: str, shifts: Floats | None = None) -> Reseau:
-        free = made(table, row, Reseau, photo, values, sd, smooth)
+        free = made(table, row, Reseau, photo, values, sd, cells.get("sd_smooth", math.inf))
         return free if shifts is None else free.with_shifts(shifts)
 
     return own
 
 
 def _needed(
-    table: ColumnTable, row: int, kind: str, columns: Sequence[str], count: int
-) -> tuple[Floats, Floats]:
+    table: ColumnTable, row: int, cells: Mapping[str, Any], columns: Sequence[str], count: int
+) -> list[Floats]:
     """Return the numbers of a pattern and standard deviations of its weights."""
-    values = table.vectors(columns)[row]
-    missing = [name for name, value in zip(columns, values, strict=True) if math.isnan(value)]
-    if missing:
-        raise table.cell_error(row, missing[0], "plain.pattern", pattern=kind)
-    sd = table.vectors(_deviations(count), infinite=True)[row]
-    if np.isnan(sd).any():
-        columns = ", ".join(_deviations(count))
-        raise table.cell_error(row, columns, "plain.pattern", pattern=kind)
-    return values, sd
-
-
-def _deviations(count: int) -> tuple[str, ...]:
-    return tuple(f"sd_{name}" for name in _WEIGHTS[:count])
+    weights = [f"sd_w{k}" for k in range(1, count + 1)]
+    for column in (*columns, *weights):
+        if column not in cells:
+            raise table.cell_error(row, column, "plain.pattern", pattern=cells["pattern"])
+    return [np.array([cells[column] for column in own]) for own in (columns, weights)]

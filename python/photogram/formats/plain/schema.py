@@ -28,8 +28,7 @@ from photogram.formats.columns import Units
 from photogram.lazy_dataclasses import dataclass
 
 AXES = ("x", "y", "z")
-ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
-POSE = (*AXES, *ROTATIONS)  # Components of poses: small rotations are about the axes of the photo
+ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")  # Small rotations about the axes of the photo
 VELOCITY, RATE = ("vx", "vy", "vz"), ("rate_x", "rate_y", "rate_z")
 BASES = ("position", "rotation")  # Corrections of a trajectory
 FACTORS = ("factor_0", "factor_1", "factor_2", "factor_3")
@@ -221,6 +220,12 @@ class Schema:
     def _names(self, *, text: bool) -> tuple[str, ...]:
         columns = [column for column in self.all_columns if (column.kind in _TEXTS) is text]
         return tuple(dict.fromkeys(name for column in columns for name in column.names))
+
+    @cached_property
+    def defaults(self) -> dict[str, float]:
+        """Numbers of empty cells by column, if they are declared."""
+        columns = (column for column in self.all_columns if not math.isnan(column.number))
+        return {name: column.number for column in columns for name in column.names}
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -56,20 +56,17 @@ def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, An
     table.names("line")
     for end in ENDS:
         indices_of(table, end, points, "point")
-    lines, first, second = (table.texts(column) for column in ("line", *ENDS))
-    sizes, warmth = table.numbers("length").tolist(), table.numbers("temperature").tolist()
     deviations = tables.deviations(table, "lengths", ("sd",))[:, 0].tolist()
-    found = []
-    for row, (length, sd, temperature) in enumerate(zip(sizes, deviations, warmth, strict=True)):
-        if not length > 0:
-            code = "error.empty" if math.isnan(length) else "error.positive"
-            raise table.cell_error(row, "length", code, value=length)
-        if first[row] == second[row]:
-            raise table.error(row, phrase("plain.same-ends", name=first[row]))
+    found = tables.records("lengths")
+    for row, (cells, sd) in enumerate(zip(found, deviations, strict=True)):
+        if not cells.get("length", 0.0) > 0:
+            code = "error.positive" if "length" in cells else "error.empty"
+            raise table.cell_error(row, "length", code, value=cells.get("length", math.nan))
+        if cells["from"] == cells["to"]:
+            raise table.error(row, phrase("plain.same-ends", name=cells["from"]))
         if not sd < math.inf:
             raise table.cell_error(row, "sd", "cells.no-sd", table="lengths")
-        own = {"line": lines[row], "from": first[row], "to": second[row], "length": length, "sd": sd}
-        found.append(own if math.isnan(temperature) else {**own, "temperature": temperature})
+        cells["sd"] = sd
     return tuple(found)
 
 

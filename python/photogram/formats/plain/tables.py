@@ -161,6 +161,20 @@ class Tables:
         path, columns = self.settings.path, TABLES[name].columns
         return ColumnTable(path, Place(path), columns, 0, dict.fromkeys(columns, ()), ())
 
+    def records(self, name: str) -> list[dict[str, Any]]:
+        """Return texts and numbers of the filled cells of each row by column; deviations may be infinite."""
+        table, schema = self.rows(name), TABLES[name]
+        columns: dict[str, Sequence[Any]] = {
+            each: table.texts(each) for each in schema.texts if each in table
+        }
+        for each in schema.numbers:
+            if each in table:
+                columns[each] = table.numbers(each, infinite=each.startswith("sd")).tolist()
+        return [
+            {each: own[row] for each, own in columns.items() if own[row] != "" and own[row] == own[row]}
+            for row in range(table.count)
+        ]
+
     def remark(self, code: str, path: Path | None = None, /, **fields: Any) -> None:
         """Add a remark, optionally on a file."""
         self.messages.append(Message.of(code, path, **fields))
@@ -305,6 +319,14 @@ def covariances_of(
     return found
 
 
+def signs_in_files(names: Sequence[str]) -> Floats:
+    """Return the signs of parameters of cameras in files relative to models.
+
+    A principal distance is positive in files, for the positive plane, and negative in models.
+    """
+    return np.array([-1.0 if name == "c" else 1.0 for name in names])
+
+
 def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind: str) -> Indices:
     """Return (rows,) the index of the named object of each row."""
     found = table.names(column)
@@ -356,6 +378,11 @@ def correlations(
 def columns_of(names: Sequence[str], values: Floats) -> dict[str, Any]:
     """Return (rows, k) numbers as columns by name."""
     return dict(zip(names, values.T, strict=True))
+
+
+def columns_of_rows(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, Any]:
+    """Return rows of cells as columns by name; nothing without rows."""
+    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)) if rows else {}
 
 
 def places_written(block: Block, values: Floats) -> Floats:

@@ -129,7 +129,6 @@ _COLUMNS = {
 }
 """Columns of each basis."""
 _ALL = tuple(dict.fromkeys(name for names in _COLUMNS.values() for name in names))
-_WITH_SD = ("smooth", "correlation")
 
 
 class _Bases:
@@ -138,14 +137,12 @@ class _Bases:
     def __init__(self, tables: Tables, table: ColumnTable, kind: str, places: Mapping[str, int]) -> None:
         self.table, self.kind = table, kind
         self.unit = tables.radians if kind == "rotation" else 1.0
-        given = tables.settings.sd.get("trajectories", (math.inf,) * 2)[BASES.index(kind)]
-        self.numbers = {what: table.numbers(f"{kind}_{what}") for what in _ALL}
-        self.numbers |= {f"sd_{what}": table.numbers(f"sd_{kind}_{what}") * self.unit for what in _WITH_SD}
-        self.numbers["sd"] = table.numbers(f"sd_{kind}", given, infinite=True) * self.unit
-        if (negative := self.numbers["sd"] < 0).any():
+        self.cells = tables.records("trajectories")
+        default = tables.settings.sd.get("trajectories", (math.inf,) * 2)[BASES.index(kind)]
+        self.sd = table.numbers(f"sd_{kind}", default, infinite=True) * self.unit
+        if (negative := self.sd < 0).any():
             row = int(np.argmax(negative))
-            value = float(self.numbers["sd"][row])
-            raise table.cell_error(row, f"sd_{kind}", "error.not-negative", value=value)
+            raise table.cell_error(row, f"sd_{kind}", "error.not-negative", value=float(self.sd[row]))
         own = tables.rows("trajectory_knots")
         groups = _rows_of(own, places, bases=True)
         values = _times(own, groups, "knot", multiple=True)
@@ -165,7 +162,7 @@ class _Bases:
         self._check(row, name, word, rows)
         if word == "none":
             return None
-        sd = float(self.numbers["sd"][row])
+        sd = float(self.sd[row])
         basis = made(self.table, row, lambda: self._basis(row, name, word).over(*known.span))
         if rows is None:
             return replace(basis, sd=sd)
@@ -200,8 +197,7 @@ class _Bases:
         )
 
     def _number(self, row: int, what: str) -> float | None:
-        value = float(self.numbers[what][row])
-        return None if math.isnan(value) else value
+        return self.cells[row].get(f"{self.kind}_{what}")
 
     def _whole(self, row: int, what: str) -> int | None:
         value = self._number(row, what)
@@ -211,13 +207,13 @@ class _Bases:
 
     def _pair(self, row: int, what: str) -> tuple[float, float] | None:
         """Return a number and its standard deviation; None without both."""
-        value, sd = self._number(row, what), self._number(row, f"sd_{what}")
+        column = f"{self.kind}_{what}"
+        value, sd = self.cells[row].get(column), self.cells[row].get(f"sd_{column}")
         if value is None or sd is None:
             if value is not None or sd is not None:
-                column = f"{self.kind}_{what}"
                 raise self.table.error(row, phrase("error.together", name=column, other=f"sd_{column}"))
             return None
-        return value, sd
+        return value, sd * self.unit
 
     def _coefficients(self, rows: Indices, count: int, sd: float) -> tuple[Floats, Floats]:
         """Return (K, 3) coefficients and standard deviations, with defaults."""

@@ -18,7 +18,7 @@ from photogram.formats.plain.schema import (
     SD_AXES,
     VELOCITY,
 )
-from photogram.formats.plain.tables import DEGREE, angles_of, columns_of, correlations
+from photogram.formats.plain.tables import DEGREE, angles_of, columns_of, columns_of_rows, correlations
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness, all_trajectories
 from photogram.network.observations.unknowns import smoothness_of
@@ -156,8 +156,7 @@ def _knots(own: Sequence[Trajectory]) -> dict[str, Any]:
         if isinstance(basis, Spline)
         for knot in np.asarray(basis.knots)
     ]
-    columns = map(list, zip(*rows, strict=True))
-    return dict(zip(("trajectory", "of", "knot"), columns, strict=True)) if rows else {}
+    return columns_of_rows(("trajectory", "of", "knot"), rows)
 
 
 def smoothness_table(block: Block) -> dict[str, Any]:

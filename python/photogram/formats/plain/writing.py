@@ -23,7 +23,7 @@ from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
-from photogram.formats.plain.tables import columns_of, correlations, places_written
+from photogram.formats.plain.tables import columns_of, correlations, places_written, signs_in_files
 from photogram.formats.plain.trajectories_written import lost_smoothness, smoothness_table, trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
@@ -215,9 +215,7 @@ def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     ]
     names = {name.lower(): name for each in reversed(cameras) for name in reversed(each.names)}
     order = dict.fromkeys(name.lower() for each in cameras for name in each.names if name not in constants)
-    for word in order:
-        # In files a principal distance is positive for the positive plane, in models negative.
-        sign = -1.0 if word == "c" else 1.0
+    for word, sign in zip(order, signs_in_files([*order]).tolist(), strict=True):
         columns[names[word]] = [None if word not in own else sign * own[word] for own in values]
     for word in order:
         if any(own.get(word) for own in deviations):
