@@ -62,15 +62,16 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
         )
     if view is start:
         note_all(section, "convention", "grave", [*readings(view.seen), *latitudes(view.seen)])
-    return section, _sides(*(blocks or [view.seen] * 2), view, explanations, words), view, exact
+    return section, _sides(blocks, view, explanations, words), view, exact
 
 
-def _sides(given: Block, whole: Block, view: View, explanations: list[Finding], words: Words) -> Section:
+def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: Words) -> Section:
     """Return the section on sides of cameras, with points above cameras and rays that do not meet."""
     section = Section(
         "Sides of the cameras (intersection from the initial stations)",
         "A point computed above its camera means a wrong sign of the principal distance, or a wrong kappa.",
     )
+    given, whole = blocks or [view.seen, view.seen]
     rays = Rays.of(given)
     met = rays.intersect()
     after = rays if view.seen is given else Rays.of(view.seen)
