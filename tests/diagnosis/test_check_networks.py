@@ -192,3 +192,14 @@ def test_one_adjustment_serves_for_several_questions(monkeypatch):
     assert diagnose(simulate(seed=3, **SIZE).block).grave == []
     assert len(calls) == 1
     assert "photogram.diagnosis.adjusting" in sys.modules
+
+
+def test_check_points_that_disagree_are_named():
+    block = simulate(seed=3, **SIZE).block
+    given = np.isfinite(block.point_positions).all(axis=1) & np.isinf(block.point_sd).all(axis=1)
+    row = int(np.flatnonzero(given)[0])
+    positions = block.point_positions.copy()
+    positions[row, 2] += 50.0
+    (found,) = diagnose(block.replace(point_positions=positions)).grave
+    assert (found.kind, found.points) == ("check-points", [block.point_ids[row]])
+    assert len(found.phrase.fields["points"]) == 1

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust
+from photogram.diagnosis.findings import likely
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 KEPT = 2  # Adjustments that are stored
 
@@ -58,7 +59,7 @@ class Adjuster:
 def put_right(
     first: Result | None, tried: Iterable[tuple[Phrase, Block]], adjusted: Adjuster
 ) -> tuple[Phrase, Block, Judged] | None:
-    """Adjust corrected blocks; return the mistake and block that explain residuals.
+    """Adjust corrected blocks; return the message on the mistake, and the block, that explain residuals.
 
     `first` is the adjustment of the unchanged block; None if that failed.
     """
@@ -77,4 +78,4 @@ def put_right(
     if verdict is None or not verdict.accepted:
         return None
     mistake, changed, _ = results[verdict.best[0]]
-    return mistake, changed, verdict
+    return likely([mistake], phrase("mistake.residuals", times=verdict.fall)), changed, verdict

@@ -17,9 +17,7 @@ import numpy as np
 
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Section, finding, note_all
 from photogram.diagnosis.hypotheses import (
-    TURNS,
     Hypothesis,
     attitude_readings,
     hypotheses,
@@ -56,7 +54,6 @@ EACH = 0.5
 AS_GOOD = 1.5  # Another hypothesis is as good if its misfit is below this multiple of the least
 SLIGHT = float(np.radians(1.0))  # Attitudes closer than this to the resected ones are correct
 CLEARLY = 5.0  # A rival reading must be closer to the resected attitudes by this factor
-PUT_RIGHT = 5  # Maximum number of successive corrections
 BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
 """Factor between metres and millimetres; limits of the median, and of the logarithm of each distance."""
 
@@ -109,7 +106,7 @@ def hints(block: Block) -> list[Message]:
         found = [Message(verdict.message) for verdict in verdicts(block)]
         bar = distances_in_millimetres(block)
         bars = [] if bar is None else [Message(bar.message)]
-        return [*found, *_latitudes(block), *(_readings(block) if not found else []), *bars]
+        return [*(found or readings(block)), *latitudes(block), *bars]
 
 
 def verdicts(block: Block) -> list[Verdict]:
@@ -200,7 +197,8 @@ def _single(block: Block, photos: Indices) -> list[Verdict]:
     return [Verdict(*each) for each in by_names.values()]
 
 
-def _latitudes(block: Block) -> list[Message]:
+def latitudes(block: Block) -> list[Message]:
+    """Report latitudes beyond the poles."""
     if block.spheroid is None:
         return []
     return [
@@ -210,7 +208,7 @@ def _latitudes(block: Block) -> list[Message]:
     ]
 
 
-def _readings(block: Block) -> list[Message]:
+def readings(block: Block) -> list[Message]:
     """Compare given attitudes with resected ones; finds mistakes in small angles."""
     if block.spheroid is not None:
         return []
@@ -291,41 +289,3 @@ def _shorter(block: Block, factor: float) -> Block:
             for each in block.observations
         ]
     )
-
-
-def conventions(view: View) -> tuple[Section, View, bool]:
-    """Report the mistakes of whole sets that explain the misfit, and correct them.
-
-    Signs, quarter turns and mirrored plates are left to the section on the sides of the cameras, which can
-    name groups of photos and single photos.
-
-    Returns the section, the corrected view, and whether the correction is exact.
-    """
-    section = Section(
-        "Units, axes and angles (images against their predictions)",
-        "Another unit, axis or sense of angles makes every observation look wrong: it is looked for first.",
-    )
-    exact = True
-    for _ in range(PUT_RIGHT):
-        whole = [each for each in verdicts(view.seen) if not each.photos and not {*each.names} & {*TURNS}]
-        if not whole:
-            break
-        best = whole[0]
-        section.findings.append(finding("grave", best.message, kind="convention"))
-        view, exact = view.changed(best.change), exact and best.exact
-    bars = distances_in_millimetres(view.seen)
-    if bars is not None:
-        section.findings.append(finding("grave", bars.message, kind="convention"))
-        view = view.changed(bars.change)
-    if section.findings:
-        section.remark("the sections below hold with this put right")
-    if not exact:
-        section.remark(
-            "the size of a pixel and the origin are known only about: nothing below is called grave"
-        )
-    return section, view, exact
-
-
-def further(section: Section, view: View) -> None:
-    """Add hints that camera sides and earlier sections have not explained."""
-    note_all(section, "convention", "grave", hints(view.block))

@@ -22,7 +22,6 @@ from photogram.diagnosis.after_adjustment import diagnosis_of
 from photogram.diagnosis.blunders import BESIDE
 from photogram.diagnosis.control import control
 from photogram.diagnosis.control_sets import doubtful, explain, free_model
-from photogram.diagnosis.conventions import conventions, further
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.editing import HOPELESS, Edited, blunder_section, edit
 from photogram.diagnosis.findings import Explained, Finding, Level, Section, Words, finding, note
@@ -166,12 +165,9 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     words, adjusted = manner.words, Adjuster(manner.options)
     lens: list[Finding] = []
     upright_lenses = lenses_put_right(block, lens, adjusted)
-    sets, view, exact = conventions(View.of(lenses_estimated(upright_lenses, lens, adjusted)))
+    view = View.of(lenses_estimated(upright_lenses, lens, adjusted))
+    sets, upright, oriented, exact = orientation(view, words)
     sets.findings[:0] = lens
-    upright, seen = orientation(view.seen, words, view.unit)
-    oriented = view.of_seen(seen)
-    if oriented is view and not sets.findings:
-        further(sets, view)
     errors, suspects = gross(oriented.seen, oriented.unit)
     if not manner.intersect_only:
         oriented, changed = _sets(sets, oriented, suspects, adjusted)

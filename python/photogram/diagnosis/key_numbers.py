@@ -126,5 +126,6 @@ def disagreeing(result: Result) -> list[Finding]:
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
     for level, limit in levels:
         if points := evidence.disagreement(limit):
-            return [finding(level, phrase("verdict.check-points", values={"points": points}))]
+            names = [str(each.fields["name"]) for each in points if "name" in each.fields]
+            return [finding(level, phrase("verdict.check-points", points=points), points=names)]
     return []

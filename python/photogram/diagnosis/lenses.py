@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.diagnosis.adjusting import Adjuster, put_right
-from photogram.diagnosis.findings import Finding, finding, likely
+from photogram.diagnosis.findings import Finding, finding
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.wider_models import calibrated, calibration_words, freed
@@ -40,9 +40,8 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     found = put_right(first, _hypotheses(block, adjusted), adjusted)
     if found is None:
         return block
-    cause, changed, verdict = found
+    message, changed, verdict = found
     values = {"likelihood_ratio": verdict.likelihood, "times_smaller": verdict.fall}
-    message = likely([cause], phrase("mistake.residuals", times=verdict.fall))
     findings.append(finding("grave", message, kind="lens", values=values))
     return changed
 

@@ -1,4 +1,4 @@
-"""Photos with wrong sign of the principal distance or kappa, or mirrored plates."""
+"""Mistakes in units, axes, angles and sides of cameras: reports, and corrections for the later steps."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.conventions import Verdict, verdicts
-from photogram.diagnosis.findings import Finding, Section, Words, finding
+from photogram.diagnosis.conventions import Verdict, distances_in_millimetres, latitudes, readings, verdicts
+from photogram.diagnosis.findings import Finding, Section, Words, finding, note, note_all
 from photogram.diagnosis.hypotheses import TURNS, images_turned, turn_of
+from photogram.diagnosis.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius
 from photogram.words import phrase
@@ -25,45 +26,70 @@ MIRRORS = {name: turn_of(name) for name in TURNS if name not in KAPPA}  # Reflec
 HALF_TURN, SENSE = "c or kappa", "sense"
 
 
-def orientation(block: Block, words: Words, unit: str = "mm") -> tuple[Section, Block]:
-    """Test photos with opposite principal distance, rotated, or mirrored.
+def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]:
+    """Report mistakes in units, axes, angles and sides of cameras that explain the misfit, and correct them.
 
-    Returns the section, and the block with the accepted explanations, so that other errors become visible.
+    Returns the sections on conventions and on sides, the corrected view, and whether the correction is exact.
     """
+    section = Section(
+        "Units, axes and angles (images against their predictions)",
+        "Another unit, axis or sense of angles makes every observation look wrong: it is looked for first.",
+    )
+    start, exact = view, True
+    explanations: list[Finding] = []
+    blocks: list[Block] = []  # Before the first mistake in sides, and after the last one of several photos
+    for _ in range(MOST):
+        found = next(iter(verdicts(view.seen)), None)
+        if found is None:
+            break
+        if _side_of(found):
+            blocks = blocks or [view.seen, view.seen]
+            explanations += _explanations(view.seen, found, words)
+            view = view.of_seen(_put_right(view.seen, found))
+            blocks[1] = view.seen if len(found.photos) != 1 else blocks[1]
+        else:
+            section.findings.append(finding("grave", found.message, kind="convention"))
+            view, exact = view.changed(found.change), exact and found.exact
+    bars = distances_in_millimetres(view.seen)
+    if bars is not None:
+        section.findings.append(finding("grave", bars.message, kind="convention"))
+        view = view.changed(bars.change)
+    if section.findings:
+        section.remark("the sections below hold with this put right")
+    if not exact:
+        section.remark(
+            "the size of a pixel and the origin are known only about: nothing below is called grave"
+        )
+    if view is start:
+        note_all(section, "convention", "grave", [*readings(view.seen), *latitudes(view.seen)])
+    return section, _sides(blocks, view, explanations, words), view, exact
+
+
+def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: Words) -> Section:
+    """Return the section on sides of cameras, with points above cameras and rays that do not meet."""
     section = Section(
         "Sides of the cameras (intersection from the initial stations)",
         "A point computed above its camera means a wrong sign of the principal distance, or a wrong kappa.",
     )
-    rays = Rays.of(block)
+    given, whole = blocks or [view.seen, view.seen]
+    rays = Rays.of(given)
     met = rays.intersect()
-    above = _above(rays, met)
-    explanations: list[Finding] = []
-    whole = block
-    for _ in range(MOST):
-        found = next(filter(_side_of, verdicts(block)), None)
-        if found is None:
-            break
-        explanations += _explanations(block, found, words)
-        block = _put_right(block, found)
-        whole = block if len(found.photos) != 1 else whole
-    after = rays if block is rays.block else Rays.of(block)
-    met_after = met if block is rays.block else after.intersect()
+    after = rays if view.seen is given else Rays.of(view.seen)
+    met_after = met if view.seen is given else after.intersect()
     cost = _mean(_costs(after, met_after))
+    section.findings += _unexplained(_above(rays, met), explanations, whole, view.seen) + explanations
     if cost > SUSPICIOUS:
-        explanations.append(
-            finding("grave", phrase("check.rays-do-not-meet", sense=words.sense), values={"cost": cost})
-        )
-    section.findings += _unexplained(above, explanations, whole, block) + explanations
+        note(section, "grave", phrase("check.rays-do-not-meet", sense=words.sense), values={"cost": cost})
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
     section.figure("rays that meet behind their camera", f"{behind} of {int(known.sum())}")
-    section.figure("median residual of intersection", f"{_median(met.sizes):.3f} {unit}")
-    if block is not rays.block:
+    section.figure("median residual of intersection", f"{_median(met.sizes):.3f} {view.unit}")
+    if view.seen is not given:
         section.figure(
             "median residual with these explanations",
-            f"{_median(met_after.sizes):.3f} {unit}; the sections below hold with them",
+            f"{_median(met_after.sizes):.3f} {view.unit}; the sections below hold with them",
         )
-    return section, block
+    return section
 
 
 def _turn(block: Block, name: str) -> int:
@@ -72,8 +98,9 @@ def _turn(block: Block, name: str) -> int:
 
 
 def _side_of(found: Verdict) -> str:
-    """Return the mistake of a verdict that concerns the side of cameras; empty if none does."""
-    return next((name for name in found.names if name in TURNS or name == SENSE), "")
+    """Return the mistake of a verdict that concerns the sides of cameras; empty if it does not."""
+    concerns = {*found.names} & {*TURNS}
+    return next((name for name in found.names if name in TURNS or name == SENSE), "") if concerns else ""
 
 
 def _concerned(block: Block, found: Verdict) -> Bools:

@@ -22,7 +22,6 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.adjusting import Adjuster, put_right
-from photogram.diagnosis.findings import likely
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.motion import timed_photos
@@ -49,10 +48,7 @@ def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> lis
     if first is not None and first.converged and (first.loss or not is_suspected(first)):
         return []
     found = put_right(first, _tried(block), adjusted)
-    if found is None:
-        return []
-    cause, _, verdict = found
-    return [Message(likely([cause], phrase("mistake.residuals", times=verdict.fall)))]
+    return [] if found is None else [Message(found[0])]
 
 
 def backward_readouts(result: Result) -> list[Message]:
