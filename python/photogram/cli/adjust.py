@@ -20,8 +20,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result
-    from photogram.adjustment.robust import Loss
+    from photogram import Block, FirstValues, Result
     from photogram.distributed import Division
     from photogram.formats import Project
     from photogram.results.snooping_result import Snooped
@@ -85,8 +84,7 @@ def adjust(
     if divided.plan:
         from photogram.distributed import Division, plan_in_parts
 
-        datum, basis = _datum(choices.datum_of(project)), project.options.unit_variance
-        print_plan(plan_in_parts(block, division or Division(), datum=datum, unit_variance=basis))
+        print_plan(plan_in_parts(block, division or Division(), project.options))
         return
     for remark in started.messages if started is not None and not quiet else ():
         print_remark(str(remark))
@@ -205,8 +203,8 @@ def _snooped(
     with adjustment_status(job, "adjusting and testing") as progress, errors_explained(block):
         found = snoop(
             block,
-            datum=_datum(choices.datum_of(project)),
-            robust=None if choices.loss_of(project) is None else True,
+            datum=project.options.constraints,
+            robust=None if project.options.loss is None else True,
             unit_variance=project.options.unit_variance,
             max_iterations=project.options.max_iterations,
             threads=threads,
@@ -218,7 +216,7 @@ def _snooped(
     assert isinstance(result, Result)
     _check_control(job, project, choices, result)
     messages = []
-    if choices.loss_of(project) is not None:
+    if project.options.loss is not None:
         messages.append(Message.of("command.robust-start", source=choices.source(job, project, "loss")))
     if adjusting(project, adjust) is not adjust:
         messages.append(Message.of("command.no-rejection"))
@@ -230,7 +228,7 @@ def _check_control(job: Job, project: Project, choices: Choices, result: Result)
     """Reject a result without a required datum of control."""
     from photogram import InputError
 
-    if choices.datum_of(project) == "control" and result.datum.is_chosen:
+    if project.options.datum == "control" and result.datum.is_chosen:
         raise InputError(phrase("command.no-datum", source=choices.source(job, project, "datum")))
 
 
@@ -245,27 +243,24 @@ def adjusted_block(
     division: Division | None = None,
 ) -> Result:
     """Adjust a block by settings of its project and options of the user."""
-    from photogram import FirstValues, adjust_started
+    from photogram import FirstValues, adjust, adjust_started
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
     from photogram.formats.supplements import repeated_remarks
     from photogram.results.fitting import with_features
 
-    chosen = choices.datum_of(project)
+    if division is None:
+        options = replace(project.options, ordering=ordering, covariance="verdict")
+        adjust_once: Callable[..., Result] = partial(adjust, options=options)
+    else:
+        from photogram import adjust_in_parts
+
+        adjust_once = partial(adjust_in_parts, division=division, options=project.options)
     with adjustment_status(job) as progress:
-        how: dict[str, Any] = {
-            "unit_variance": project.options.unit_variance,
-            "threads": threads,
-            "progress": progress,
-            "max_iterations": project.options.max_iterations,
-        }
         with errors_explained(block):
-            call = adjusting(project, _call(chosen, choices.loss_of(project), ordering, division))
-            if isinstance(block, FirstValues):
-                result = adjust_started(block, by=call, **how)
-            else:
-                result = call(block, **how)
-        result = diagnosed(result.with_max_bias_ratio(project.options.max_bias_ratio))
+            call = partial(adjusting(project, adjust_once), threads=threads, progress=progress)
+            result = adjust_started(block, by=call) if isinstance(block, FirstValues) else call(block)
+        result = diagnosed(result)
     _check_control(job, project, choices, result)
     again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
     told = replace(result, messages=[*project.messages, *again, *result.messages])
@@ -298,29 +293,6 @@ def result_at(
     block, started = started_block(project, keep_all=keep_all)
     whole = project if fitted else project.replace(features={})
     return adjusted_block(job, whole, started or block, choices=choices, threads=threads), project
-
-
-def _call(
-    name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
-) -> Callable[..., Result]:
-    """Return the call that adjusts: in one process, or in parts."""
-    datum = _datum(name)
-    if division is None:
-        from photogram import adjust
-
-        return partial(adjust, datum=datum, loss=loss, ordering=ordering, covariance="verdict")
-    from photogram import adjust_in_parts
-
-    return partial(adjust_in_parts, division=division, datum=datum, loss=loss)
-
-
-def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
-    """Return the datum of a name; None if control or observations define it."""
-    from photogram import InnerConstraints, MinimumConstraints
-
-    if name == "inner":
-        return InnerConstraints()
-    return MinimumConstraints() if name == "minimum" else None
 
 
 def _files(project: Project, result: Result, report: str, sections: list[TitledLines]) -> dict[str, bytes]:

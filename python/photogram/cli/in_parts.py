@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
@@ -75,17 +75,13 @@ def adjusted_on_disk(
     from photogram.formats import in_parts
 
     wishes, folder = Wishes(), divided.run or target / "run"
-    chosen: Any = {
-        "unit_variance": choices.unit_variance,
-        "loss": choices.loss_of,
-        "max_iterations": choices.iterations,
-    }
+    change = choices.options
     if divided.plan:
-        print_plan(in_parts.planned_on_disk(path, wishes, folder, division, **chosen))
+        print_plan(in_parts.planned_on_disk(path, wishes, folder, division, change=change))
         return True
     with adjustment_status(job) as progress:
         found = in_parts.adjusted_on_disk(
-            path, wishes, folder, division, **chosen, threads=threads, progress=progress
+            path, wishes, folder, division, change=change, threads=threads, progress=progress
         )
     lines = [*found.lines(), str(phrase("command.node-results", folder=folder / "results"))]
     job.finish(

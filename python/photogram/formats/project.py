@@ -6,11 +6,12 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.arrays import repeated_pairs
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -31,9 +32,8 @@ from photogram.show.methods import Brief
 from photogram.targets.board import Board
 from photogram.words import Phrase, option_sd, phrase
 
-__all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]
+__all__ = ["Frame", "Project", "Size", "Unused", "assembled"]
 
-DatumName = Literal["control", "minimum", "inner"]
 Size = tuple[int, int]  # Image width and height of a camera, pixels
 
 ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Default for image coordinates
@@ -44,25 +44,6 @@ def frame_of(block: Block) -> Frame:
     if block.spheroid is not None and block.frame.kind == "cartesian":
         return replace(block.frame, kind="geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
     return block.frame
-
-
-@dataclass(frozen=True)
-class Options:
-    """Adjustment settings of a project; None: not specified.
-
-    Attributes
-    ----------
-    datum, loss, unit_variance, max_iterations
-        As in :func:`photogram.adjust`.
-    max_bias_ratio
-        As in :meth:`photogram.Result.with_max_bias_ratio`.
-    """
-
-    datum: DatumName | None = None
-    loss: Literal["huber", "cauchy"] | None = None
-    unit_variance: Literal["constrained", "unity", "redundancy"] = "constrained"
-    max_iterations: int | None = None
-    max_bias_ratio: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +118,7 @@ class Project(Brief):
     pixel_mm: tuple[float | None, ...]
     starts: Floats
     frame: Frame = field(default_factory=Frame)
-    options: Options = field(default_factory=Options)
+    options: AdjustOptions = field(default_factory=AdjustOptions)
     lacks: tuple[Phrase, ...] = ()
     messages: tuple[Message, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
@@ -205,7 +186,7 @@ def assembled(
     timed: Sequence[Timed] = (),
     passages: Sequence[Passage] = (),
     frame: Frame | None = None,
-    options: Options | None = None,
+    options: AdjustOptions | None = None,
     lacks: Sequence[Phrase] = (),
     messages: Sequence[Message] = (),
     details: Mapping[str, Any] | None = None,
@@ -288,7 +269,7 @@ def assembled(
         pixel_mm=tuple(pixel_mm) if pixel_mm is not None else (None,) * len(cameras),
         starts=starts,
         frame=frame or Frame(),
-        options=options or Options(),
+        options=options or AdjustOptions(),
         lacks=tuple(lacking),
         messages=tuple(found),
         details=details or {},

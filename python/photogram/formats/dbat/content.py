@@ -12,11 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.images import by_camera
-from photogram.formats.project import Options, PointTable, Project, Size, assembled
+from photogram.formats.project import PointTable, Project, Size, assembled
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -103,7 +104,7 @@ class Content:
     # Photos with fixed poses, and free parameters of cameras
     held: set[int] = field(default_factory=set)
     free: set[str] = field(default_factory=set)
-    options: Options = field(default_factory=Options)
+    options: AdjustOptions = field(default_factory=AdjustOptions)
     lacks: list[Phrase] = field(default_factory=list)
     messages: list[Message] = field(default_factory=list)
 

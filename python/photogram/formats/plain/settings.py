@@ -10,12 +10,13 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any, cast
 
+from photogram.adjustment.options import AdjustOptions, DatumName
 from photogram.errors import InputError, message_of
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes
 from photogram.formats.plain.schema import ANGLES, FILM_MODELS, TABLES
 from photogram.formats.plain.statement_settings import KEYS, read_asked
-from photogram.formats.project import DatumName, Frame, Options
+from photogram.formats.project import Frame
 from photogram.io.toml import Document, Table, day_of, read_document
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
@@ -71,7 +72,7 @@ class Settings:
     path: Path  # The file, or the path for error messages
     name: str = ""  # Name of the project
     frame: Frame = field(default_factory=Frame)  # As in a project
-    options: Options = field(default_factory=Options)
+    options: AdjustOptions = field(default_factory=AdjustOptions)
     length: str = "m"  # Units
     angle: str = "deg"
     image: str = "px"
@@ -139,13 +140,13 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
         path=path,
         name=project.text("name", ""),
         frame=Frame(_word(file, "frame", "kind"), frame.text("crs", ""), _origin(frame), (axes[0], axes[1])),
-        options=Options(
-            cast("DatumName", datum) if "datum" in adjust else None,
-            cast("Any", None if loss == "none" else loss),
+        options=AdjustOptions(
+            datum=cast("DatumName", datum) if "datum" in adjust else None,
+            loss=cast("Any", None if loss == "none" else loss),
             # Earlier versions wrote `free` for the default.
-            cast("Any", "constrained" if basis == "free" else basis),
-            adjust.count("iterations", low=1) if "iterations" in adjust else None,
-            adjust.positive("max_bias_ratio") if "max_bias_ratio" in adjust else None,
+            unit_variance=cast("Any", "constrained" if basis == "free" else basis),
+            max_iterations=adjust.count("iterations", low=1) if "iterations" in adjust else None,
+            max_bias_ratio=adjust.positive("max_bias_ratio") if "max_bias_ratio" in adjust else None,
         ),
         **words,
         time_origin=_time_origin(file.optional("time")),
