@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from photogram.cli.choices import Choices
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark, print_sections, print_summary
 from photogram.cli.documents import Documents, check_maps
-from photogram.cli.in_parts import DIVIDING, Parts, adjusted_on_disk, print_plan
-from photogram.cli.job import InputFile, Job, OutputFolder, adjustment_status, with_job
+from photogram.cli.in_parts import DIVIDING, adjusted_on_disk, print_plan
+from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
 from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, check_alone, default_out
 from photogram.cli.projects import NOTHING, Additions, described, project_path, read_project
 from photogram.cli.statement_output import OfHead, stated, statement_files
+from photogram.distributed.division import Division
 from photogram.lazy_dataclasses import replace
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, Result
-    from photogram.distributed import Division
     from photogram.formats import Project
     from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
@@ -44,7 +44,9 @@ def adjust(
     keep_all: bool = False,
     statement: bool = False,
     wanted: OfHead,
-    divided: Parts,
+    division: Annotated[Division, Without("folder")],
+    run: OutputFolder = None,
+    plan: bool = False,
     ordering: OrderingName = "auto",
     threads: Threads = None,
     strict: bool = False,
@@ -66,8 +68,9 @@ def adjust(
     if ordering != "auto":
         check_alone(job, "--ordering", DIVIDING)
     documents.check_plots(job, target)
-    division = divided.division
-    if added == NOTHING and adjusted_on_disk(job, path, target, divided, choices, threads):
+    parts = None if run is None and division == Division() else replace(division, folder=run)
+    on_disk = partial(adjusted_on_disk, job, path, target, choices=choices, threads=threads, is_plan=plan)
+    if parts and added == NOTHING and on_disk(parts):
         return
     project = read_project(job, path, added)
     check_maps(documents.map)  # now that all inputs are known, which it must not be
@@ -81,23 +84,23 @@ def adjust(
 
         check_place(project.block, documents.crs)
     block, started = started_block(project, keep_all=keep_all)
-    if divided.plan:
-        from photogram.distributed import Division, plan_in_parts
+    if plan:
+        from photogram.distributed import plan_in_parts
 
-        print_plan(plan_in_parts(block, division or Division(), project.options))
+        print_plan(plan_in_parts(block, parts or division, project.options))
         return
     for remark in started.messages if started is not None and not quiet else ():
         print_remark(str(remark))
 
-    def run(start: Block | FirstValues) -> Result:
-        how: dict[str, Any] = {"choices": choices, "threads": threads, "division": division}
+    def adjusted(start: Block | FirstValues) -> Result:
+        how: dict[str, Any] = {"choices": choices, "threads": threads, "division": parts}
         return adjusted_block(job, project, start, ordering=ordering, **how)
 
     if snooping.snoop:
-        removed = _snooped(job, project, block, started, run, choices, threads, snooping)
+        removed = _snooped(job, project, block, started, adjusted, choices, threads, snooping)
         result = cast("Result", removed.result)
     else:
-        removed, result = None, run(started or block)
+        removed, result = None, adjusted(started or block)
     own = None
     if asked is not None and result.converged:
         with job.status("stating"):

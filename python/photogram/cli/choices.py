@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from photogram.adjustment.options import AdjustOptions
 from photogram.cli.command_classes import misuse
 from photogram.cli.components import MaxBiasRatio, UnitVarianceName
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
+    from photogram.adjustment.options import AdjustOptions
     from photogram.cli.job import Job
     from photogram.formats import Project
 
@@ -32,6 +32,8 @@ class Choices:
 
     def options(self, options: AdjustOptions) -> AdjustOptions:
         """Return the options of a project with the options of the user."""
+        from photogram.adjustment.options import AdjustOptions
+
         return AdjustOptions(
             datum=self.datum or (None if self.hold else options.datum),
             unit_variance=self.unit_variance or options.unit_variance,
