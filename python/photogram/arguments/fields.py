@@ -97,7 +97,7 @@ def _check_of(of: str, names: Mapping[str, Any]) -> Check | None:
         "int": arrays.whole_number,
         "float": arrays.number,
         "bool": arrays.truth_value,
-        "str": arrays.text,
+        "str": _text,
         "Floats": arrays.numbers,
         "Indices": arrays.whole_numbers,
         "Bools": arrays.truth_values,
@@ -111,11 +111,26 @@ def _check_of(of: str, names: Mapping[str, Any]) -> Check | None:
 
     def elements(name: str, value: Any) -> tuple[Any, ...]:
         values = arrays.elements(name, value, None if match[2] else len(inner))
+        if inner == [_text] and {*map(type, values)} <= {str}:  # Names of a hundred thousand stars
+            return value if isinstance(value, tuple) else tuple(values)
         checks = inner * len(values) if match[2] else inner
         pairs = zip(checks, values, strict=True)
         return tuple(check(f"{name}[{row}]", each) for row, (check, each) in enumerate(pairs))
 
     return elements
+
+
+def _text(name: str, value: Any) -> str:
+    """Return a text; titles of files may have control characters, but no lone surrogates."""
+    from photogram.arguments.arrays import refused
+
+    try:
+        if isinstance(value, str):
+            value.encode()
+            return value
+    except UnicodeEncodeError:
+        pass
+    raise refused(name, value, "a text")
 
 
 def _word(words: Sequence[str], name: str, value: Any) -> Any:
