@@ -18,7 +18,7 @@ import numpy as np
 from peak import forget_peak, peak_memory
 from photogram import Block, adjust, simulate
 from photogram.memory import give_back, resident_memory
-from photogram.network.simulated_motion import LineScanner
+from photogram.network.simulation_options import LineScanner
 from photogram.network.trajectories import Polynomial, Spline
 
 

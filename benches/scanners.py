@@ -24,6 +24,7 @@ from on_disk import on_disk, told
 from peak import forget_peak, peak_memory
 from photogram import Block, Camera, adjust
 from photogram.adjustment.adjustment import core_options
+from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed import Division
 from photogram.distributed.adjust import opened
@@ -162,7 +163,7 @@ def source(images: int) -> str:
 def divide(images: int, parts: int, run: Path) -> None:
     """Simulate a block, and write its parts into the folder of a run."""
     block, _ = simulated(images)
-    partition(block, run, parts, core_options("constrained", None), source(images))
+    partition(block, run, parts, core_options(AdjustOptions()), source(images))
 
 
 def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> None:

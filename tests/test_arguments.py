@@ -150,6 +150,7 @@ def good(tmp_path_factory):
     )
     return {
         "photogram": {
+            "AdjustOptions": {},
             "AsPublished": {"percent": 5.0},
             "Attitudes": {"matrices": np.eye(3)[None], "step_covariances": np.eye(3)[None]},
             "Block": {name: getattr(block, name) for name in photogram.Block.__dataclass_fields__},

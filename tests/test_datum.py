@@ -15,6 +15,7 @@ from golden_network import free_network
 from message_codes import raises
 from photogram import (
     AdjustmentError,
+    AdjustOptions,
     Block,
     InnerConstraints,
     InputError,
@@ -159,6 +160,19 @@ def test_a_block_that_is_not_free_says_why(small_block):
     assert (relative.photo_sd[0] == 0).all()
 
 
+def test_options_of_an_adjustment_are_one_object_or_keywords():
+    block = free_network(bars=False)
+    options = AdjustOptions(datum="inner", max_iterations=30)
+    result = adjust(block, options)
+    keywords = adjust(block, options=AdjustOptions(), datum=InnerConstraints(), max_iterations=30)
+    assert result.datum.kind == keywords.datum.kind == "inner constraints"
+    assert (result.point_positions == keywords.point_positions).all()
+    with raises(InputError, "error.least"):
+        adjust(block, options, max_iterations=0)
+    with pytest.raises(TypeError, match="iterations"):
+        adjust(block, iterations=3)
+
+
 def test_datums_that_cannot_be_are_refused():
     block = free_network(bars=False)
     result = adjust(block)
@@ -174,7 +188,7 @@ def test_datums_that_cannot_be_are_refused():
     with raises(InputError, "error.requires"):
         MinimumConstraints(coordinate=("photo2", "X"))
     with raises(InputError, "error.kind"):
-        adjust(block, datum="inner")  # type: ignore[arg-type]
+        adjust(block, datum="somewhere")
     with pytest.raises(InputError, check=lambda error: error.code == "error.exclusive"):
         result.relative_to()
     with pytest.raises(InputError, check=lambda error: error.phrase.fields["message"].code == "error.kind"):

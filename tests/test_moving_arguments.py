@@ -8,6 +8,7 @@ import pytest
 from moving_blocks import rolling
 from photogram import PhotogramError, Position
 from photogram.adjustment.adjustment import core_options
+from photogram.adjustment.options import AdjustOptions
 from photogram.network import (
     Attitude,
     Clock,
@@ -102,7 +103,7 @@ def test_hostile_values_are_refused(kind, name):
     for hostile, make in HOSTILE.items():
         try:
             with np.errstate(all="ignore"):
-                block_network(used(kind(**GOOD[kind] | {name: make()})), core_options("constrained", None))
+                block_network(used(kind(**GOOD[kind] | {name: make()})), core_options(AdjustOptions()))
         except PhotogramError:
             continue
         except Exception as error:

@@ -17,7 +17,6 @@ from . import targets as targets
 from ._photocore import __version__ as __version__
 from .absolute_orientation.adjust import orient as orient
 from .absolute_orientation.orientation import Orientation as Orientation
-from .adjustment.adjustment import AsPublished as AsPublished
 from .adjustment.adjustment import Progress as Progress
 from .adjustment.adjustment import adjust as adjust
 from .adjustment.cleaning import Cleaned as Cleaned
@@ -26,6 +25,8 @@ from .adjustment.components import variance_components as variance_components
 from .adjustment.elimination import eliminate_terms as eliminate_terms
 from .adjustment.first_values import FirstValues as FirstValues
 from .adjustment.first_values import first_values as first_values
+from .adjustment.options import AdjustOptions as AdjustOptions
+from .adjustment.options import AsPublished as AsPublished
 from .adjustment.prediction import predict as predict
 from .adjustment.reconsidered import adjust_started as adjust_started
 from .adjustment.resection import Pose as Pose

@@ -230,7 +230,6 @@ def test_arrays_that_cannot_be(change, message):
         ({"max_iterations": 2**64}, "argument.kind"),
         ({"max_iterations": None}, "argument.kind"),
         ({"reject": 5}, "argument.kind"),
-        ({"former": "first.json"}, "argument.kind"),
         ({"tolerance": np.nan}, "orientation.positive"),
         ({"tolerance": "1"}, "argument.kind"),
         ({"trace": True}, "orientation.trace"),

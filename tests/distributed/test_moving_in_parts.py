@@ -10,6 +10,7 @@ import test_moving
 from moving_blocks import rolling, scanned
 from photogram import adjust, adjust_in_parts, simulate
 from photogram.adjustment.adjustment import core_options
+from photogram.adjustment.options import AdjustOptions
 from photogram.distributed import Division
 from photogram.distributed.adjust import fingerprint
 from photogram.network import LineScanner, Polynomial, RollingShutter
@@ -77,7 +78,7 @@ def test_records_frames_and_smoothness_are_at_home_once(smooth):
 
 def test_a_run_is_that_of_its_trajectories():
     """Digits that are not shown, and smoothness, tell one block from another."""
-    block, options = scanned(), core_options("constrained", None)
+    block, options = scanned(), core_options(AdjustOptions())
     later = block.replace(timed=[replace(each, time=1e-9) for each in block.timed])
     blocks = [block, later, scanned(smooth=True), scanned(records=False)]
     assert len({fingerprint(each, options) for each in blocks}) == 4

@@ -13,10 +13,11 @@ import numpy as np
 
 from photogram import RankError
 from photogram.adjustment.adjustment import core_options
+from photogram.adjustment.options import AdjustOptions
 from photogram.distributed.cut import Incidence, Tree, cut, homes, tree_of
 
 SD, STATION_SD = 0.01, 0.05
-OPTIONS = core_options("constrained", None, max_iterations=50)
+OPTIONS = core_options(AdjustOptions(max_iterations=50))
 
 
 def make(folder: Path, stations: int, points: int, parts: int, seed: int = 1) -> Tree:

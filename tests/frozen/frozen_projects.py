@@ -38,13 +38,19 @@ OF_PROJECT = (
     *("repeated", "unused"),
 )
 
+FORMER = {
+    "AdjustOptions": ("Options", ("datum", "loss", "unit_variance", "max_iterations", "max_bias_ratio")),
+}
+"""Names and fields that classes had at commit ae1d3bec, if they have others now."""
+
 
 def leaves(place: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Yield the texts and numbers of an object with their places; elements of a list have one place."""
     if is_dataclass(value) and not isinstance(value, type):
-        for field in fields(value):
-            if field.init and not field.name.startswith("_"):
-                yield from leaves(f"{place}.{type(value).__name__}.{field.name}", getattr(value, field.name))
+        names = [field.name for field in fields(value) if field.init and not field.name.startswith("_")]
+        kind, names = FORMER.get(type(value).__name__, (type(value).__name__, names))
+        for name in names:
+            yield from leaves(f"{place}.{kind}.{name}", getattr(value, name))
     elif isinstance(value, np.ndarray):
         yield place, value.astype(float).ravel().tolist()
     elif isinstance(value, dict):

@@ -16,7 +16,7 @@ from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.arrays import names as names_of
-from photogram.arguments.arrays import one_of
+from photogram.arguments.arrays import number, one_of, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.messages import Message
@@ -114,6 +114,8 @@ def orient(
     one_of("method", method, get_args(Method))
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     start = ("auto" if method == "rigorous" else "report") if start is None else start
+    one_of("start", start, get_args(Start))
+    whole_number("max_iterations", max_iterations)
     rejected = tuple(names_of("reject", reject))
     positive = {
         "max_iterations": max_iterations,
@@ -121,7 +123,7 @@ def orient(
         "scale": 1.0 if scale is None else scale,
     }
     for name, value in positive.items():
-        if not 0 < value < math.inf:
+        if not 0 < number(name, value) < math.inf:
             raise InputError(phrase("orientation.positive", name=name, value=value))
     if trace and method == "rigorous":
         raise InputError(phrase("orientation.trace"))

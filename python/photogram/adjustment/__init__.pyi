@@ -1,5 +1,5 @@
-from .adjustment import AsPublished as AsPublished
-from .adjustment import Ordering as Ordering
 from .adjustment import Progress as Progress
-from .adjustment import UnitVariance as UnitVariance
 from .adjustment import adjust as adjust
+from .options import AsPublished as AsPublished
+from .options import Ordering as Ordering
+from .options import UnitVariance as UnitVariance

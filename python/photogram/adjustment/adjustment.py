@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.first_features import started
+from photogram.adjustment.options import AdjustOptions, AsPublished, Ordering
 from photogram.adjustment.remarks import (
     behind,
     check_cameras,
@@ -21,10 +22,11 @@ from photogram.adjustment.remarks import (
     too_coarse,
     undetermined,
 )
-from photogram.adjustment.robust import Loss, loss_row, remark
+from photogram.adjustment.robust import loss_row, remark
 from photogram.adjustment.taking_over import large_turns, stays, taken_over
 from photogram.adjustment.undetermined import beyond_trajectory, in_one_place, undetermined_combinations
 from photogram.arguments.arrays import argument_error, number, one_of, whole_number
+from photogram.arguments.fields import options_of
 from photogram.arguments.objects import kind_error
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, replace
@@ -36,7 +38,6 @@ from photogram.network.datum import (
     DatumRow,
     InnerConstraints,
     MinimumConstraints,
-    check_datum,
     datum_row,
     minimum_row,
 )
@@ -47,28 +48,11 @@ from photogram.results.iteration import Iteration
 from photogram.results.result import Result, dropped_points
 from photogram.words import phrase
 
-UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
-Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
-
-
 AS_PUBLISHED = 4  # Default number of iterations of the 1987 program
 OF_CAMERAS = 200  # Maximum iterations with free camera parameters
 OF_KNOTS = 400  # Maximum iterations with the knots of a splined lens
 NOTABLE_RISE = 1e-3  # Percent; less is rounding
 TURNS = 5  # Maximum number of updates of trajectory tables by large corrections
-
-
-@dataclass(frozen=True)
-class AsPublished:
-    """The iteration of the 1987 program (GIANT guide, section 6).
-
-    Attributes
-    ----------
-    percent
-        Convergence limit: relative change of the weighted sum of squares between iterations, percent.
-    """
-
-    percent: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -93,16 +77,11 @@ class Progress:
 
 def adjust(
     block: Block,
+    options: AdjustOptions | None = None,
     *,
-    datum: InnerConstraints | MinimumConstraints | None = None,
-    unit_variance: UnitVariance = "constrained",
-    loss: Loss | None = None,
-    covariance: bool | Literal["verdict"] = True,
-    tolerance: float | AsPublished = 1e-5,
-    max_iterations: int | None = None,
-    ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
+    **changes: Any,
 ) -> Result:
     """Adjust a block by least squares.
 
@@ -116,42 +95,15 @@ def adjust(
     ----------
     block
         The block.
-    datum
-        Datum of a free block: minimum constraints, or inner constraints on selected points and photos; see
-        docs/datum.md. None: minimum constraints, selected if nothing else defines the datum.
-    unit_variance
-        Basis of the variance of unit weight. `constrained`: every weighted quantity is an observation.
-        `unity`: the variance is 1. `redundancy`: redundancy numbers of image coordinates, control and
-        additional observations (docs/weights.md). `free`, the default of the 1987 program (GIANT guide,
-        Appendix E): image coordinates and ground control only; too large if photos or cameras are weighted.
-        Covariances are scaled by the variance.
-    loss
-        Robust loss of image coordinates: `huber` or `cauchy`, of both coordinates of an image point together.
-        None: least squares. `("huber", 2.0)` also specifies the scale in a-priori standard deviations,
-        otherwise 1.50 for `huber` and 2.55 for `cauchy`. Variance, covariances and redundancy numbers refer
-        to the weights modified by the loss (`image_weights`).
-    covariance
-        Whether to compute covariances, redundancy numbers and standardized residuals. `verdict`: a verdict or
-        report will follow. The adjustment then takes about 5 % longer and stores data for the tests, if there
-        is enough memory. This requires convergence, no loss and no inner constraints.
-    tolerance
-        Convergence limit: largest change of an unknown, as a fraction of its standard deviation (a-priori
-        unit weight). The iteration also ends if the convergence rate predicts less than a tenth of it. A step
-        that increases the sum of squares is damped (Levenberg-Marquardt). `AsPublished`: the criterion of the
-        1987 program.
-    max_iterations
-        Maximum number of iterations. None: 50; 200 with a loss, which needs reweighting, or with free camera
-        parameters, which converge slowly in weak networks; 400 with a splined lens, whose knots may depend on
-        their priors only; 4 for `AsPublished`.
-    ordering
-        Elimination order of photos: input order, narrow band (reverse Cuthill-McKee), approximate minimum
-        degree, nested dissection by positions, or by ties only. `auto` selects the order with the least
-        predicted work.
+    options
+        The options; None: the defaults.
     threads
         Number of threads, at most four per processor. None: one thread for up to a few thousand image points,
         otherwise all processors. The result is identical to the last bit for any number.
     progress
         Called with the progress from time to time; an exception that it raises stops the adjustment.
+    **changes
+        Fields of :class:`photogram.AdjustOptions` with other values.
 
     Returns
     -------
@@ -173,35 +125,24 @@ def adjust(
     KeyboardInterrupt
         If interrupted by Ctrl-C.
     """
-    checked(block)
-    keep = isinstance(covariance, str) and covariance == "verdict"
-    if not (keep or isinstance(covariance, bool | np.bool_)):
-        raise kind_error("covariance", "True, False or `verdict`", covariance)
-    check_datum(datum)
-    options = core_options(
-        unit_variance,
-        loss,
-        bool(covariance),
-        tolerance,
-        iteration_limit(block, tolerance) if max_iterations is None else max_iterations,
-        ordering=ordering,
-    )
+    chosen = options_of(AdjustOptions, options, changes)
+    core = core_options(chosen, checked(block))
     processors = core_threads(threads)
     check_cameras(block)
     block = started(block)
-    options, inner = with_datum(block, options, datum)
-    result = _adjusted(block, options, processors, progress, inner, keep=keep)
-    if not block.all_trajectories:
-        return result
+    core, inner = with_datum(block, core, chosen.constraints)
+    keep = chosen.covariance == "verdict"
+    result = _adjusted(block, core, processors, progress, inner, keep=keep)
     messages: list[Message] = []
-    for _ in range(TURNS):
+    for _ in range(TURNS if block.all_trajectories else 0):
         if not (turns := large_turns(result)):
             break
         messages.append(taken_over(turns))
         block = started(result.restarted(turns))
-        result = _adjusted(block, options, processors, progress, inner, keep=keep)
-    messages += stays(result)
-    return replace(result, messages=[*messages, *result.messages]) if messages else result
+        result = _adjusted(block, core, processors, progress, inner, keep=keep)
+    messages += stays(result) if block.all_trajectories else []
+    result = replace(result, messages=[*messages, *result.messages]) if messages else result
+    return result.with_max_bias_ratio(chosen.max_bias_ratio)
 
 
 def iteration_limit(block: Block, tolerance: float | AsPublished = 1e-5) -> int | None:
@@ -224,36 +165,27 @@ def with_datum(
     return options, datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
 
 
-def core_options(
-    unit_variance: UnitVariance,
-    loss: Loss | None,
-    covariance: bool = True,
-    tolerance: float | AsPublished = 1e-5,
-    max_iterations: int | None = None,
-    *,
-    ordering: Ordering = "auto",
-) -> CoreOptions:
-    """Return validated options for the core, without minimum constraints."""
-    one_of("unit_variance", unit_variance, get_args(UnitVariance))
-    row = loss_row(loss)
+def core_options(chosen: AdjustOptions, block: Block | None = None) -> CoreOptions:
+    """Return options for the core, without minimum constraints; a block may need more iterations."""
+    row, tolerance = loss_row(chosen.loss), chosen.tolerance
     as_published = isinstance(tolerance, AsPublished)
-    limit = tolerance.percent if isinstance(tolerance, AsPublished) else tolerance
-    if max_iterations is None:
+    count = chosen.max_iterations
+    if count is None:
         # Reweighting needs more iterations.
-        max_iterations = AS_PUBLISHED if as_published else 50 if row is None else 200
-    check_iteration(ordering, max_iterations, limit)
-    if unit_variance == "redundancy" and not covariance:
+        count = AS_PUBLISHED if as_published else 50 if row is None else 200
+        count = (None if block is None else iteration_limit(block, tolerance)) or count
+    if chosen.unit_variance == "redundancy" and not chosen.covariance:
         raise InputError(phrase("adjust.redundancy-numbers"))
     if row and as_published:
         raise InputError(phrase("adjust.loss-as-published"))
     return CoreOptions(
         criterion="percent" if as_published else "fraction",
-        limit=limit,
-        max_iterations=max_iterations,
-        covariance=covariance,
+        limit=tolerance.percent if isinstance(tolerance, AsPublished) else tolerance,
+        max_iterations=count,
+        covariance=bool(chosen.covariance),
         loss=row,
-        ordering=ordering,
-        unit_variance=unit_variance,
+        ordering=chosen.ordering,
+        unit_variance=chosen.unit_variance,
         minimum=None,
     )
 

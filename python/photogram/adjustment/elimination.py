@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.adjustment.adjustment import UnitVariance, adjust
+from photogram.adjustment.adjustment import adjust
+from photogram.adjustment.options import UnitVariance
 from photogram.arguments.arrays import probability
 from photogram.arguments.objects import kind_error
 from photogram.errors import InputError

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.adjustment import Ordering, Progress, adjust
+from photogram.adjustment.adjustment import Progress, adjust
+from photogram.adjustment.options import Ordering
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message

@@ -7,23 +7,22 @@ import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import (
     Progress,
-    UnitVariance,
     adjust,
     adjusted_from,
     at_least,
     core_options,
     core_threads,
-    iteration_limit,
     with_datum,
 )
 from photogram.adjustment.first_values import FirstValues, first_values
+from photogram.adjustment.options import AdjustOptions, UnitVariance
 from photogram.adjustment.remarks import check_cameras
 from photogram.arguments.arrays import argument_error, number, one_of, truth_value
 from photogram.arguments.objects import kind_error
@@ -32,7 +31,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
-from photogram.network.datum import InnerConstraints, MinimumConstraints, check_datum
+from photogram.network.datum import InnerConstraints, MinimumConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
 from photogram.results.axes import point_axes
@@ -165,10 +164,8 @@ def _snoop_block(
 ) -> Snooped:
     block = checked(network)
     check_cameras(block)
-    check_datum(datum)
-    one_of("unit_variance", unit_variance, get_args(UnitVariance))
-    limit = iteration_limit(block) if max_iterations is None else max_iterations
-    core, inner = with_datum(block, core_options(unit_variance, None, max_iterations=limit), datum)
+    chosen = AdjustOptions(datum=datum, unit_variance=unit_variance, max_iterations=max_iterations)
+    core, inner = with_datum(block, core_options(chosen, block), chosen.constraints)
 
     def adjusted(given: Block, **options: Any) -> Result:
         return adjust(

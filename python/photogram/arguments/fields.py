@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from typing import Any, Literal, TypeVar, get_args
@@ -17,6 +18,7 @@ from photogram.lazy_dataclasses import field, fields, replace
 Options = TypeVar("Options")
 Check = Callable[[str, Any], Any]
 """Function of name and value; returns the converted value or raises an error."""
+_SEQUENCE = re.compile(r"(?:list|tuple|Sequence)\[(.+?)(?:, \.\.\.)?\]")
 _TUPLE = re.compile(r"tuple\[((?:int|float|str|, )+)(, \.\.\.)?\]")
 
 
@@ -81,13 +83,13 @@ def _checks(kind: Any) -> list[tuple[str, Check]]:
     found = []
     for each in fields(kind):
         of, _, alternative = str(each.type).partition(" | ")
-        check = _check_of(of) if alternative in ("", "None") else None
+        check = _check_of(of, vars(sys.modules[kind.__module__])) if alternative in ("", "None") else None
         if check is not None or each.metadata.get("words"):
             found.append((each.name, _limited(check, each.metadata, of, optional=alternative == "None")))
     return found
 
 
-def _check_of(of: str) -> Check | None:
+def _check_of(of: str, names: Mapping[str, Any]) -> Check | None:
     """Return the check of a type; None if values of the type are not checked."""
     from photogram.arguments import arrays
 
@@ -95,7 +97,7 @@ def _check_of(of: str) -> Check | None:
         "int": arrays.whole_number,
         "float": arrays.number,
         "bool": arrays.truth_value,
-        "str": arrays.text,
+        "str": _text,
         "Floats": arrays.numbers,
         "Indices": arrays.whole_numbers,
         "Bools": arrays.truth_values,
@@ -103,11 +105,14 @@ def _check_of(of: str) -> Check | None:
     if of.startswith("Literal["):
         return partial(_word, get_args(eval(of, {"Literal": Literal})))
     if (match := _TUPLE.fullmatch(of)) is None:
-        return simple.get(of)
+        match = _SEQUENCE.fullmatch(of)
+        return simple.get(of) if match is None else partial(_sequence, names.get(match[1]))
     inner = [simple[each] for each in match[1].split(", ")]
 
     def elements(name: str, value: Any) -> tuple[Any, ...]:
         values = arrays.elements(name, value, None if match[2] else len(inner))
+        if inner == [_text] and {*map(type, values)} <= {str}:  # Names of a hundred thousand stars
+            return value if isinstance(value, tuple) else tuple(values)
         checks = inner * len(values) if match[2] else inner
         pairs = zip(checks, values, strict=True)
         return tuple(check(f"{name}[{row}]", each) for row, (check, each) in enumerate(pairs))
@@ -115,11 +120,35 @@ def _check_of(of: str) -> Check | None:
     return elements
 
 
+def _text(name: str, value: Any) -> str:
+    """Return a text; titles of files may have control characters, but no lone surrogates."""
+    from photogram.arguments.arrays import refused
+
+    try:
+        if isinstance(value, str):
+            value.encode()
+            return value
+    except UnicodeEncodeError:
+        pass
+    raise refused(name, value, "a text")
+
+
 def _word(words: Sequence[str], name: str, value: Any) -> Any:
     from photogram.arguments.arrays import one_of
 
     one_of(name, value, words)
     return value
+
+
+def _sequence(kind: Any, name: str, value: Any) -> Any:
+    from photogram.arguments.arrays import elements, refused
+
+    found = elements(name, value)
+    is_class = isinstance(kind, type) and kind is not Any and not getattr(kind, "_is_protocol", False)
+    for row, each in enumerate(found if is_class else ()):
+        if not isinstance(each, kind):
+            raise refused(f"{name}[{row}]", each, f"a {kind.__name__}")
+    return value if isinstance(value, Sequence) else found
 
 
 def _limited(check: Check | None, limits: Mapping[str, Any], of: str, *, optional: bool) -> Check:

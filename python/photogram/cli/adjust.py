@@ -5,24 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from photogram.cli.choices import Choices
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark, print_sections, print_summary
 from photogram.cli.documents import Documents, check_maps
-from photogram.cli.in_parts import DIVIDING, Parts, adjusted_on_disk, print_plan
-from photogram.cli.job import InputFile, Job, OutputFolder, adjustment_status, with_job
+from photogram.cli.in_parts import DIVIDING, adjusted_on_disk, print_plan
+from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
 from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, check_alone, default_out
 from photogram.cli.projects import NOTHING, Additions, described, project_path, read_project
 from photogram.cli.statement_output import OfHead, stated, statement_files
+from photogram.distributed.division import Division
 from photogram.lazy_dataclasses import replace
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result
-    from photogram.adjustment.robust import Loss
-    from photogram.distributed import Division
+    from photogram import Block, FirstValues, Result
     from photogram.formats import Project
     from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
@@ -45,7 +44,9 @@ def adjust(
     keep_all: bool = False,
     statement: bool = False,
     wanted: OfHead,
-    divided: Parts,
+    division: Annotated[Division, Without("folder")],
+    run: OutputFolder = None,
+    plan: bool = False,
     ordering: OrderingName = "auto",
     threads: Threads = None,
     strict: bool = False,
@@ -67,8 +68,9 @@ def adjust(
     if ordering != "auto":
         check_alone(job, "--ordering", DIVIDING)
     documents.check_plots(job, target)
-    division = divided.division
-    if added == NOTHING and adjusted_on_disk(job, path, target, divided, choices, threads):
+    parts = None if run is None and division == Division() else replace(division, folder=run)
+    on_disk = partial(adjusted_on_disk, job, path, target, choices=choices, threads=threads, is_plan=plan)
+    if parts and added == NOTHING and on_disk(parts):
         return
     project = read_project(job, path, added)
     check_maps(documents.map)  # now that all inputs are known, which it must not be
@@ -82,24 +84,23 @@ def adjust(
 
         check_place(project.block, documents.crs)
     block, started = started_block(project, keep_all=keep_all)
-    if divided.plan:
-        from photogram.distributed import Division, plan_in_parts
+    if plan:
+        from photogram.distributed import plan_in_parts
 
-        datum, basis = _datum(choices.datum_of(project)), project.options.unit_variance
-        print_plan(plan_in_parts(block, division or Division(), datum=datum, unit_variance=basis))
+        print_plan(plan_in_parts(block, parts or division, project.options))
         return
     for remark in started.messages if started is not None and not quiet else ():
         print_remark(str(remark))
 
-    def run(start: Block | FirstValues) -> Result:
-        how: dict[str, Any] = {"choices": choices, "threads": threads, "division": division}
+    def adjusted(start: Block | FirstValues) -> Result:
+        how: dict[str, Any] = {"choices": choices, "threads": threads, "division": parts}
         return adjusted_block(job, project, start, ordering=ordering, **how)
 
     if snooping.snoop:
-        removed = _snooped(job, project, block, started, run, choices, threads, snooping)
+        removed = _snooped(job, project, block, started, adjusted, choices, threads, snooping)
         result = cast("Result", removed.result)
     else:
-        removed, result = None, run(started or block)
+        removed, result = None, adjusted(started or block)
     own = None
     if asked is not None and result.converged:
         with job.status("stating"):
@@ -205,8 +206,8 @@ def _snooped(
     with adjustment_status(job, "adjusting and testing") as progress, errors_explained(block):
         found = snoop(
             block,
-            datum=_datum(choices.datum_of(project)),
-            robust=None if choices.loss_of(project) is None else True,
+            datum=project.options.constraints,
+            robust=None if project.options.loss is None else True,
             unit_variance=project.options.unit_variance,
             max_iterations=project.options.max_iterations,
             threads=threads,
@@ -218,7 +219,7 @@ def _snooped(
     assert isinstance(result, Result)
     _check_control(job, project, choices, result)
     messages = []
-    if choices.loss_of(project) is not None:
+    if project.options.loss is not None:
         messages.append(Message.of("command.robust-start", source=choices.source(job, project, "loss")))
     if adjusting(project, adjust) is not adjust:
         messages.append(Message.of("command.no-rejection"))
@@ -230,7 +231,7 @@ def _check_control(job: Job, project: Project, choices: Choices, result: Result)
     """Reject a result without a required datum of control."""
     from photogram import InputError
 
-    if choices.datum_of(project) == "control" and result.datum.is_chosen:
+    if project.options.datum == "control" and result.datum.is_chosen:
         raise InputError(phrase("command.no-datum", source=choices.source(job, project, "datum")))
 
 
@@ -245,27 +246,24 @@ def adjusted_block(
     division: Division | None = None,
 ) -> Result:
     """Adjust a block by settings of its project and options of the user."""
-    from photogram import FirstValues, adjust_started
+    from photogram import FirstValues, adjust, adjust_started
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
     from photogram.formats.supplements import repeated_remarks
     from photogram.results.features import with_features
 
-    chosen = choices.datum_of(project)
+    if division is None:
+        options = replace(project.options, ordering=ordering, covariance="verdict")
+        adjust_once: Callable[..., Result] = partial(adjust, options=options)
+    else:
+        from photogram import adjust_in_parts
+
+        adjust_once = partial(adjust_in_parts, division=division, options=project.options)
     with adjustment_status(job) as progress:
-        how: dict[str, Any] = {
-            "unit_variance": project.options.unit_variance,
-            "threads": threads,
-            "progress": progress,
-            "max_iterations": project.options.max_iterations,
-        }
         with errors_explained(block):
-            call = adjusting(project, _call(chosen, choices.loss_of(project), ordering, division))
-            if isinstance(block, FirstValues):
-                result = adjust_started(block, by=call, **how)
-            else:
-                result = call(block, **how)
-        result = diagnosed(result.with_max_bias_ratio(project.options.max_bias_ratio))
+            call = partial(adjusting(project, adjust_once), threads=threads, progress=progress)
+            result = adjust_started(block, by=call) if isinstance(block, FirstValues) else call(block)
+        result = diagnosed(result)
     _check_control(job, project, choices, result)
     again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
     told = replace(result, messages=[*project.messages, *again, *result.messages])
@@ -298,29 +296,6 @@ def result_at(
     block, started = started_block(project, keep_all=keep_all)
     whole = project if fitted else project.replace(features={})
     return adjusted_block(job, whole, started or block, choices=choices, threads=threads), project
-
-
-def _call(
-    name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
-) -> Callable[..., Result]:
-    """Return the call that adjusts: in one process, or in parts."""
-    datum = _datum(name)
-    if division is None:
-        from photogram import adjust
-
-        return partial(adjust, datum=datum, loss=loss, ordering=ordering, covariance="verdict")
-    from photogram import adjust_in_parts
-
-    return partial(adjust_in_parts, division=division, datum=datum, loss=loss)
-
-
-def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
-    """Return the datum of a name; None if control or observations define it."""
-    from photogram import InnerConstraints, MinimumConstraints
-
-    if name == "inner":
-        return InnerConstraints()
-    return MinimumConstraints() if name == "minimum" else None
 
 
 def _files(project: Project, result: Result, report: str, sections: list[TitledLines]) -> dict[str, bytes]:

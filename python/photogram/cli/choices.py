@@ -8,10 +8,10 @@ import typer
 
 from photogram.cli.command_classes import misuse
 from photogram.cli.components import MaxBiasRatio, UnitVarianceName
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
-    from photogram.adjustment.robust import Loss
+    from photogram.adjustment.options import AdjustOptions
     from photogram.cli.job import Job
     from photogram.formats import Project
 
@@ -30,15 +30,17 @@ class Choices:
     max_bias_ratio: MaxBiasRatio = None
     self_calibrate: str | None = None
 
-    def datum_of(self, project: Project) -> str | None:
-        """Return the name of the datum of the option, else of the project."""
-        return self.datum or project.options.datum
+    def options(self, options: AdjustOptions) -> AdjustOptions:
+        """Return the options of a project with the options of the user."""
+        from photogram.adjustment.options import AdjustOptions
 
-    def loss_of(self, project: Project) -> Loss | None:
-        """Return the robust loss of the option or the project; None: least squares."""
-        if self.loss is None:
-            return project.options.loss
-        return None if self.loss == "none" else self.loss
+        return AdjustOptions(
+            datum=self.datum or (None if self.hold else options.datum),
+            unit_variance=self.unit_variance or options.unit_variance,
+            loss=options.loss if self.loss is None else None if self.loss == "none" else self.loss,
+            max_iterations=self.iterations or options.max_iterations,
+            max_bias_ratio=self.max_bias_ratio or options.max_bias_ratio,
+        )
 
     def source(self, job: Job, project: Project, name: str) -> str:
         """Return the source of `datum` or `loss`: option, or key and line of a file."""
@@ -62,15 +64,6 @@ class Choices:
         wanted = [name.strip() for name in self.self_calibrate.split(",")] if self.self_calibrate else []
         project = self_calibrated(project, wanted)
         project = held_points(project, [each.strip() for each in self.hold.split(",")] if self.hold else [])
-        options = project.options
         if self.hold and self.datum in ("inner", "minimum"):
             raise misuse("--datum", "conflict", options="--hold")
-        return project.replace(
-            options=replace(
-                options,
-                datum=None if self.hold else options.datum,
-                unit_variance=self.unit_variance or options.unit_variance,
-                max_iterations=self.iterations or options.max_iterations,
-                max_bias_ratio=self.max_bias_ratio or options.max_bias_ratio,
-            )
-        )
+        return project.replace(options=self.options(project.options))

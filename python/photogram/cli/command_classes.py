@@ -58,7 +58,11 @@ def declared(parameter: Parameter, owner: str) -> Parameter:
 
 def option_of(field: Field[Any], kind: type) -> Parameter:
     """Return the option of a field of a class of options; the help shows limits of whole numbers."""
-    hint: Any = field.metadata.get("kind") or eval(str(field.type), vars(sys.modules[kind.__module__]))
+    hint: Any = field.metadata.get("kind")
+    if hint is None:
+        hint = eval(str(field.type), vars(sys.modules[kind.__module__]))
+    elif field.default is None:
+        hint |= None
     if hint is int:
         limits = (("min", field.metadata.get("low")), ("max", field.metadata.get("high")))
         closed: dict[str, Any] = {name: limit for name, limit in limits if isinstance(limit, int)}

@@ -37,7 +37,7 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Block, Progress, Result
-    from photogram.adjustment.adjustment import UnitVariance
+    from photogram.adjustment.options import UnitVariance
     from photogram.giant import Limits, Project
     from photogram.giant.common import Common
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
-from photogram.cli.job import Job, OutputFolder, adjustment_status
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.cli.job import Job, adjustment_status
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -27,29 +26,6 @@ TAKEN = frozenset(
 """Options for a project on disk; any other option is rejected."""
 
 
-@dataclass(frozen=True)
-class Parts:
-    """Options for an adjustment in parts."""
-
-    cluster: str | None = None
-    workers: int | None = None
-    parts: int | None = None
-    memory: str | None = None
-    run: OutputFolder = None
-    plan: bool = False
-
-    @property
-    def division(self) -> Division | None:
-        """Options of :func:`photogram.adjust_in_parts`; None without an option."""
-        if replace(self, plan=False) == Parts():
-            return None
-        from photogram.distributed import Division
-
-        return Division(
-            parts=self.parts, cluster=self.cluster, workers=self.workers, memory=self.memory, folder=self.run
-        )
-
-
 def print_plan(plan: PartsPlan) -> None:
     """Print how a block would be adjusted in parts."""
     output.print("\n".join(plan.lines()))
@@ -57,12 +33,16 @@ def print_plan(plan: PartsPlan) -> None:
 
 
 def adjusted_on_disk(
-    job: Job, path: Path, target: Path, divided: Parts, choices: Choices, threads: int | None
+    job: Job,
+    path: Path,
+    target: Path,
+    division: Division,
+    choices: Choices,
+    threads: int | None,
+    *,
+    is_plan: bool,
 ) -> bool:
     """Plan or adjust a project batch by batch; False if this is impossible."""
-    division = divided.division
-    if division is None:
-        return False
     from photogram.formats import Wishes
     from photogram.formats.plain.batches import streamable
 
@@ -74,18 +54,14 @@ def adjusted_on_disk(
             raise misuse(name, "parquet-in-parts", options=typed)
     from photogram.formats import in_parts
 
-    wishes, folder = Wishes(), divided.run or target / "run"
-    chosen: Any = {
-        "unit_variance": choices.unit_variance,
-        "loss": choices.loss_of,
-        "max_iterations": choices.iterations,
-    }
-    if divided.plan:
-        print_plan(in_parts.planned_on_disk(path, wishes, folder, division, **chosen))
+    wishes, folder = Wishes(), Path(division.folder or target / "run")
+    change = choices.options
+    if is_plan:
+        print_plan(in_parts.planned_on_disk(path, wishes, folder, division, change=change))
         return True
     with adjustment_status(job) as progress:
         found = in_parts.adjusted_on_disk(
-            path, wishes, folder, division, **chosen, threads=threads, progress=progress
+            path, wishes, folder, division, change=change, threads=threads, progress=progress
         )
     lines = [*found.lines(), str(phrase("command.node-results", folder=folder / "results"))]
     job.finish(

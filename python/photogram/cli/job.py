@@ -304,15 +304,18 @@ class Without:
 
 def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
     """Return the roles of options and arguments of a command that are paths."""
-    found: dict[str, Reads | Writes] = {}
-    for parameter in _options(command)[0]:
-        kind, *metadata = get_args(parameter.annotation)
-        marks = [mark for mark in metadata if isinstance(mark, Reads | Writes)]
-        if len(marks) == 1:
-            found[parameter.name] = marks[0]
-        elif marks or _holds_path(kind):
-            raise TypeError(f"{command.__name__}: {parameter.name} must be marked as one of Reads or Writes")
+    found = {}
+    for each in _options(command)[0]:
+        if (role := _mark(each, (Reads, Writes))) is not None:
+            found[each.name] = role
+        elif _holds_path(each.annotation):
+            raise TypeError(f"{command.__name__}: {each.name} must be marked as one of Reads or Writes")
     return found
+
+
+def _mark(parameter: Parameter, kind: type | tuple[type, ...]) -> Any:
+    """Return the mark of a kind in the annotation of an option or argument; None without one."""
+    return next((each for each in get_args(parameter.annotation)[1:] if isinstance(each, kind)), None)
 
 
 def _holds_path(kind: object) -> bool:
@@ -396,10 +399,8 @@ def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[s
         value = values.get(parameter.name, parameter.default)
         if value == parameter.default or value is None:
             continue
-        name = _option(parameter)
-        for mark in get_args(parameter.annotation)[1:]:
-            if isinstance(mark, ArgumentInfo):
-                name = str(mark.metavar)
+        argument = _mark(parameter, ArgumentInfo)
+        name = _option(parameter) if argument is None else str(argument.metavar)
         each = value if isinstance(value, list) else [value]
         found[name] = ", ".join(str(getattr(one, "value", one)) for one in each)
     return found
@@ -407,12 +408,8 @@ def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[s
 
 def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
     """Assign values to arguments; an option may replace the first argument."""
-    arguments = {
-        parameter.name: mark.metavar
-        for parameter in parameters
-        for mark in get_args(parameter.annotation)[1:]
-        if isinstance(mark, ArgumentInfo)
-    }
+    marks = {parameter.name: _mark(parameter, ArgumentInfo) for parameter in parameters}
+    arguments = {name: mark.metavar for name, mark in marks.items() if mark is not None}
     given = [values[name] for name in arguments if values[name]]
     stands = [word for name, word in STANDS.items() if name in values]
     instead = sum(bool(values.get(name)) for name in STANDS)
@@ -427,10 +424,8 @@ def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
 
 def _option(parameter: Parameter) -> str:
     """Return the name of an option on the command line."""
-    for mark in get_args(parameter.annotation)[1:]:
-        if isinstance(mark, OptionInfo):
-            # In an annotation, the default of the mark is the first option name.
-            names = [each for each in (mark.default, *(mark.param_decls or ())) if isinstance(each, str)]
-            if names:
-                return next((each for each in names if each.startswith("--")), names[0])
-    return "--" + parameter.name.replace("_", "-")
+    mark = _mark(parameter, OptionInfo)
+    # In an annotation, the default of the mark is the first option name.
+    given = () if mark is None else (mark.default, *(mark.param_decls or ()))
+    names = [each for each in given if isinstance(each, str)] or ["--" + parameter.name.replace("_", "-")]
+    return next((each for each in names if each.startswith("--")), names[0])

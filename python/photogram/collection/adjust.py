@@ -9,12 +9,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import (
-    Ordering,
     Progress,
     check_iteration,
     core_threads,
     teller,
 )
+from photogram.adjustment.options import Ordering
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.core_arrays import collection_network, named

@@ -1,7 +1,5 @@
 """Partitioned adjustment (Helmert blocking): on a Dask cluster, or one part after the other."""
 
-from photogram.distributed.adjust import plan_in_parts
-from photogram.distributed.division import Division
-from photogram.distributed.plan import PartsPlan
+import lazy_loader
 
-__all__ = ["Division", "PartsPlan", "plan_in_parts"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,24 +8,23 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import orjson
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import (
-    AsPublished,
     Progress,
-    UnitVariance,
     adjust,
     core_options,
     core_threads,
-    iteration_limit,
     with_datum,
 )
 from photogram.adjustment.first_features import started
+from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
-from photogram.adjustment.robust import Loss
+from photogram.arguments.fields import options_of
 from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
 from photogram.distributed.datum import Mover
 from photogram.distributed.division import Division
@@ -47,9 +46,6 @@ from photogram.network.block import Block, checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.datum import (
     DatumRow,
-    InnerConstraints,
-    MinimumConstraints,
-    check_datum,
 )
 from photogram.network.films import Scan
 from photogram.results.block_files import STANDS
@@ -67,15 +63,11 @@ LEAST_PHOTOS = 20  # Minimum number of photos per part; smaller parts consist of
 def adjust_in_parts(
     block: Block,
     division: Division,
+    options: AdjustOptions | None = None,
     *,
-    datum: InnerConstraints | MinimumConstraints | None = None,
-    unit_variance: UnitVariance = "constrained",
-    max_iterations: int | None = None,
-    tolerance: float | AsPublished = 1e-5,
-    covariance: bool = True,
-    loss: Loss | None = None,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
+    **changes: Any,
 ) -> Result:
     """Adjust a block in parts, on a cluster or sequentially (docs/distributed.md).
 
@@ -90,8 +82,8 @@ def adjust_in_parts(
     division
         Number of parts, cluster, memory and folder. A block that fits into the memory is adjusted as a whole,
         if neither parts nor a cluster are specified.
-    datum, unit_variance, max_iterations, tolerance, covariance, loss, progress
-        As in :func:`photogram.adjust`.
+    options, progress, changes
+        As in :func:`photogram.adjust`; the order of elimination does not apply.
     threads
         As in :func:`photogram.adjust`; on a cluster, threads per worker (None: one).
 
@@ -112,36 +104,23 @@ def adjust_in_parts(
     ModuleNotFoundError
         If a cluster is requested and dask.distributed is not installed (extra `distributed`).
     """
-    if max_iterations is None:
-        max_iterations = iteration_limit(checked(block), tolerance)
-    options = core_options(unit_variance, loss, covariance, tolerance, max_iterations)
+    chosen = options_of(AdjustOptions, options, changes)
     core_threads(threads)  # rejected here, not by a worker
-    block, options, row = _ready(block, options, datum)
+    block, core, row = _ready(block, chosen)
     room = None if division.parts is not None or division.cluster is not None else division.memory_bytes
     # A block that fits into the memory is adjusted as a whole.
     if room is not None and _counted(block, 1).factor_bytes[0] + WHOLE * len(block.image_xy) <= room:
-        return adjust(
-            block,
-            datum=datum,
-            unit_variance=unit_variance,
-            max_iterations=max_iterations,
-            tolerance=tolerance,
-            covariance=covariance,
-            loss=loss,
-            threads=threads,
-            progress=progress,
-        )
-    with _run(block, options, row, division, threads) as run:
-        return merged(run.folder, run.manifest, block, run.adjust(progress, block))
+        return adjust(block, chosen, threads=threads, progress=progress)
+    with _run(block, core, row, division, threads) as run:
+        result = merged(run.folder, run.manifest, block, run.adjust(progress, block))
+        return result.with_max_bias_ratio(chosen.max_bias_ratio)
 
 
 def plan_in_parts(
     block: Block,
     division: Division,
-    *,
-    datum: InnerConstraints | MinimumConstraints | None = None,
-    unit_variance: UnitVariance = "constrained",
-    tolerance: float | AsPublished = 1e-5,
+    options: AdjustOptions | None = None,
+    **changes: Any,
 ) -> PartsPlan:
     """Plan the adjustment of a block in parts: work, memory, traffic and time.
 
@@ -149,7 +128,7 @@ def plan_in_parts(
 
     Parameters
     ----------
-    block, division, datum, unit_variance, tolerance
+    block, division, options, changes
         As in :func:`adjust_in_parts`.
 
     Returns
@@ -161,24 +140,21 @@ def plan_in_parts(
     InputError, AdjustmentError
         As in :func:`adjust_in_parts`.
     """
-    options = core_options(unit_variance, None, tolerance=tolerance)
-    block, options, row = _ready(block, options, datum)
-    with _run(block, options, row, division, None) as run:
+    block, core, row = _ready(block, options_of(AdjustOptions, options, changes))
+    with _run(block, core, row, division, None) as run:
         return run.plan()
 
 
-def _ready(
-    block: Block, options: CoreOptions, datum: InnerConstraints | MinimumConstraints | None
-) -> tuple[Block, CoreOptions, DatumRow | None]:
+def _ready(block: Block, options: AdjustOptions) -> tuple[Block, CoreOptions, DatumRow | None]:
     """Return a valid block with initial values of shared unknowns, options and inner constraints.
 
     The options contain the minimum constraints; inner constraints are a row for the core.
     """
     check_cameras(checked(block))
-    check_datum(datum)
     refuse_passages(block, "blocks in parts", but=Scan)
+    core = core_options(options, block)
     block = started(block)
-    return block, *with_datum(block, options, datum)
+    return block, *with_datum(block, core, options.constraints)
 
 
 @contextmanager

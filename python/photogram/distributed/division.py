@@ -6,8 +6,7 @@ import re
 from os import PathLike
 from typing import Any
 
-from photogram.arguments.arrays import shown, whole_number
-from photogram.arguments.objects import path_of
+from photogram.arguments.fields import check_fields, option
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
@@ -21,6 +20,8 @@ UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12, "ki": 2**10, "m
 
 def bytes_of(memory: int | str) -> int:
     """Convert a memory size to bytes: `4GB` (10^9), `1.5GiB` (2^30), or a number."""
+    from photogram.arguments.arrays import shown, whole_number
+
     size: float
     if isinstance(memory, str):
         match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kmgt]?i?)b?\s*", memory.lower(), re.ASCII)
@@ -60,17 +61,16 @@ class Division:
         If parts or workers are not within 1 to 100,000, or the memory or folder is invalid.
     """
 
-    parts: int | None = None
-    cluster: Any = None
-    workers: int | None = None
-    memory: int | str | None = None
+    parts: int | None = option(None, 1, MOST)
+    cluster: Any = option(None, kind=str)
+    workers: int | None = option(None, 1, MOST)
+    memory: int | str | None = option(None, kind=str)
     folder: str | PathLike[str] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("parts", "workers"):
-            given = getattr(self, name)
-            if given is not None and not 1 <= whole_number(name, given) <= MOST:
-                raise InputError(phrase("parts.range", name=name, most=MOST, value=shown(given)))
+        from photogram.arguments.objects import path_of
+
+        check_fields(self)
         if self.memory is not None:
             bytes_of(self.memory)
         if self.folder is not None:

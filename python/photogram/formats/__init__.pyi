@@ -16,7 +16,6 @@ from .metadata.record import Said as Said
 from .micmac import read_marks as read_marks
 from .micmac import write_marks as write_marks
 from .project import Frame as Frame
-from .project import Options as Options
 from .project import Project as Project
 from .registry import FORMATS as FORMATS
 from .registry import adjusting as adjusting

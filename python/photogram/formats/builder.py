@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.arrays import is_covariance, repeated_pairs
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.project import Options, Project, Repeated, Size
+from photogram.formats.project import Project, Repeated, Size
 from photogram.formats.rigging import FrameOf, mounted
 from photogram.io.places import Failing, Place, at_place
 from photogram.messages import Message
@@ -227,7 +228,7 @@ class BlockBuilder:
     def project(
         self,
         *,
-        options: Options | None = None,
+        options: AdjustOptions | None = None,
         details: Mapping[str, Any] | None = None,
         **fields: Any,
     ) -> Project:
@@ -271,7 +272,7 @@ class BlockBuilder:
             pixel_mm=tuple(self.pixel_mm),
             starts=starts,
             frame=self.frame,
-            options=options or Options(),
+            options=options or AdjustOptions(),
             lacks=tuple(self.lacks),
             messages=tuple(self.messages),
             details=details or {},

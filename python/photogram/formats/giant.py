@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
 from photogram.formats.format import Format, Wishes
-from photogram.formats.project import Frame, Options, Project
+from photogram.formats.project import Frame, Project
 from photogram.giant.files import present_files, to_bytes
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
@@ -48,7 +49,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         frame=Frame("geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
         if block.spheroid
         else Frame(),
-        options=Options(unit_variance=found.common.unbiased_variance),
+        options=AdjustOptions(unit_variance=found.common.unbiased_variance),
         messages=tuple(messages),
     )
 

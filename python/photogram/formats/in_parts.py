@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from photogram.adjustment.adjustment import Progress, UnitVariance, core_options, iteration_limit
-from photogram.adjustment.robust import Loss
+from photogram.adjustment.adjustment import Progress, core_options
+from photogram.adjustment.options import AdjustOptions
 from photogram.distributed.adjust import Run, opened
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
@@ -16,7 +16,6 @@ from photogram.distributed.plan import PartsPlan
 from photogram.distributed.run import Manifest, result_folder
 from photogram.formats.format import Wishes
 from photogram.formats.plain.batches import Streamed
-from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass
 
 
@@ -55,30 +54,21 @@ class OnDisk:
         return lines
 
 
-def _as_said(project: Project) -> Loss | None:
-    return project.options.loss
-
-
 def adjusted_on_disk(
     path: Path,
     wishes: Wishes,
     folder: Path,
     division: Division,
     *,
-    unit_variance: UnitVariance | None = None,
-    loss: Callable[[Project], Loss | None] = _as_said,
-    max_iterations: int | None = None,
+    change: Callable[[AdjustOptions], AdjustOptions] = lambda options: options,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
     """Adjust a project with images in Parquet, in parts, in a folder.
 
-    `unit_variance`: basis of the variance of unit weight; None: of the project. `loss`: returns the loss for
-    the project, by default its own. `max_iterations`: largest number of iterations. None: the number of the
-    project, otherwise 50, or 200 with a loss.
+    `change` returns the options for the options of the project.
     """
-    chosen = (unit_variance, loss, max_iterations)
-    with _run(path, wishes, folder, division, chosen, threads) as run:
+    with _run(path, wishes, folder, division, change, threads) as run:
         outcome = run.adjust(progress)
         found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
         return OnDisk(outcome, run.manifest, found)
@@ -90,12 +80,10 @@ def planned_on_disk(
     folder: Path,
     division: Division,
     *,
-    unit_variance: UnitVariance | None = None,
-    loss: Callable[[Project], Loss | None] = _as_said,
-    max_iterations: int | None = None,
+    change: Callable[[AdjustOptions], AdjustOptions] = lambda options: options,
 ) -> PartsPlan:
     """Plan an adjustment and write its parts to the folder."""
-    with _run(path, wishes, folder, division, (unit_variance, loss, max_iterations), None) as run:
+    with _run(path, wishes, folder, division, change, None) as run:
         return run.plan()
 
 
@@ -105,21 +93,14 @@ def _run(
     wishes: Wishes,
     folder: Path,
     division: Division,
-    chosen: tuple[UnitVariance | None, Callable[[Project], Loss | None], int | None],
+    change: Callable[[AdjustOptions], AdjustOptions],
     threads: int | None,
 ) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(alone(folder))
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
-        project, (unit_variance, loss, max_iterations) = streamed.project, chosen
-        options = core_options(
-            unit_variance or project.options.unit_variance,
-            loss(project),
-            max_iterations=max_iterations
-            or project.options.max_iterations
-            or iteration_limit(streamed.block),
-        )
+        options = core_options(change(streamed.project.options), streamed.block)
         source = streamed.source(options)
         with opened(
             folder,

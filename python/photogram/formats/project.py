@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -19,9 +20,8 @@ from photogram.show.methods import Brief
 from photogram.targets.board import Board
 from photogram.words import Phrase, phrase
 
-__all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused"]
+__all__ = ["Frame", "Project", "Size", "Unused"]
 
-DatumName = Literal["control", "minimum", "inner"]
 Size = tuple[int, int]  # Image width and height of a camera, pixels
 
 
@@ -30,25 +30,6 @@ def frame_of(block: Block) -> Frame:
     if block.spheroid is not None and block.frame.kind == "cartesian":
         return replace(block.frame, kind="geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
     return block.frame
-
-
-@dataclass(frozen=True)
-class Options:
-    """Adjustment settings of a project; None: not specified.
-
-    Attributes
-    ----------
-    datum, loss, unit_variance, max_iterations
-        As in :func:`photogram.adjust`.
-    max_bias_ratio
-        As in :meth:`photogram.Result.with_max_bias_ratio`.
-    """
-
-    datum: DatumName | None = None
-    loss: Literal["huber", "cauchy"] | None = None
-    unit_variance: Literal["constrained", "unity", "redundancy"] = "constrained"
-    max_iterations: int | None = None
-    max_bias_ratio: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +104,7 @@ class Project(Brief):
     pixel_mm: tuple[float | None, ...]
     starts: Floats
     frame: Frame = field(default_factory=Frame)
-    options: Options = field(default_factory=Options)
+    options: AdjustOptions = field(default_factory=AdjustOptions)
     lacks: tuple[Phrase, ...] = ()
     messages: tuple[Message, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from photogram.adjustment.options import AdjustOptions, DatumName
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
-from photogram.formats.project import DatumName, Options, Project
+from photogram.formats.project import Project
 from photogram.results.result import Result
 from photogram.results.result_files import SUMMARY, read_summary
 from photogram.words import phrase
@@ -91,7 +92,7 @@ def _project(path: Path, wishes: Wishes) -> Project:
         pixel_mm=(None,) * count,
         starts=np.array(result.point_positions),
         frame=result.block.frame,
-        options=Options(
+        options=AdjustOptions(
             datum=datums.get(result.datum.kind),
             loss=None if result.loss is None else losses[result.loss[0]],
             unit_variance=variances.get(result.unit_variance, "constrained"),

@@ -12,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Wishes
 from photogram.formats.images import by_camera
-from photogram.formats.project import Options, Project, Size
+from photogram.formats.project import Project, Size
 from photogram.io.places import Failing
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
@@ -92,7 +93,7 @@ class DbatBuilder(BlockBuilder):
         # Photos with fixed poses, and free parameters of cameras
         self.held: set[int] = set()
         self.free: set[str] = set()
-        self.options = Options()
+        self.options = AdjustOptions()
 
     def sensor(self, name: str, sensor: Sensor) -> None:
         """Add a camera."""

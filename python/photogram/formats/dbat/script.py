@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError
 from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of, sensors_of_table
 from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, titled, untitled
@@ -15,7 +16,7 @@ from photogram.formats.format import Wishes
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
-from photogram.formats.project import Options, Size
+from photogram.formats.project import Size
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.files import read_beginning, read_lines
@@ -173,7 +174,7 @@ def _datum(operations: Element, content: DbatBuilder) -> None:
         if number not in content.poses:
             raise each.error(phrase("format.undefined", what="photo with a pose", name=word))
         content.held.add(number)
-        content.options = Options(datum="minimum")
+        content.options = AdjustOptions(datum="minimum")
 
 
 def _cameras(parent: Element, messages: list[Message]) -> dict[str, Sensor]:

@@ -9,12 +9,13 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes
 from photogram.formats.plain.keys import KEYS, read_keys
 from photogram.formats.plain.schema import TABLES
-from photogram.formats.project import Frame, Options
+from photogram.formats.project import Frame
 from photogram.io.toml import Table, read_document
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
@@ -46,7 +47,7 @@ class Settings:
     path: Path  # The file, or the path for error messages
     name: str = ""  # Name of the project
     frame: Frame = field(default_factory=Frame)  # As in a project
-    options: Options = field(default_factory=Options)
+    options: AdjustOptions = field(default_factory=AdjustOptions)
     length: str = "m"  # Units
     angle: str = "deg"
     image: str = "px"
@@ -107,7 +108,7 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
     return Settings(
         path=path,
         frame=Frame(**values["frame"]),
-        options=Options(**options),
+        options=AdjustOptions(**options),
         **values[""],
         sd=_deviations(file.optional("sd")) | dict(wishes.sd),
         tables=_tables(file.optional("tables")),
