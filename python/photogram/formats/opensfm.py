@@ -267,7 +267,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     attitudes = Attitudes(attitude_matrices(block)[rows])
     rotations = attitudes.values("rotation_vector_to_vision").tolist()
     translations = attitudes.translations(block.photo_positions[rows]).tolist()
-    gps = {each.photo: each for each in block.observations if isinstance(each, Position)}
+    gps = {each.photo: each for each in block.observations.of_type(Position)}
     shots: dict[str, Any] = {}
     for row, rotation, translation in zip(rows.tolist(), rotations, translations, strict=True):
         name = block.photo_ids[row]

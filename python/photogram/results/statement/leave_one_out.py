@@ -45,7 +45,7 @@ class LeftOut:
 def leave_one_out(result: Result) -> list[LeftOut]:
     """Return used control points predicted by the others, in order of names."""
     block, found = result.block, []
-    observed = {each.point: each for each in block.observations if isinstance(each, Control)}
+    observed = {each.point: each for each in block.observations.of_type(Control)}
     held_by = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     held_by[[row for row, name in enumerate(block.point_ids) if name in observed]] = True
     control = np.flatnonzero(result.used_points & held_by)
