@@ -410,5 +410,5 @@ def test_many_positions_are_added_fast():
         observations=Position.from_arrays(photo=names, position=np.zeros((count, 3)), sd=0.1)
     )
     assert time.process_time() - start < 1.0  # 0.1 s on a free machine
-    rows, (kind, _, photos, *_) = block.observation_groups[0]
-    assert (kind, len(rows), photos[-1, 0]) == ("position", count, count - 1)
+    kind, _, photos, *_ = block.observation_groups[0]
+    assert (kind, len(photos), photos[-1, 0]) == ("position", count, count - 1)

@@ -23,7 +23,7 @@ from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed
-from photogram.network.observations import Control, Observation
+from photogram.network.observations import Control, Observation, Observations
 from photogram.network.passages import Passage
 from photogram.network.rigs import Mount
 from photogram.results.features import Definition
@@ -200,7 +200,7 @@ def assembled(
     point_check_sd: Floats | None = None,
     photo_position_sd: ArrayLike = np.inf,
     photo_attitude_sd: ArrayLike = np.inf,
-    observations: Sequence[Observation] = (),
+    observations: Sequence[Observation | Observations[Any]] = (),
     mounts: Sequence[Mount] = (),
     timed: Sequence[Timed] = (),
     passages: Sequence[Passage] = (),

@@ -254,8 +254,8 @@ class Block(Valued, Brief):
         return different_unknowns([*sensors, *of_times, *coefficients, *records, *passed, *of_observations])
 
     @cached_property
-    def observation_groups(self) -> list[tuple[list[int], Group]]:
-        """Observations by type: their rows, and their arrays for the core."""
+    def observation_groups(self) -> list[Group]:
+        """Arrays for the core of the observations of each type."""
         return observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
     @property

@@ -59,13 +59,13 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
     """Return the adjusted observations of a block by the names of their types."""
     found = iter(solution.adjusted_observations)
     kinds: dict[str, ObservedKind] = {}
-    for rows, (*_, covariances) in block.observation_groups:
-        first = block.observations[rows[0]]
-        kind = first.label
+    for columns in block.observations.columns:
+        first, rows = columns.objects[0], columns.rows
+        kind = columns.label
         components = first.components(geographic=block.geographic)
         observed = np.ones((len(rows), len(components)), dtype=bool)
         if first.MISSING:
-            observed = ~np.isnan([block.observations[row].observed for row in rows])
+            observed = ~np.isnan(columns.table["observed"])
         tables = np.full((3, *observed.shape), np.nan)
         single = np.full((2, len(rows)), np.nan)
         adjusted = [next(found) for _ in rows]
@@ -75,11 +75,11 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
             parts = zip(*some, strict=True)
             tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(parts)) for _ in range(3)]
             single[:, taken] = list(parts)
-        variances = np.diagonal(covariances, axis1=1, axis2=2)
+        variances = np.diagonal(np.asarray(columns.table["precision"]), axis1=1, axis2=2)
         own = ObservedKind(
             kind=kind,
-            rows=np.array(rows, dtype=np.int64),
-            names=[" - ".join(block.observations[row].of) for row in rows],
+            rows=rows,
+            names=[" - ".join(each.of) for each in columns.objects],
             components=components,
             units=first.units(block.linear_unit),
             sd=np.sqrt(np.where(observed, variances, np.nan)),

@@ -20,7 +20,7 @@ from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.network.observations import Observation, Position
+from photogram.network.observations import Observations, Position
 from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "LOCAL_CS"
@@ -73,7 +73,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         image_photos=photos,
         image_points=owners,
         image_xy=xy,
-        observations=[*points.observations, *observations],
+        observations=[*points.observations, observations],
         frame=frame,
         lacks=[Phrase("read.ties"), *lacks],
         messages=messages,
@@ -302,7 +302,7 @@ def _enabled(element: Element) -> bool:
 
 def _gnss(
     positions: _Positions, shots: list[Element], names: list[str], default: Floats
-) -> tuple[list[Observation], list[Phrase]]:
+) -> tuple[Observations[Position], list[Phrase]]:
     given = {
         row: own
         for row, each in enumerate(shots)
@@ -312,12 +312,12 @@ def _gnss(
     lost = len(given) - len(known)
     lacks = [Phrase("read.references", {"number": lost, "option": option_sd("gnss")})] if lost else []
     if not known:
-        return [], lacks
+        return Observations(), lacks
     xyz, sd = map(np.array, zip(*known.values(), strict=True))
     found, turned = positions.carried(xyz, sd)
     covariances = (turned + turned.transpose(0, 2, 1)) / 2
-    each = zip(known, found, covariances, strict=True)
-    return [Position(names[row], place, covariance=own) for row, place, own in each], lacks
+    photos = [names[row] for row in known]
+    return Position.from_arrays(photo=photos, position=found, covariance=covariances), lacks
 
 
 def _markers(positions: _Positions, markers: list[Element], default: Floats) -> PointTable:

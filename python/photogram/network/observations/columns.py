@@ -156,6 +156,11 @@ class Observations(Sequence[_Row]):
     def _objects(self) -> list[_Row]:
         return self.column("objects")
 
+    @property
+    def core_order(self) -> list[int]:
+        """Row numbers of the observations in the order of the core: by type."""
+        return [row for own in self.columns for row in own.rows.tolist()]
+
     def column(self, name: str) -> list[Any]:
         """Return a field of all observations in order, e.g. `points`; also `objects` or `moments`."""
         found: list[Any] = [None] * self._count
@@ -207,8 +212,8 @@ def observation_rows(
     points: Sequence[str],
     photos: Sequence[str],
     unknowns: Sequence[Unknown],
-) -> list[tuple[list[int], Group]]:
-    """Return the observations of each type: their row numbers, and their arrays for the core.
+) -> list[Group]:
+    """Return the arrays for the core of the observations of each type, in `core_order`.
 
     Record times follow the photos. InputError if a point or photo is not in the block.
     """
@@ -217,4 +222,4 @@ def observation_rows(
     all_photos = [*photos, *(each.name for each in moments(observations))]
     of_points, of_photos = ({name: row for row, name in enumerate(each)} for each in (points, all_photos))
     of_unknowns = {id(each): row for row, each in enumerate(unknowns)}
-    return [(own.rows.tolist(), own.group(of_points, of_photos, of_unknowns)) for own in observations.columns]
+    return [own.group(of_points, of_photos, of_unknowns) for own in observations.columns]
