@@ -42,30 +42,32 @@ class Columns:
     @classmethod
     def of(cls, objects: Mapping[int, Any]) -> Columns:
         """Create the columns of similar observations by row number."""
-        own = list(objects.values())
+        observations = list(objects.values())
         table: dict[str, Any] = {
-            each.name: [getattr(one, each.name) for one in own] for each in fields(own[0])
+            field.name: [getattr(one, field.name) for one in observations]
+            for field in fields(observations[0])
         }
         table |= {name: np.stack(table[name]) for name in ("observed", "precision")}
-        found = cls(type(own[0]), own[0].label, np.array(list(objects), dtype=np.int64), table)
-        vars(found)["objects"] = own
-        return found
+        first = observations[0]
+        columns = cls(type(first), first.label, np.array(list(objects), dtype=np.int64), table)
+        vars(columns)["objects"] = observations
+        return columns
 
     @classmethod
     def merged(cls, columns: Iterable[Columns]) -> Columns:
         """Return the columns of similar observations, in the order of their rows."""
-        objects = {row: one for own in columns for row, one in own.numbered()}
+        objects = {row: one for part in columns for row, one in part.numbered()}
         return cls.of(dict(sorted(objects.items())))
 
     @cached_property
     def objects(self) -> list[Any]:
         """Observations as objects."""
-        found = []
+        objects = []
         for values in zip(*self.table.values(), strict=True):
-            own = object.__new__(self.kind)
-            vars(own).update(zip(self.table, values, strict=True))
-            found.append(own)
-        return found
+            observation = object.__new__(self.kind)
+            vars(observation).update(zip(self.table, values, strict=True))
+            objects.append(observation)
+        return objects
 
     def numbered(self) -> Iterator[tuple[int, Any]]:
         """Yield the row numbers and objects."""
@@ -90,15 +92,15 @@ class Columns:
         """Return the arrays for the core, with the indices of names, and of unknowns by identity."""
         table, indices = self.table, []
         known: Mapping[Any, int]
-        of_unknowns = {one: unknowns[id(one)] for own in set(table["unknowns"]) for one in own if one}
+        of_unknowns = {one: unknowns[id(one)] for row in set(table["unknowns"]) for one in row if one}
         parts = {"points": points, "photos": photos, "unknowns": {None: -1, **of_unknowns}}
         for name, known in parts.items():
             column: Sequence[tuple[Any, ...]] = table[name]
             try:
-                flat = [known[each] for own in column for each in own]
+                flat = [known[one] for row in column for one in row]
             except KeyError as error:
-                row = next(row for row, own in enumerate(column) if error.args[0] in own)
-                what = f"observation {self.objects[row].name}"
+                number = next(number for number, row in enumerate(column) if error.args[0] in row)
+                what = f"observation {self.objects[number].name}"
                 raise argument_error(what, "absent", kind=name[:-1], name=error.args[0]) from None
             indices.append(np.array(flat, dtype=np.int64).reshape(len(column), len(column[0])))
         values = self.kind.core_values(np.asarray(table["observed"]), table["unknowns"])
@@ -114,28 +116,28 @@ class Observations(Sequence[_Row]):
     """
 
     def __init__(self, columns: Iterable[Columns] = ()) -> None:
-        self.columns = sorted(columns, key=lambda each: int(each.rows[0]))
-        self._count = sum(len(each.rows) for each in self.columns)
+        self.columns = sorted(columns, key=lambda part: int(part.rows[0]))
+        self._count = sum(len(part.rows) for part in self.columns)
 
     @classmethod
     def of(cls, parts: Iterable[Any]) -> Observations[Any]:
         """Create the observations of a block from single observations and columns, in order."""
         count = 0
-        found: dict[tuple[object, ...], list[Columns]] = {}
+        by_key: dict[tuple[object, ...], list[Columns]] = {}
         single: dict[tuple[object, ...], dict[int, Any]] = {}
         for part in parts:
             if isinstance(part, Observations):
-                for own in part.columns:
-                    moved = replace(own, rows=own.rows + count) if count else own
-                    found.setdefault(own.key, []).append(moved)
+                for columns in part.columns:
+                    moved = replace(columns, rows=columns.rows + count) if count else columns
+                    by_key.setdefault(columns.key, []).append(moved)
                 count += len(part)
             else:
                 key = (type(part), part.label, *(len(getattr(part, name)) for name in _SIZES))
                 single.setdefault(key, {})[count] = part
                 count += 1
         for key, objects in single.items():
-            found.setdefault(key, []).append(Columns.of(objects))
-        return cls(own[0] if len(own) == 1 else Columns.merged(own) for own in found.values())
+            by_key.setdefault(key, []).append(Columns.of(objects))
+        return cls(same[0] if len(same) == 1 else Columns.merged(same) for same in by_key.values())
 
     def __len__(self) -> int:
         return self._count
@@ -159,24 +161,24 @@ class Observations(Sequence[_Row]):
     @property
     def core_order(self) -> list[int]:
         """Row numbers of the observations in the order of the core: by type."""
-        return [row for own in self.columns for row in own.rows.tolist()]
+        return [row for columns in self.columns for row in columns.rows.tolist()]
 
     def column(self, name: str) -> list[Any]:
         """Return a field of all observations in order, e.g. `points`; also `objects` or `moments`."""
-        found: list[Any] = [None] * self._count
-        for own in self.columns:
-            values = getattr(own, name) if name in ("objects", "moments") else own.table[name]
+        values: list[Any] = [None] * self._count
+        for columns in self.columns:
+            column = getattr(columns, name) if name in ("objects", "moments") else columns.table[name]
             if len(self.columns) == 1:
-                return list(values)
-            for row, value in zip(own.rows.tolist(), values, strict=True):
-                found[row] = value
-        return found
+                return list(column)
+            for row, value in zip(columns.rows.tolist(), column, strict=True):
+                values[row] = value
+        return values
 
     def of_type(self, kind: type[_Kind]) -> list[_Kind]:
         """Return the observations of one type, in order."""
-        columns = [own for own in self.columns if issubclass(own.kind, kind)]
-        found = {row: one for own in columns for row, one in own.numbered()}
-        return [found[row] for row in sorted(found)]
+        same = [columns for columns in self.columns if issubclass(columns.kind, kind)]
+        objects = {row: one for columns in same for row, one in columns.numbered()}
+        return [objects[row] for row in sorted(objects)]
 
 
 def moments(observations: Sequence[Any]) -> list[Moment]:
