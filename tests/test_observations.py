@@ -412,3 +412,23 @@ def test_many_positions_are_added_fast():
     assert time.process_time() - start < 1.0  # 0.1 s on a free machine
     kind, _, photos, *_ = block.observation_groups[0]
     assert (kind, len(photos), photos[-1, 0]) == ("position", count, count - 1)
+
+
+def test_a_block_checks_the_changed_fields(example):
+    block = example.measured()
+    groups = block.observation_groups
+    assert block.replace(title="again", image_sd=0.02).observation_groups is groups
+    assert block.replace(photo_position_sd=1.0).observation_groups is not groups
+    fewer = {name: getattr(block, name)[1:] for name in ("image_photos", "image_points", "image_xy")}
+    for change, code in (
+        ({"image_points": np.zeros(len(block.image_xy), dtype=int)}, "block.repeated-image"),
+        (fewer, "argument.shape"),
+        ({"photo_cameras": [0]}, "error.requires"),
+        ({"point_sd": -1.0}, "block.value.sd"),
+        ({"title": 1}, "argument.kind"),
+        ({"frame": None}, "error.kind"),
+        ({"observations": [Distance("P0", "unknown", 1.0, sd=1.0)]}, "error.absent"),
+    ):
+        with raises(InputError, code):
+            block.replace(**change)
+    assert block.replace(**fewer, image_sd=block.image_sd[1:]).observation_groups[0][0] == groups[0][0]

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, names, number, shaped
+from photogram.arguments.declared import check_fields, check_with, finite, optional
 from photogram.arguments.objects import require
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
@@ -229,14 +230,11 @@ class Drift(Numbers):
 
     KIND = "drift"
 
-    epoch: float | None = None
+    epoch: float | None = field(default=None, metadata=check_with(optional(finite)))
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.epoch is not None:
-            epoch = number(f"epoch of {self.title}", self.epoch)
-            require(np.isfinite(epoch), f"epoch of {self.title}", "finite", value=epoch)
-            object.__setattr__(self, "epoch", epoch)
+        check_fields(self, self.title)
 
 
 @dataclass(frozen=True, eq=False)
