@@ -1,21 +1,37 @@
 """Observations beside images in Python; the tests of the crate compare all kinds with dense algebra."""
 
 import json
+import time
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
 from example_scripts import load
 from message_codes import raises
-from photogram import Attitudes, Block, Distance, InputError, Position, Spheroid, adjust, predict, simulate
+from photogram import (
+    Attitudes,
+    Block,
+    Distance,
+    InputError,
+    LeverArm,
+    Position,
+    Spheroid,
+    adjust,
+    predict,
+    simulate,
+)
 from photogram.giant import Project
 from photogram.network import (
     Attitude,
+    Clock,
     Control,
     Difference,
     EqualHeight,
+    Prior,
     Range,
     Relative,
+    Shift,
     geographic_to_geocentric,
     local_frames,
     project,
@@ -284,3 +300,135 @@ def test_weighted_angles_have_no_singular_place(sd):
     assert result.photo_redundancy[:, 3:].sum() + result.redundancy.sum() + result.point_redundancy.sum() == (
         pytest.approx(result.degrees_of_freedom, abs=1e-6)
     )
+
+
+ARRAYS = [
+    (Position, {"photo": ["a", "b"], "position": np.eye(3)[:2], "sd": 0.1, "lever_arm": [1.0, 2.0, 3.0]}),
+    (Position, {"photo": ["a", "b"], "position": np.eye(3)[:2], "covariance": [np.eye(3), 2 * np.eye(3)]}),
+    (Position, {"photo": ["a", "b"], "position": np.eye(3)[:2], "sd": np.ones((2, 3)), "time": [1.0, 2.0]}),
+    (Attitude, {"photo": ["a", "b"], "attitude": [np.eye(3), np.eye(3)], "sd": [1e-3, 1e-3, 2e-3]}),
+    (Distance, {"first": ["a", "b"], "second": ["b", "c"], "length": [1.0, 2.0], "sd": [0.1, 0.2]}),
+    (
+        Difference,
+        {"first": ["a", "b"], "second": ["b", "c"], "vector": [[1, np.nan, 2], [1, 2, 3]], "sd": 0.1},
+    ),
+    (EqualHeight, {"first": ["a", "b"], "second": ["b", "c"], "sd": 0.1, "difference": [0.0, 1.0]}),
+    (
+        Relative,
+        {"first": ["a"], "second": ["b"], "translation": [[1, 2, 3]], "rotation": np.eye(3), "sd": 1.0},
+    ),
+    (Position, {"photo": ["a", "b"], "position": np.eye(3)[:2], "sd": 0.1, "lever_arm": LeverArm("antenna")}),
+    (Position, {"photo": ["a", "b"], "position": np.eye(3)[:2], "sd": 0.1, "shift": [Shift("1"), None]}),
+]
+
+
+@pytest.mark.parametrize(("kind", "arrays"), ARRAYS)
+def test_observations_of_arrays_are_those_of_objects(kind, arrays):
+    def value(name, row):
+        shape = dict(kind.VALUES) | {"sd": (len(kind.COMPONENTS),), "covariance": (len(kind.COMPONENTS),) * 2}
+        column = arrays[name]
+        if name in (*kind.POINTS, *kind.PHOTOS) or (isinstance(column, list) and name == "shift"):
+            return column[row]
+        many = np.ndim(column) > len(shape.get(name, ())) or (shape.get(name) == (1,) and np.ndim(column))
+        return column[row] if not isinstance(column, LeverArm) and many else column
+
+    observed = kind.from_arrays(**arrays)
+    assert len(observed) == len(arrays[(*kind.POINTS, *kind.PHOTOS)[0]])
+    for row, own in enumerate(observed):
+        single = kind(**{name: value(name, row) for name in arrays})
+        assert (own.name, own.points, own.photos) == (single.name, single.points, single.photos)
+        assert list(map(id, own.unknowns)) == list(map(id, single.unknowns))
+        np.testing.assert_array_equal(own.observed, single.observed)
+        np.testing.assert_array_equal(own.precision, single.precision)
+        again = kind(**{each.name: getattr(own, each.name) for each in fields(kind) if each.init})
+        np.testing.assert_array_equal(again.precision, single.precision)
+
+
+def test_a_block_adjusts_columns_as_objects(example):
+    block = example.measured()
+    positions = block.observations.of_type(Position)
+    columns = Position.from_arrays(
+        photo=[each.photo for each in positions],
+        position=np.array([each.position for each in positions]),
+        sd=positions[0].sd,
+        lever_arm=np.array([each.lever_arm for each in positions]),
+    )
+    others = [each for each in block.observations if not isinstance(each, Position)]
+    mixed = block.replace(observations=[*others[:2], columns, *others[2:]])
+    again = mixed.replace(observations=[mixed.observations, *positions[:1]])
+    assert [type(each) for each in mixed.observations[:3]] == [*map(type, others[:2]), Position]
+    assert len(again.observations.of_type(Position)) == len(positions) + 1
+    one, other = adjust(block.replace(observations=[*others[:2], *positions, *others[2:]])), adjust(mixed)
+    np.testing.assert_array_equal(one.point_positions, other.point_positions)
+    assert one.block.observations == again.replace(observations=mixed.observations).observations
+    assert one.observation_table().equals(other.observation_table())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"position": np.zeros((3, 3))}, "argument.shape"),
+        ({"position": np.full((2, 3), np.nan)}, "error.finite"),
+        ({"photo": ["a", ""]}, "argument.empty-name"),
+        ({"sd": [[0.1] * 3, [0.1, 0.0, 0.1]]}, "position b"),
+        ({"covariance": np.eye(3)}, "error.exclusive"),
+        ({"lever": 1.0}, "error.unknown"),
+        ({"shift": [None]}, "error.count"),
+        ({"time": [0.0, np.inf]}, "error.finite"),
+        ({"clock": Clock("receiver")}, "error.requires"),
+    ],
+)
+def test_arrays_that_cannot_be_observed_are_refused(change, message):
+    good = {"photo": ["a", "b"], "position": np.zeros((2, 3)), "sd": 0.1}
+    with raises(InputError, message):
+        Position.from_arrays(**good | change)
+
+
+def test_types_without_columns_and_missing_arguments_are_refused():
+    with raises(InputError, "error.kind"):
+        Prior.from_arrays(unknown=Shift("1"), sd=1.0)
+    with raises(InputError, "error.missing"):
+        Position.from_arrays(photo=["a"], sd=1.0)
+
+
+def test_many_positions_are_added_fast():
+    count = 50_000
+    names = [str(row) for row in range(count)]
+    block = Block(
+        photo_ids=names,
+        photo_positions=np.zeros((count, 3)),
+        photo_attitudes=0.0,
+        principal_distances=-150.0,
+        point_positions=np.zeros((1, 3)),
+        image_photos=[0],
+        image_points=[0],
+        image_xy=[[0.0, 0.0]],
+        image_sd=0.01,
+    )
+    start = time.process_time()
+    block = block.replace(
+        observations=Position.from_arrays(photo=names, position=np.zeros((count, 3)), sd=0.1)
+    )
+    assert time.process_time() - start < 1.0  # 0.1 s on a free machine
+    kind, _, photos, *_ = block.observation_groups[0]
+    assert (kind, len(photos), photos[-1, 0]) == ("position", count, count - 1)
+
+
+def test_a_block_checks_the_changed_fields(example):
+    block = example.measured()
+    groups = block.observation_groups
+    assert block.replace(title="again", image_sd=0.02).observation_groups is groups
+    assert block.replace(photo_position_sd=1.0).observation_groups is not groups
+    fewer = {name: getattr(block, name)[1:] for name in ("image_photos", "image_points", "image_xy")}
+    for change, code in (
+        ({"image_points": np.zeros(len(block.image_xy), dtype=int)}, "block.repeated-image"),
+        (fewer, "argument.shape"),
+        ({"photo_cameras": [0]}, "error.requires"),
+        ({"point_sd": -1.0}, "block.value.sd"),
+        ({"title": 1}, "argument.kind"),
+        ({"frame": None}, "error.kind"),
+        ({"observations": [Distance("P0", "unknown", 1.0, sd=1.0)]}, "error.absent"),
+    ):
+        with raises(InputError, code):
+            block.replace(**change)
+    assert block.replace(**fewer, image_sd=block.image_sd[1:]).observation_groups[0][0] == groups[0][0]

@@ -6,12 +6,15 @@ Creating one class takes 0.5 ms; all of them take a third of the time of a first
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import asdict, field, fields, replace
 from functools import partial
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
 
-__all__ = ["asdict", "dataclass", "field", "fields", "replace"]
+__all__ = ["asdict", "converting_dataclass", "dataclass", "field", "fields", "replace"]
+
+_Kind = TypeVar("_Kind")
 
 MAKING = RLock()
 APART = {"__repr__", "__eq__", "__hash__"}  # Methods created later: few classes need them
@@ -65,5 +68,15 @@ def _declared(
 
 if TYPE_CHECKING:
     from dataclasses import dataclass
+
+    @dataclass_transform(field_specifiers=(field,))
+    def converting_dataclass(
+        *,
+        eq: bool,
+        repr: bool,  # noqa: A002  # as dataclasses call it
+        frozen: bool,
+        kw_only: bool = False,
+    ) -> Callable[[type[_Kind]], type[_Kind]]:
+        """Declare a dataclass with fields of the types `Converted`."""
 else:
-    dataclass = _declared
+    dataclass = converting_dataclass = _declared

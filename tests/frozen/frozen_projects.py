@@ -13,7 +13,7 @@ import lzma
 import math
 import sys
 from base64 import b64decode, b64encode
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -56,7 +56,7 @@ def leaves(place: str, value: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(value, dict):
         for name, member in value.items():
             yield from leaves(f"{place}[{name}]", member)
-    elif isinstance(value, list | tuple):
+    elif isinstance(value, Sequence) and not isinstance(value, str):
         for member in value:
             yield from leaves(place, member)
     elif isinstance(value, bool | int | float | np.number):

@@ -65,14 +65,13 @@ class Known:
 def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: Floats) -> None:
     """Insert observed attitudes A_obs B', and observed positions minus lever arms."""
     place = {name: row for row, name in enumerate(block.photo_ids)}
-    of_photos = [each for each in block.observations if each.moment is None]
-    positions = [each for each in of_photos if isinstance(each, Position)]
+    positions = [each for each in block.observations.of_type(Position) if each.moment is None]
     for antenna in positions:
         centres[place[antenna.photos[0]]] = axes.positions(antenna.observed[np.newaxis, :3])[0]
         if antenna.shift is not None and axes.spheroid is None:
             centres[place[antenna.photos[0]]] -= antenna.shift.position
-    for each in of_photos:
-        if isinstance(each, Attitude):
+    for each in block.observations.of_type(Attitude):
+        if each.moment is None:
             row = place[each.photos[0]]
             given, known = each.boresight, each.observed[9:18].reshape(3, 3)
             boresight = given.attitude if isinstance(given, Boresight) else known
@@ -91,10 +90,9 @@ def _control(block: Block, axes: Cartesian) -> tuple[Floats, Floats]:
     """Return positions and standard deviations of control in cartesian axes."""
     points, sd = block.point_positions.copy(), block.point_sd.copy()
     place = {name: row for row, name in enumerate(block.point_ids)}
-    for each in block.observations:
-        if isinstance(each, Control):
-            points[place[each.point]] = each.observed
-            sd[place[each.point]] = np.sqrt(np.diagonal(each.precision))
+    for each in block.observations.of_type(Control):
+        points[place[each.point]] = each.observed
+        sd[place[each.point]] = np.sqrt(np.diagonal(each.precision))
     held = np.isfinite(sd)
     points[~held.any(axis=1)] = np.nan
     if axes.spheroid is not None:

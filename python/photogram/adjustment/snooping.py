@@ -328,7 +328,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     # Undetermined values remain fixed here; coefficients of trajectories remain anyway.
     alone = sorted(out.photos - set(np.flatnonzero(timed_photos(block)).tolist()))
     position_sd[alone], attitude_sd[alone] = 0.0, 0.0
-    rows = [row for own, _ in block.observation_groups for row in own]
+    rows = block.observations.core_order
     dropped = {rows[index] for index in gone(trial, out, OBSERVATION)[0].tolist()}
     observed = [
         _observed(getattr(block, f"photo_{name}"), getattr(block, f"photo_{name}_observed"), sd)

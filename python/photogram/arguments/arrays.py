@@ -40,7 +40,8 @@ def shaped(
     """
     array = numbers(name, value, missing=missing)
     if array.ndim == 0:
-        array = np.broadcast_to(array, shape)
+        array = np.full(shape, array)
+        array.flags.writeable = False
     if array.shape != shape:
         raise InputError(phrase("argument.shape", name=name, shape=str(shape), actual=str(array.shape)))
     return frozen(array)
@@ -292,23 +293,24 @@ def probability(name: str, value: float) -> float:
     return value
 
 
-def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> bool:
-    """Return whether a square matrix is symmetric and positive definite.
+def is_covariance(matrices: NDArray[np.float64], *, singular: bool = False) -> NDArray[np.bool_]:
+    """Return which (..., k, k) matrices are symmetric and positive definite.
 
     A singular one may have rows of zeros, and the others may be indefinite by rounding.
     """
-    variances = np.diag(matrix)
+    variances = np.diagonal(matrices, axis1=-2, axis2=-1)
     known = variances > 0
-    if not np.isfinite(matrix).all() or matrix[~known].any() or not (singular or known.all()):
-        return False
-    deviations = np.sqrt(variances[known])
+    good = np.isfinite(matrices).all(axis=(-2, -1)) & (singular | known.all(axis=-1))
+    good &= (known[..., np.newaxis] | (matrices == 0)).all(axis=(-2, -1))
+    deviations = np.sqrt(np.where(known, variances, 1.0))
     with np.errstate(over="ignore", invalid="ignore"):
-        correlations = matrix[np.ix_(known, known)] / deviations / deviations[:, np.newaxis]
-        asymmetry = np.abs(correlations - correlations.T).max(initial=0.0)
+        correlations = matrices / deviations[..., np.newaxis, :] / deviations[..., np.newaxis]
+        asymmetry = np.abs(correlations - np.swapaxes(correlations, -1, -2)).max(axis=(-2, -1), initial=0.0)
     # A correlation that is not finite fails this comparison.
-    if not asymmetry <= (_ROUNDING if singular else _SYMMETRIC):
-        return False
-    return bool(np.linalg.eigvalsh(correlations).min(initial=1.0) > (-_ROUNDING if singular else 0.0))
+    good &= asymmetry <= (_ROUNDING if singular else _SYMMETRIC)
+    correlations = np.where(good[..., np.newaxis, np.newaxis], correlations, np.eye(variances.shape[-1]))
+    smallest = np.linalg.eigvalsh(correlations).min(axis=-1, initial=1.0)
+    return np.asarray(good & (smallest > (-_ROUNDING if singular else 0.0)))
 
 
 def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:

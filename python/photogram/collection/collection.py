@@ -6,17 +6,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.arrays import indices, shaped
 from photogram.arguments.equality import Valued
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import FREE, ONE, Array, Floats, IndexArray
 from photogram.collection.parameters import POSE, parameters_of
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.knots import KNOTTED
-from photogram.network.observations import Observation
+from photogram.network.observations import Observation, Observations
 from photogram.network.tables import numbered
 from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["Collection"]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@converting_dataclass(frozen=True, eq=False, repr=False)
 class Collection(Valued, Brief):
     """Collection of P photos with unknown cameras, n points and m image observations.
 
@@ -61,30 +61,15 @@ class Collection(Valued, Brief):
         right, y up. `docs/cameras.md` describes the other models.
     """
 
-    photo_parameters: Floats
-    point_positions: Floats
-    image_photos: Indices
-    image_points: Indices
-    image_xy: Floats
-    image_sd: Floats = field(default_factory=lambda: np.array(1.0))
-    photo_sd: Floats = field(default_factory=lambda: np.array(np.inf))
-    point_sd: Floats = field(default_factory=lambda: np.array(np.inf))
+    photo_parameters: Array
+    point_positions: Array
+    image_photos: IndexArray
+    image_points: IndexArray
+    image_xy: Array
+    image_sd: Array = field(default=ONE)
+    photo_sd: Array = field(default=FREE)
+    point_sd: Array = field(default=FREE)
     camera: str = "bal"
-
-    if TYPE_CHECKING:
-        # Signature for type checkers: arguments accept more types than the fields.
-        def __init__(
-            self,
-            photo_parameters: ArrayLike,
-            point_positions: ArrayLike,
-            image_photos: ArrayLike,
-            image_points: ArrayLike,
-            image_xy: ArrayLike,
-            image_sd: ArrayLike = ...,
-            photo_sd: ArrayLike = ...,
-            point_sd: ArrayLike = ...,
-            camera: str = "bal",
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         # Models with knots have more than parameters.
@@ -143,9 +128,9 @@ class Collection(Valued, Brief):
         return numbered(len(self.point_positions))
 
     @property
-    def observations(self) -> tuple[Observation, ...]:
+    def observations(self) -> Observations[Observation]:
         """Additional observations: none."""
-        return ()
+        return Observations()
 
     @property
     def image_unit(self) -> str:

@@ -260,7 +260,7 @@ def _apart(given: Floats, found: Floats) -> float:
 
 def distances_in_millimetres(block: Block) -> Hypothesis | None:
     """Compare observed distances with coordinates, to find millimetres."""
-    bars = [each for each in block.observations if isinstance(each, Distance)]
+    bars = block.observations.of_type(Distance)
     if not bars:
         return None
     place = {name: row for row, name in enumerate(block.point_ids)}

@@ -257,7 +257,7 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
             return "control-set", explained
     kinds = ("control", "station", f"{BESIDE}{Position.KIND}")
     weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
-    observed = weighted or any(isinstance(each, Position) for each in block.observations)
+    observed = weighted or bool(block.observations.of_type(Position))
     if observed and doubtful(adjusted.tried(block), *kinds):
         wrong = wrong_positions(block, adjusted)
         if wrong is not None:

@@ -164,7 +164,7 @@ def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
     residuals, marks = mark_residuals(result), result.fiducials
     kind = result.kinds.get(Fiducial.KIND)
     read = [] if kind is None else [result.block.observations[row] for row in kind.rows.tolist()]
-    every = (each for each in result.block.observations if isinstance(each, KnownTogether))
+    every = result.block.observations.of_type(KnownTogether)
     known = [each for each in every if all(isinstance(own, Mark) for own in each.joined)]
     limit = critical_chi_square(CHANCE / len(films), 2)
     for photo, film in films.items():

@@ -87,7 +87,7 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
 
 def _positions(block: Block) -> list[Position]:
     """Return observed positions, including weighted positions of photos."""
-    found = [each for each in block.observations if isinstance(each, Position)]
+    found = block.observations.of_type(Position)
     if any(each.shift is not None or each.drift is not None for each in found):
         return []
     sd = block.photo_position_sd

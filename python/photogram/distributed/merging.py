@@ -143,7 +143,7 @@ def _rest(
         "dropped": sorted((int(row), str(reason)) for row, reason in _all(details, "dropped")),
         "sums_of_squares": outcome.sums_of_squares,
         # In the order of the observation groups of the whole block
-        "adjusted_observations": [observed[row] for rows, _ in block.observation_groups for row in rows],
+        "adjusted_observations": [observed[row] for row in block.observations.core_order],
         "degrees_of_freedom": outcome.degrees_of_freedom,
     }
 

@@ -80,7 +80,7 @@ class CoreEngine:
         freedom = solution.degrees_of_freedom
         _write(folder, _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], freedom))
         # Data without a table; rows refer to the whole block.
-        places = [int(part.observations[row]) for rows, _ in part.block.observation_groups for row in rows]
+        places = [int(part.observations[row]) for row in part.block.observations.core_order]
         observed = zip(places, solution.adjusted_observations, strict=True)
         outcome = {
             "sums_of_squares": solution.sums_of_squares,

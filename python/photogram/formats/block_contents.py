@@ -29,7 +29,7 @@ def posed(block: Block) -> Bools:
 
 def correlated_control(block: Block) -> dict[str, Control]:
     """Return control with correlated coordinates by point name."""
-    return {each.point: each for each in block.observations if isinstance(each, Control)}
+    return {each.point: each for each in block.observations.of_type(Control)}
 
 
 def check_images(block: Block, title: str) -> None:

@@ -51,7 +51,7 @@ def check_systems(
     model = intersected(project, points)
     seen = np.isfinite(model).all(axis=1)
     posed = np.isfinite(block.photo_positions).all(axis=1)
-    gnss = [np.asarray(each.position) for each in block.observations if isinstance(each, Position)]
+    gnss = [np.asarray(each.position) for each in block.observations.of_type(Position)]
     stations = np.vstack([block.photo_positions[posed], *(each[np.newaxis] for each in gnss)])
     firm = np.count_nonzero(seen) > 2
     if not firm and (free or not len(stations)):

@@ -25,7 +25,7 @@ from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.network.observations import Observation, Position
+from photogram.network.observations import Observations, Position
 from photogram.words import Phrase, phrase
 
 TITLE = "OpenSfM reconstruction"
@@ -153,25 +153,27 @@ def _poses(shots: dict[str, Tree]) -> tuple[Floats, Floats]:
     return _photocore.vector_rotations(vectors), translations
 
 
-def _gps(shots: dict[str, Tree], wishes: Wishes, messages: list[Message]) -> list[Observation]:
+def _gps(shots: dict[str, Tree], wishes: Wishes, messages: list[Message]) -> Observations[Position]:
     given = {name: each["gps_position"].numbers(3) for name, each in shots.items() if "gps_position" in each}
     if not given or not any(position.any() for position in given.values()):
-        return []
+        return Observations()
     heights = np.array([position[2] for position in given.values()])
     level = len(given) > 1 and float(np.ptp(heights)) < 1e-6
     if level:
         messages.append(Message(phrase("opensfm.heights")))
-    found: list[Observation] = []
-    for name, position in given.items():
+    deviations = []
+    for name in given:
         dop = shots[name].get("gps_dop", UNKNOWN_DOP)
         sd = np.broadcast_to(wishes.sd.get("gnss", (dop.number(),)), 3).copy()
         if not (sd > 0).all():
             raise dop.error(phrase("format.positive", name="the standard deviation", value=float(sd.min())))
         if level:
             sd[2] = NO_HEIGHT
-        found.append(Position(name, position, sd=sd))
-    messages.append(Message(phrase("opensfm.gnss", n=len(found))))
-    return found
+        deviations.append(sd)
+    messages.append(Message(phrase("opensfm.gnss", n=len(given))))
+    return Position.from_arrays(
+        photo=list(given), position=np.array(list(given.values())), sd=np.array(deviations)
+    )
 
 
 def _frame(model: Tree) -> Frame:
@@ -246,7 +248,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     attitudes = Attitudes(attitude_matrices(block)[rows])
     rotations = attitudes.values("rotation_vector_to_vision").tolist()
     translations = attitudes.translations(block.photo_positions[rows]).tolist()
-    gps = {each.photo: each for each in block.observations if isinstance(each, Position)}
+    gps = {each.photo: each for each in block.observations.of_type(Position)}
     shots: dict[str, Any] = {}
     for row, rotation, translation in zip(rows.tolist(), rotations, translations, strict=True):
         name = block.photo_ids[row]

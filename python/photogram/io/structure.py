@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,7 @@ class Encoder:
             return self._array(given)
         if isinstance(given, list):
             return [self.value(each) for each in given]
-        if isinstance(given, tuple):
+        if isinstance(given, Sequence):
             return {"tuple": [self.value(each) for each in given]}
         if isinstance(given, Mapping):
             return {"map": [[self.value(name), self.value(each)] for name, each in given.items()]}

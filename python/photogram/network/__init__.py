@@ -2,10 +2,10 @@
 
 A :class:`photogram.Block` accepts
 
-* observations, each an `Observation`: of photos `Attitude`, `Range`, `Rate`, `Relative`, `Velocity` and
-  `photogram.Position`; of points `Control`, `Difference`, `EqualHeight`, `OnLevel`, `OnLine`, `OnPlane`,
-  `OnPlumbLine` and `photogram.Distance`; of marks `Fiducial`; of unknowns `Base`, `KnownFilm`,
-  `KnownTogether`, `Prior`, `Smoothness`;
+* observations, each an `Observation`, or many as `Observations`: of photos `Attitude`, `Range`, `Rate`,
+  `Relative`, `Velocity` and `photogram.Position`; of points `Control`, `Difference`, `EqualHeight`,
+  `OnLevel`, `OnLine`, `OnPlane`, `OnPlumbLine` and `photogram.Distance`; of marks `Fiducial`; of unknowns
+  `Base`, `KnownFilm`, `KnownTogether`, `Prior`, `Smoothness`;
 * unknowns shared by observations, each an `Unknown`: `Boresight`, `Drift`, `Instrument`, `Level`, `Line`,
   `Plane`, `PlumbLine`, `Shift` and `photogram.LeverArm`;
 * moving photos, `Timed`: with a `Shutter`, or `Lines` of a `LineSensor` behind a `Lens`; each on its

@@ -34,6 +34,7 @@ from .observations import Fiducial as Fiducial
 from .observations import KnownFilm as KnownFilm
 from .observations import KnownTogether as KnownTogether
 from .observations import Observation as Observation
+from .observations import Observations as Observations
 from .observations import OnLevel as OnLevel
 from .observations import OnLine as OnLine
 from .observations import OnPlane as OnPlane

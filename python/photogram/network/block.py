@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import copy
 import math
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from photogram.arguments.arrays import text, truth_value
+from photogram.arguments.declared import check_with, instance
 from photogram.arguments.equality import Valued
 from photogram.arguments.objects import kind_error
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import (
+    FREE,
+    NONE,
+    Array,
+    Floats,
+    IndexArray,
+    Indices,
+    NamedIndices,
+    Names,
+    OptionalArray,
+)
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field, fields
-from photogram.network.block_checks import check_block, known_poses, unsupported
+from photogram.lazy_dataclasses import converting_dataclass, field, fields
+from photogram.network.block_checks import array, check_block, known_poses, unsupported
 from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import reads_pixels
 from photogram.network.frame import Frame
@@ -26,12 +36,13 @@ from photogram.network.knots import Knots
 from photogram.network.moving_photos import Timed
 from photogram.network.observations import (
     Observation,
+    Observations,
     all_trajectories,
     moments,
     observation_rows,
     of_records,
 )
-from photogram.network.observations.observation import Group
+from photogram.network.observations.columns import Group
 from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
@@ -46,11 +57,17 @@ from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.methods import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
-_NUMBERS: Any = None  # Default for names that are not specified
-_ANGLES = 1e6  # Radians; larger angles do not have the digits that an attitude needs
+if TYPE_CHECKING:
+    from photogram.arguments.types import Converted
+
+    Records = Converted[Sequence[Observation | Observations[Any]], Observations[Observation]]
+else:
+    Records = Sequence[Observation]
+
+NO_RECORDS: Any = Observations()
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+@converting_dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Block(Valued, Brief):
     """Block of photographs with observations and prior information.
 
@@ -135,73 +152,39 @@ class Block(Valued, Brief):
         If both or neither of principal distances and cameras are specified.
     """
 
-    photo_ids: list[str] = _NUMBERS
-    photo_positions: Floats
-    photo_attitudes: Floats
-    principal_distances: Floats | None = None
-    point_ids: list[str] = _NUMBERS
-    point_positions: Floats
-    image_photos: Indices
-    image_points: Indices
-    image_xy: Floats
-    image_sd: Floats
-    photo_position_sd: Floats = field(default_factory=lambda: np.array(np.inf))
-    photo_attitude_sd: Floats = field(default_factory=lambda: np.array(np.inf))
-    point_sd: Floats = field(default_factory=lambda: np.array(np.inf))
-    spheroid: Spheroid | None = None
-    photo_to_ground: bool = False
-    title: str = ""
-    linear_unit: str = "m"
-    refraction: Refraction | None = None
-    photo_positions_observed: Floats | None = None
-    photo_attitudes_observed: Floats | None = None
-    observations: Sequence[Observation] = ()
+    photo_ids: Names = field(default=NONE)
+    photo_positions: Array = field(metadata=array("photos", 3, "not-infinite"))
+    photo_attitudes: Array = field(metadata=array("photos", 3, "angle"))
+    principal_distances: OptionalArray = field(default=NONE, metadata=array("photos", 0, "not-zero"))
+    point_ids: Names = field(default=NONE)
+    point_positions: Array = field(metadata=array("points", 3, "not-infinite"))
+    image_photos: IndexArray = field(metadata=array("images", 0, "photos"))
+    image_points: IndexArray = field(metadata=array("images", 0, "points"))
+    image_xy: Array = field(metadata=array("images", 2, "finite"))
+    image_sd: Array = field(metadata=array("images", 2, "positive"))
+    photo_position_sd: Array = field(default=FREE, metadata=array("photos", 3, "sd"))
+    photo_attitude_sd: Array = field(default=FREE, metadata=array("photos", 3, "sd"))
+    point_sd: Array = field(default=FREE, metadata=array("points", 3, "sd"))
+    spheroid: Spheroid | None = field(default=None, metadata=check_with(instance(Spheroid, None)))
+    photo_to_ground: bool = field(default=False, metadata=check_with(truth_value))
+    title: str = field(default="", metadata=check_with(text))
+    linear_unit: str = field(default="m", metadata=check_with(text))
+    refraction: Refraction | None = field(default=None, metadata=check_with(instance(Refraction, None)))
+    photo_positions_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, "not-infinite"))
+    photo_attitudes_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, "angle"))
+    observations: Records = field(default=NO_RECORDS)
     cameras: Sequence[Camera] = ()
-    photo_cameras: Indices | None = None
+    photo_cameras: NamedIndices = field(default=NONE, metadata=array("photos", 0, "cameras"))
     mounts: Sequence[Mount] = ()
     timed: Sequence[Timed] = ()
     passages: Sequence[Passage] = ()
-    frame: Frame = field(default_factory=Frame)
-    point_check_sd: Floats | None = None
+    frame: Frame = field(default_factory=Frame, metadata=check_with(instance(Frame)))
+    point_check_sd: OptionalArray = field(default=NONE, metadata=array("points", 3, "check-sd"))
     rejected_points = frozenset[str]()
     """Points whose image observations were all rejected; copied with the block, but not a field."""
-    if TYPE_CHECKING:
-        # Signature for type checkers: arguments accept more types than the fields.
-        def __init__(
-            self,
-            *,
-            photo_ids: Iterable[str | int] | None = None,
-            photo_positions: ArrayLike,
-            photo_attitudes: ArrayLike,
-            principal_distances: ArrayLike | None = None,
-            point_ids: Iterable[str | int] | None = None,
-            point_positions: ArrayLike,
-            image_photos: ArrayLike,
-            image_points: ArrayLike,
-            image_xy: ArrayLike,
-            image_sd: ArrayLike,
-            photo_position_sd: ArrayLike = ...,
-            photo_attitude_sd: ArrayLike = ...,
-            point_sd: ArrayLike = ...,
-            spheroid: Spheroid | None = None,
-            photo_to_ground: bool = False,
-            title: str = "",
-            linear_unit: str = "m",
-            refraction: Refraction | None = None,
-            photo_positions_observed: ArrayLike | None = None,
-            photo_attitudes_observed: ArrayLike | None = None,
-            observations: Sequence[Observation] = (),
-            cameras: Sequence[Camera] = (),
-            photo_cameras: ArrayLike | Sequence[str] | None = None,
-            mounts: Sequence[Mount] = (),
-            timed: Sequence[Timed] = (),
-            passages: Sequence[Passage] = (),
-            frame: Frame = ...,
-            point_check_sd: ArrayLike | None = None,
-        ) -> None: ...
 
     def __post_init__(self) -> None:
-        check_block(self)
+        check_block(self, {each.name for each in fields(self)})
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -213,7 +196,7 @@ class Block(Valued, Brief):
         kinds_of_points = ", ".join(f"{count:,} {name}" for name, count in counts.items())
         distances = self.principal_distances
         spheroid = self.spheroid
-        kinds = Counter(each.label for each in self.observations)
+        kinds = {own.label: len(own.rows) for own in self.observations.columns}
         rows = [
             ("photos", few(self.photo_ids)),
             ("points", few(self.point_ids)),
@@ -260,7 +243,8 @@ class Block(Valued, Brief):
     @cached_property
     def unknowns(self) -> list[Unknown]:
         """Unknowns shared by observations, mounted photos and trajectories, in order."""
-        of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
+        own_unknowns = dict.fromkeys(self.observations.column("unknowns"))
+        of_observations = (each for own in own_unknowns for each in own if each is not None)
         sensors = [mount.sensor for mount in self.mounts]
         sensors += [each.sensor for each in self.timed if each.sensor is not None]
         of_times = [scalar for each in self.timed for scalar in each.scalars]
@@ -270,8 +254,8 @@ class Block(Valued, Brief):
         return different_unknowns([*sensors, *of_times, *coefficients, *records, *passed, *of_observations])
 
     @cached_property
-    def observation_groups(self) -> list[tuple[list[int], Group]]:
-        """Observations by type: their rows, and their arrays for the core."""
+    def observation_groups(self) -> list[Group]:
+        """Arrays for the core of the observations of each type."""
         return observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
     @property
@@ -373,7 +357,7 @@ class Block(Valued, Brief):
         )
 
     def replace(self, **changes: Any) -> Self:
-        """Return a validated block with some fields replaced; other arrays are shared.
+        """Return a block with some fields replaced and validated; other fields are shared.
 
         `point_check_sd` is dropped if the number of points changes, unless it is replaced as well.
 
@@ -382,14 +366,15 @@ class Block(Valued, Brief):
         InputError
             If a name is not a field, or the class rejects a value.
         """
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        if unknown := sorted(changes.keys() - values.keys()):
-            raise InputError(phrase("error.unknown", kind="field", name=unknown[0], names=list(values)))
+        names = [each.name for each in fields(self)]
+        if unknown := sorted(changes.keys() - set(names)):
+            raise InputError(phrase("error.unknown", kind="field", name=unknown[0], names=names))
         points = changes.get("point_ids")
         if points is not None and len(points) != len(self.point_ids):
-            values["point_check_sd"] = None
-        own = type(self)(**{**values, **changes})
-        own._set("rejected_points", self.rejected_points)
+            changes = {"point_check_sd": None} | changes
+        own = copy.copy(self)
+        vars(own).update(changes)
+        check_block(own, changes.keys())
         return own
 
     def with_fixed_photos(self) -> Self:

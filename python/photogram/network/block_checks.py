@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,20 +15,17 @@ from photogram.arguments.arrays import (
     length,
     repeated_pairs,
     shaped,
-    text,
-    truth_value,
 )
-from photogram.arguments.objects import instances, kind_error, require_kind
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import fields
 from photogram.network.films import check_scans
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import checked_timed, own_trajectories
-from photogram.network.observations import Observation, Rate, Velocity
+from photogram.network.observations import Rate, Velocity
+from photogram.network.observations.observation import checked_observations
 from photogram.network.observations.unknowns import with_knots, with_smoothness
 from photogram.network.passages import Figure, checked_passages
-from photogram.network.refraction import Refraction, metres_per_unit
+from photogram.network.refraction import metres_per_unit
 from photogram.network.rigs import checked_mounts
 from photogram.network.tables import checked_cameras, different, numbered, photo_indices
 from photogram.words import Phrase, phrase
@@ -47,56 +44,78 @@ RULES: dict[str, Callable[[Floats], Bools]] = {
     "check-sd": lambda values: np.isnan(values) | ((values >= 0) & ~np.isinf(values)),
 }
 _WITH_NAN = ("not-infinite", "angle", "check-sd")
-ARRAYS = (
-    ("photo_positions", "photos", 3, "not-infinite"),
-    ("photo_attitudes", "photos", 3, "angle"),
-    ("principal_distances", "photos", 0, "not-zero"),
-    ("point_positions", "points", 3, "not-infinite"),
-    ("photo_position_sd", "photos", 3, "sd"),
-    ("photo_attitude_sd", "photos", 3, "sd"),
-    ("point_sd", "points", 3, "sd"),
-    ("photo_positions_observed", "photos", 3, "not-infinite"),
-    ("photo_attitudes_observed", "photos", 3, "angle"),
-    ("point_check_sd", "points", 3, "check-sd"),
-    ("image_xy", "images", 2, "finite"),
-    ("image_sd", "images", 2, "positive"),
-)
-"""Arrays of a block: name, rows, columns (0 for one number in each row), and rule."""
-OPTIONAL = ("photo_positions_observed", "photo_attitudes_observed", "point_check_sd")
+_IMAGES = frozenset({"image_photos", "image_points", "image_xy", "image_sd"})
+_ALONE = _IMAGES | {"title", "linear_unit", "refraction", "frame", "point_check_sd"}
+"""Fields that observations, mounted photos, trajectories and image transformations do not depend on."""
 
 
-def check_block(block: Block) -> None:
-    """Convert and check all fields of a new block."""
-    for name, positions in (("photo_ids", "photo_positions"), ("point_ids", "point_positions")):
-        names = getattr(block, name)
-        names = numbered(length(positions, getattr(block, positions))) if names is None else names
-        block._set(name, different(name, names))
-    block._set("cameras", checked_cameras(block.cameras))
-    if not block.cameras and block.photo_cameras is not None:
-        raise InputError(phrase("error.requires", name="photo_cameras", other="cameras"))
-    if block.cameras and block.principal_distances is not None:
-        raise InputError(phrase("error.exclusive", first="principal_distances", second="cameras"))
-    photos, points = len(block.photo_ids), len(block.point_ids)
-    if block.cameras:
-        block._set("photo_cameras", frozen(photo_indices(block.photo_cameras, block.cameras, photos)))
-    counts = {"photos": photos, "points": points, "images": length("image_photos", block.image_photos)}
-    for name, rows, columns, rule in ARRAYS:
-        if name == "image_xy":  # Errors of images name their photos and points
-            for of, count in (("image_photos", photos), ("image_points", points)):
-                block._set(of, indices(of, getattr(block, of), counts["images"], count))
-        value = getattr(block, name)
-        if value is None and (name in OPTIONAL or (name == "principal_distances" and block.cameras)):
-            continue
-        shape = (counts[rows], columns) if columns else (counts[rows],)
-        array = shaped(name, value, shape, missing=rule in _WITH_NAN)
-        block._set(name, array)
-        refuse(block, name, rows, ~RULES[rule](array), rule)
+def array(rows: str, columns: int, rule: str) -> dict[str, Any]:
+    """Declare an array field: rows, columns (0 for one number in each row), and rule of values or indices."""
+    return {"rows": rows, "columns": columns, "rule": rule}
+
+
+def rows_of(kind: type[Any], rows: str) -> tuple[str, ...]:
+    """Return the declared arrays of a class with one row for each photo, point or image."""
+    return tuple(each.name for each in fields(kind) if each.metadata.get("rows") == rows)
+
+
+def check_block(block: Block, changed: Collection[str]) -> None:
+    """Convert and check the changed fields of a block, and what depends on them."""
+    changed = set(changed)
+    if changed & {"photo_ids", "point_ids"}:
+        changed = {each.name for each in fields(block)}
+        for name, positions in (("photo_ids", "photo_positions"), ("point_ids", "point_positions")):
+            names = getattr(block, name)
+            names = numbered(length(positions, getattr(block, positions))) if names is None else names
+            block._set(name, different(name, names))
+    if changed & {"image_photos", "image_points"}:
+        changed |= _IMAGES
+    if changed & {"cameras", "photo_cameras", "principal_distances"}:
+        changed |= {"cameras", "photo_cameras", "principal_distances"}
+        block._set("cameras", checked_cameras(block.cameras))
+        if not block.cameras and block.photo_cameras is not None:
+            raise InputError(phrase("error.requires", name="photo_cameras", other="cameras"))
+        if block.cameras and block.principal_distances is not None:
+            raise InputError(phrase("error.exclusive", first="principal_distances", second="cameras"))
+    counts = {"photos": len(block.photo_ids), "points": len(block.point_ids)}
+    counts["images"] = length("image_photos", block.image_photos)
+    for each in fields(block):
+        if each.name in changed:
+            _check_field(block, each, counts)
     unknown_control = np.isfinite(block.point_sd) & np.isnan(block.point_positions)
     refuse(block, "point_positions", "points", unknown_control, "control-unknown")
     _check_observed(block)
-    _check_repeated(block)
-    _check_conventions(block)
-    _check_observations(block)
+    if changed & _IMAGES:
+        _check_repeated(block)
+    if block.refraction is not None:
+        metres_per_unit(block.linear_unit)
+    if changed - _ALONE:
+        for name in ("unknowns", "observation_groups"):
+            vars(block).pop(name, None)
+        _check_observations(block)
+    if changed - _ALONE or "image_photos" in changed:
+        photo_cameras = block.photo_cameras if block.cameras else None
+        check_scans(block.passages, block.photo_ids, block.cameras, photo_cameras, block.image_photos)
+
+
+def _check_field(block: Block, declared: Any, counts: Mapping[str, int]) -> None:
+    name, rules = declared.name, declared.metadata
+    value = getattr(block, name)
+    if "check" in rules:
+        block._set(name, rules["check"](name, value))
+    if "rule" not in rules:
+        return
+    rows, rule = rules["rows"], rules["rule"]
+    if rule == "cameras":
+        if block.cameras:
+            block._set(name, frozen(photo_indices(value, block.cameras, counts[rows])))
+    elif rule not in RULES:
+        block._set(name, indices(name, value, counts[rows], counts[rule]))
+    elif value is not None or declared.default is not None or (rule == "not-zero" and not block.cameras):
+        shape = (counts[rows], rules["columns"]) if rules["columns"] else (counts[rows],)
+        numbers = shaped(name, value, shape, missing=rule in _WITH_NAN)
+        block._set(name, numbers)
+        refuse(block, name, rows, ~RULES[rule](numbers), rule)
 
 
 def refuse(block: Block, name: str, rows: str, bad: Bools, rule: str) -> None:
@@ -138,22 +157,8 @@ def _check_repeated(block: Block) -> None:
         raise InputError(phrase("block.repeated-image", **names, first=first, second=second))
 
 
-def _check_conventions(block: Block) -> None:
-    text("title", block.title)
-    text("linear_unit", block.linear_unit)
-    block._set("photo_to_ground", truth_value("photo_to_ground", block.photo_to_ground))
-    require_kind("spheroid", block.spheroid, Spheroid, optional=True)
-    require_kind("frame", block.frame, Frame)
-    require_kind("refraction", block.refraction, Refraction, optional=True)
-    if block.refraction is not None:
-        metres_per_unit(block.linear_unit)
-
-
 def _check_observations(block: Block) -> None:
-    block._set("observations", instances("observations", block.observations, Observation))
-    for row, observation in enumerate(block.observations):
-        if not observation.KIND:
-            raise kind_error(f"observations[{row}]", "an Observation", observation)
+    block._set("observations", checked_observations(block.observations))
     block._set("mounts", checked_mounts(block.mounts, block.photo_ids))
     _check_free_poses(block, [mount.photo for mount in block.mounts], "mounted")
     _check_timed(block)
@@ -165,12 +170,10 @@ def _check_observations(block: Block) -> None:
     figures = {
         name: each.title for each in block.passages if isinstance(each, Figure) for name in each.points
     }
-    observed = {name for each in block.observations for name in each.points} if figures else set()
+    observed = {name for own in block.observations.column("points") for name in own} if figures else set()
     for row, name in enumerate(block.point_ids if figures else ()):
         if name in figures and (block.point_sd[row].any() or name in observed):
             raise InputError(phrase("block.figure-point", point=name, figure=figures[name]))
-    photo_cameras = block.photo_cameras if block.cameras else None
-    check_scans(block.passages, block.photo_ids, block.cameras, photo_cameras, block.image_photos)
 
 
 def _check_free_poses(block: Block, photos: list[str], rule: str) -> None:
@@ -211,17 +214,18 @@ def _check_motions(block: Block) -> None:
     sensors = {each.photo: each.sensor for each in block.timed}
     # The mean time of a scanner's images changes if one image is removed.
     without_time = {each.photo for each in block.timed if each.lines is not None and each.time is None}
-    for each in block.observations:
-        if each.moment is not None:
+    for own in block.observations.columns:
+        if not (without_time or issubclass(own.kind, Rate | Velocity)):
             continue
-        photo: Any = next((name for name in each.photos if name in without_time), None)
-        code = "scanner-time" if photo else ""
-        if not code and isinstance(each, Rate | Velocity):
-            photo = each.photos[0]
-            at_rest = photo not in sensors and photo in block.photo_ids
-            code = "at-rest" if at_rest else "sensor" if sensors.get(photo) is not None else ""
-        if code:
-            raise InputError(phrase(f"block.motion.{code}", kind=each.KIND, photo=photo))
+        for names, moment in zip(own.table["photos"], own.moments, strict=True):
+            photo: Any = next((name for name in names if name in without_time), None)
+            code = "scanner-time" if photo else ""
+            if not code and issubclass(own.kind, Rate | Velocity):
+                photo = names[0]
+                at_rest = photo not in sensors and photo in block.photo_ids
+                code = "at-rest" if at_rest else "sensor" if sensors.get(photo) is not None else ""
+            if code and moment is None:
+                raise InputError(phrase(f"block.motion.{code}", kind=own.kind.KIND, photo=photo))
 
 
 def known_poses(block: Block) -> Bools:

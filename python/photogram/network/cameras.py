@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,11 +20,12 @@ from photogram.arguments.arrays import (
     shaped,
     text,
 )
+from photogram.arguments.declared import check_fields, check_with, choice, optional
 from photogram.arguments.equality import Valued
 from photogram.arguments.objects import kind_error, require
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import NONE, Floats, Indices, OptionalArray
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
 from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
@@ -57,7 +58,12 @@ def _names() -> tuple[str, ...]:
     return tuple(name for name in _photocore.CAMERAS if not name.endswith(_MEASURED))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+def _model(name: str, value: str) -> str:
+    one_of(name, value, _names())
+    return value
+
+
+@converting_dataclass(frozen=True, eq=False, repr=False)
 class Camera(Valued, Brief):
     """Camera model with parameters, shared by one photo or many.
 
@@ -99,48 +105,29 @@ class Camera(Valued, Brief):
         If knots have another shape or do not belong to the model.
     """
 
-    model: str
+    model: str = field(metadata=check_with(_model))
     parameters: Mapping[str, float]
     sd: Mapping[str, float] | float = 0.0
-    name: str = ""
-    unit: ImageUnit | None = None
+    name: str = field(default="", metadata=check_with(text))
+    unit: ImageUnit | None = field(default=None, metadata=check_with(optional(choice(ImageUnit))))
     covariance: tuple[Sequence[str], ArrayLike] | None = None
-    weights: Weights = "corrected"
-    knots: Floats | None = None
-    knot_sd: Floats | None = None
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            model: str,
-            parameters: Mapping[str, float],
-            sd: Mapping[str, float] | float = 0.0,
-            name: str = "",
-            unit: ImageUnit | None = None,
-            covariance: tuple[Sequence[str], ArrayLike] | None = None,
-            weights: Weights = "corrected",
-            knots: ArrayLike | None = None,
-            knot_sd: ArrayLike | None = None,
-        ) -> None: ...
+    weights: Weights = field(default="corrected", metadata=check_with(choice(Weights)))
+    knots: OptionalArray = field(default=NONE)
+    knot_sd: OptionalArray = field(default=NONE)
 
     def __post_init__(self) -> None:
-        one_of("model", self.model, _names())
-        text("name", self.name)
+        check_fields(self)
         if self.unit is None:
-            self._set("unit", "mm" if "c" in self.names else "px")
-        one_of("unit", self.unit, get_args(ImageUnit))
-        one_of("weights", self.weights, get_args(Weights))
+            vars(self)["unit"] = "mm" if "c" in self.names else "px"
         forward = self.weights == "measured" and self.direction == "forward"
         require(not forward, f"camera {self.title}", "not-applicable", name="weights", other=self.model)
-        self._set("parameters", self._checked_parameters())
-        self._set("covariance", self._checked_covariance())
-        self._set("sd", self._checked_sd())
-        self._set("knots", checked_knots(self.title, self.model, self.parameters, self.knots))
+        own = vars(self)
+        own["parameters"] = self._checked_parameters()
+        own["covariance"] = self._checked_covariance()
+        own["sd"] = self._checked_sd()
+        own["knots"] = checked_knots(self.title, self.model, self.parameters, self.knots)
         given = 0.0 if self.knot_sd is None else self.knot_sd
-        self._set("knot_sd", checked_knot_sd(self.title, self.knots, given))
-
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
+        own["knot_sd"] = checked_knot_sd(self.title, self.knots, given)
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the camera, as shown by its `repr` and in notebooks."""

@@ -76,7 +76,7 @@ def block_network(
         block.image_points,
         image_xy,
         block.image_sd,
-        observation_groups=[group for _, group in block.observation_groups],
+        observation_groups=block.observation_groups,
         unknowns=[each.row() for each in unknowns],
         mounts=mount_rows(block.mounts, block.timed, block.photo_ids, unknowns),
         **flown,

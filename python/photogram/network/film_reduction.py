@@ -48,9 +48,8 @@ def camera_images(block: Block) -> Floats:
 def _to_marks(block: Block, images: Floats) -> Floats:
     """Correct the images of each photo by an affine map fitted to its marks; (m, 2)."""
     read: dict[str, list[Fiducial]] = {}
-    for each in block.observations:
-        if isinstance(each, Fiducial):
-            read.setdefault(each.photo, []).append(each)
+    for each in block.observations.of_type(Fiducial):
+        read.setdefault(each.photo, []).append(each)
     rows = {name: row for row, name in enumerate(block.photo_ids)}
     for photo, own in read.items():
         film = own[0].film

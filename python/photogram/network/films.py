@@ -13,8 +13,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, names, one_of, shaped
-from photogram.arguments.objects import instances, kind_error, require, require_kind
+from photogram.arguments.arrays import argument_error, one_of, shaped
+from photogram.arguments.declared import check_fields, check_with, instance, numbers, object_name
+from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -98,16 +99,15 @@ class Readings:
         (hx, hy) mm, half ranges of the scanner polynomials.
     """
 
-    pitch: float = 1.0
-    origin: tuple[float, float] = (0.0, 0.0)
+    pitch: float = field(default=1.0, metadata=check_with(numbers((), "positive")))
+    origin: tuple[float, float] = field(default=(0.0, 0.0), metadata=check_with(numbers((2,), "finite")))
     down: bool = False
-    half_range: tuple[float, float] = (1.0, 1.0)
+    half_range: tuple[float, float] = field(
+        default=(1.0, 1.0), metadata=check_with(numbers((2,), "positive"))
+    )
 
     def __post_init__(self) -> None:
-        for name, shape in (("pitch", ()), ("origin", (2,)), ("half_range", (2,))):
-            value = shaped(f"{name} of readings", getattr(self, name), shape)
-            good = np.isfinite(value).all() and (name == "origin" or (value > 0).all())
-            require(good, f"{name} of readings", "finite" if name == "origin" else "positive", value=value)
+        check_fields(self, "readings")
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,10 +240,10 @@ class Film:
         Whether the film was scanned from the emulsion side (mirrored).
     """
 
-    placement: FilmPlacement
-    size: FilmSize
-    scanner: Scanner
-    readings: Readings
+    placement: FilmPlacement = field(metadata=check_with(instance(FilmPlacement)))
+    size: FilmSize = field(metadata=check_with(instance(FilmSize)))
+    scanner: Scanner = field(metadata=check_with(instance(Scanner)))
+    readings: Readings = field(metadata=check_with(instance(Readings)))
     bend: FilmBend | None = None
     projective: bool = False
     roll: Roll | None = None
@@ -252,14 +252,7 @@ class Film:
     mirrored: bool = False
 
     def __post_init__(self) -> None:
-        parts = (
-            ("placement", FilmPlacement),
-            ("size", FilmSize),
-            ("scanner", Scanner),
-            ("readings", Readings),
-        )
-        for name, kind in parts:
-            require_kind(f"{name} of a film", getattr(self, name), kind)
+        check_fields(self, "a film")
         if len(self.curves) not in (0, 6):
             raise kind_error("curves of a scanner", "6 or 0 objects", len(self.curves))
 
@@ -297,12 +290,11 @@ class Scan(Passage):
 
     KIND = "scan"
 
-    photo: str
-    film: Film
+    photo: str = field(metadata=check_with(object_name))
+    film: Film = field(metadata=check_with(instance(Film)))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "photo", names("scan", [self.photo])[0])
-        require_kind(f"film of photo {self.photo}", self.film, Film)
+        check_fields(self, "a scan")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, names, number, numbers, one_of, shaped
+from photogram.arguments.arrays import argument_error, number, numbers, shaped
+from photogram.arguments.declared import (
+    array,
+    check_fields,
+    check_with,
+    choice,
+    finite,
+    instance,
+    object_name,
+    optional,
+)
 from photogram.arguments.equality import Valued
-from photogram.arguments.objects import instances, kind_error, require, require_kind
+from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.lens import Lens
 from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
@@ -56,10 +66,10 @@ class Shutter:
 
     readout: Readout | float
     edges: tuple[float, float]
-    direction: Direction = "down"
+    direction: Direction = field(default="down", metadata=check_with(choice(Direction)))
 
     def __post_init__(self) -> None:
-        one_of("direction", self.direction, get_args(Direction))
+        check_fields(self)
         first, last = shaped("edges of a shutter", self.edges, (2,)).tolist()
         if not np.isfinite([first, last]).all() or first == last:
             raise kind_error("edges of a shutter", "two different coordinates", self.edges)
@@ -138,15 +148,15 @@ class LineSensor(Valued):
     s0: float
     x0: float = 0.0
     y0: float = 0.0
-    lens: Lens | None = None
+    lens: Lens | None = field(default=None, metadata=check_with(instance(Lens, None)))
     bends: ArrayLike | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self, "a line of sensors")
         pitch = shaped("pitch of a line of sensors", self.pitch, (2,))
         if not (np.isfinite(pitch).all() and pitch.any()):
             raise kind_error("pitch of a line of sensors", "finite and not 0", self.pitch)
         object.__setattr__(self, "pitch", tuple(pitch.tolist()))
-        require_kind("lens of a line of sensors", self.lens, Lens, optional=True)
         if self.bends is not None:
             rows = numbers("bends of a line of sensors", self.bends)
             sound = rows.ndim == 2 and rows.shape[1] == 3 and len(rows) and np.isfinite(rows).all()
@@ -202,18 +212,6 @@ class LineSensor(Valued):
         return samples, (places - self.places(samples)) @ np.array([-along[1], along[0]])
 
 
-_KINDS: dict[str, type] = {
-    "trajectory": Trajectory,
-    "shutter": Shutter,
-    "lines": Lines,
-    "line_sensor": LineSensor,
-    "sensor": Sensor,
-    "offset": Clock,
-    "rate": Readout,
-}
-"""Types of some fields of a timed photo that may be None."""
-
-
 @dataclass(frozen=True, eq=False)
 class Moment:
     """Time on a trajectory to which an additional observation refers."""
@@ -261,28 +259,22 @@ class Timed:
     """
 
     photo: str
-    trajectory: Trajectory | None = None
-    time: float | None = None
-    shutter: Shutter | None = None
-    lines: Lines | None = None
-    line_sensor: LineSensor | None = None
-    sensor: Sensor | None = None
-    offset: Clock | None = None
-    rate: Readout | None = None
-    velocity: ArrayLike = 0.0
-    rotation_rate: ArrayLike = 0.0
-    sd_velocity: ArrayLike = np.inf
-    sd_rate: ArrayLike = np.inf
+    trajectory: Trajectory | None = field(default=None, metadata=check_with(instance(Trajectory, None)))
+    time: float | None = field(default=None, metadata=check_with(optional(finite)))
+    shutter: Shutter | None = field(default=None, metadata=check_with(instance(Shutter, None)))
+    lines: Lines | None = field(default=None, metadata=check_with(instance(Lines, None)))
+    line_sensor: LineSensor | None = field(default=None, metadata=check_with(instance(LineSensor, None)))
+    sensor: Sensor | None = field(default=None, metadata=check_with(instance(Sensor, None)))
+    offset: Clock | None = field(default=None, metadata=check_with(instance(Clock, None)))
+    rate: Readout | None = field(default=None, metadata=check_with(instance(Readout, None)))
+    velocity: ArrayLike = field(default=0.0, metadata=check_with(array((3,))))
+    rotation_rate: ArrayLike = field(default=0.0, metadata=check_with(array((3,))))
+    sd_velocity: ArrayLike = field(default=np.inf, metadata=check_with(array((3,))))
+    sd_rate: ArrayLike = field(default=np.inf, metadata=check_with(array((3,))))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "photo", names("photo of a trajectory", [self.photo])[0])
-        for name, kind in _KINDS.items():
-            require_kind(f"{name} of photo {self.photo}", getattr(self, name), kind, optional=True)
-        if self.time is not None and not np.isfinite(number(f"time of photo {self.photo}", self.time)):
-            raise argument_error(f"time of photo {self.photo}", "finite", value=self.time)
-        for name in ("velocity", "rotation_rate", "sd_velocity", "sd_rate"):
-            array = shaped(f"{name} of photo {self.photo}", getattr(self, name), (3,))
-            object.__setattr__(self, name, array)
+        vars(self)["photo"] = object_name("photo of a trajectory", self.photo)
+        check_fields(self, f"photo {self.photo}")
         scanner = self.lines is not None
         where = f"photo {self.photo}"
         require(

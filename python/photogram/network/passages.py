@@ -8,10 +8,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, names, shaped
-from photogram.arguments.objects import instances, kind_error, require, require_kind
+from photogram.arguments.arrays import argument_error, names
+from photogram.arguments.declared import array, check_fields, check_with, instance
+from photogram.arguments.objects import instances, kind_error
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.unknowns import Numbers, Unknown
 
 PassageRow = tuple[str, list[int], list[int], Floats]
@@ -68,18 +69,15 @@ class Figure(Passage):
 
     KIND = "figure"
 
-    bend: Bend
+    bend: Bend = field(metadata=check_with(instance(Bend)))
     points: Sequence[str]
     shifts: ArrayLike
 
     def __post_init__(self) -> None:
-        require_kind("bend of a figure", self.bend, Bend)
-        object.__setattr__(self, "points", tuple(names("points of a figure", self.points)))
-        shifts = shaped(f"shifts of the figure {self.bend.name}", self.shifts, (len(self.points), 2, 3))
-        require(
-            np.isfinite(shifts).all(), f"shifts of the figure {self.bend.name}", "finite", value="NaN or inf"
-        )
-        object.__setattr__(self, "shifts", shifts)
+        check_fields(self, "a figure")
+        points = tuple(names("points of a figure", self.points))
+        shifts = array((len(points), 2, 3), "finite")(f"shifts of the {self.title}", self.shifts)
+        vars(self).update(points=points, shifts=shifts)
 
     @property
     def title(self) -> str:

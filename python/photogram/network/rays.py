@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
@@ -133,16 +135,9 @@ class Rays:
 
     def totals(self) -> tuple[Floats, Floats, Floats]:
         """Sum the equations of the rays of each point: (n, 3, 3), (n, 3) and ray counts (n,)."""
-        across, right = self.equations()
-        points, count = self.block.image_points, len(self.block.point_ids)
-        used = self.used.astype(np.float64)
-
-        def total(values: Floats) -> Floats:
-            return np.bincount(points, weights=values * used, minlength=count).astype(np.float64)
-
-        normal = np.array([[total(across[:, i, j]) for j in range(3)] for i in range(3)]).transpose(2, 0, 1)
-        constant = np.array([total(right[:, i]) for i in range(3)]).T
-        return normal, constant, total(np.ones(len(points)))
+        across, right = (each[self.used] for each in self.equations())
+        points, count = self.block.image_points[self.used], len(self.block.point_ids)
+        return sums_of(points, across, count), sums_of(points, right, count), counts_of(points, count)
 
     def at(self, positions: Floats) -> Intersection:
         """Return the residuals of all images for given (n, 3) positions in the metric axes."""
@@ -182,10 +177,20 @@ def meet_rays(points: Indices, count: int, centres: Floats, directions: Floats) 
     across = np.eye(3) - directions[:, :, np.newaxis] * directions[:, np.newaxis]
     # Subtract a nearby position, because geocentric coordinates are large.
     origin = np.median(centres, axis=0) if len(centres) else np.zeros(3)
-    normal, constant = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    np.add.at(normal, points, across)
-    np.add.at(constant, points, np.einsum("mij,mj->mi", across, centres - origin))
-    return meet(normal, constant, np.bincount(points, minlength=count).astype(np.float64)) + origin
+    constant = sums_of(points, np.einsum("mij,mj->mi", across, centres - origin), count)
+    return meet(sums_of(points, across, count), constant, counts_of(points, count)) + origin
+
+
+def sums_of(rows: Indices, values: Floats, count: int) -> Floats:
+    """Return the sums (count, ...) of the values (m, ...) with the same row number."""
+    flat = values.reshape(len(values), math.prod(values.shape[1:]))
+    columns = [np.bincount(rows, column, count) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(count, *values.shape[1:]).astype(np.float64, copy=False)
+
+
+def counts_of(rows: Indices, count: int) -> Floats:
+    """Return how often each row number occurs, (count,)."""
+    return np.bincount(rows, minlength=count).astype(np.float64)
 
 
 def meet(normal: Floats, constant: Floats, rays: Floats) -> Floats:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.arguments.arrays import names
-from photogram.arguments.objects import instances, require_kind
+from photogram.arguments.declared import check_fields, check_with, instance, object_name
+from photogram.arguments.objects import instances
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.moving_photos import Timed, require_photos
 from photogram.network.unknowns import Sensor, Unknown
 from photogram.words import phrase
@@ -34,14 +34,12 @@ class Mount:
         Pose of the sensor in the frame, one object for all its photos.
     """
 
-    photo: str
-    frame: str
-    sensor: Sensor
+    photo: str = field(metadata=check_with(object_name))
+    frame: str = field(metadata=check_with(object_name))
+    sensor: Sensor = field(metadata=check_with(instance(Sensor)))
 
     def __post_init__(self) -> None:
-        require_kind(f"sensor of photo {self.photo}", self.sensor, Sensor)
-        for name, value in zip(("photo", "frame"), names("mount", (self.photo, self.frame)), strict=True):
-            object.__setattr__(self, name, value)
+        check_fields(self, "a mount")
 
 
 def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:

@@ -21,7 +21,7 @@ from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, photo_axes
-from photogram.network.observations import Attitude, Distance, Observation, Position
+from photogram.network.observations import Attitude, Distance, Observation, Observations, Position
 from photogram.network.rigs import Mount
 from photogram.network.simulated_motion import photo_angles, rotations_of
 from photogram.network.simulation import Simulation
@@ -86,7 +86,7 @@ def with_gnss(
         deviation * random.standard_normal((strips.max() + 1, 3)) for deviation in (shift_sd, drift_sd)
     )
     errors = sd * random.standard_normal(centres.shape)
-    parts: list[list[Observation]] = [[], []]
+    parts = []
     since = times - (np.bincount(strips, times) / np.bincount(strips))[strips]
     moved = shifts[strips] + since[:, np.newaxis] * drifts[strips]
     middle = np.median(truth.photo_positions, axis=0)[np.newaxis]
@@ -98,19 +98,11 @@ def with_gnss(
     for which, noise in enumerate((np.zeros_like(errors), errors)):
         along = axes.from_local(noise[:, :, np.newaxis], truth.photo_positions)[..., 0]
         observed = axes.from_cartesian(antennas + along)
-        for photo, strip in enumerate(strips.tolist()):
-            shift, drift = (None if each is None else each[which][strip] for each in own)
-            parts[which].append(
-                Position(
-                    truth.photo_ids[photo],
-                    observed[photo],
-                    sd=sd,
-                    lever_arm=arms[which],
-                    shift=shift,
-                    drift=drift,
-                    time=float(times[photo]),
-                )
-            )
+        shift, drift = (each and [each[which][strip] for strip in strips.tolist()] for each in own)
+        unknowns = {"lever_arm": arms[which], "shift": shift, "drift": drift}
+        parts.append(
+            Position.from_arrays(photo=truth.photo_ids, position=observed, sd=sd, time=times, **unknowns)
+        )
     return _observed(simulation, *parts)
 
 
@@ -147,10 +139,7 @@ def with_inertial(
     errors = rotations_of(sd * random.standard_normal((len(local), 3)))
     known, unknown = Boresight("inertial unit", turn, 0.0), Boresight("inertial unit")
     exact, noisy = (
-        [
-            Attitude(name, matrix, sd=sd, boresight=own)
-            for name, matrix in zip(truth.photo_ids, matrices, strict=True)
-        ]
+        Attitude.from_arrays(photo=truth.photo_ids, attitude=matrices, sd=sd, boresight=own)
         for matrices, own in ((local, known), (local @ errors, unknown))
     )
     return _observed(simulation, exact, noisy)
@@ -198,14 +187,11 @@ def with_distances(
     first, second = random.permutation(len(truth.point_ids))[: 2 * count].reshape(2, -1)
     places = Cartesian(truth.spheroid).positions(truth.point_positions)
     lengths = scale * np.linalg.norm(places[second] - places[first], axis=1) + constant
-    names = [(truth.point_ids[p], truth.point_ids[q]) for p, q in zip(first, second, strict=True)]
+    names = {"first": [truth.point_ids[p] for p in first], "second": [truth.point_ids[q] for q in second]}
     known = Instrument("rangefinder", scale, constant, 0.0), Instrument("rangefinder")
     errors = sd * random.standard_normal(count)
     exact, noisy = (
-        [
-            Distance(p, q, float(length), sd, instrument=own if unknown else None)
-            for (p, q), length in zip(names, values, strict=True)
-        ]
+        Distance.from_arrays(**names, length=values, sd=sd, instrument=own if unknown else None)
         for values, own in ((lengths, known[0]), (lengths + errors, known[1]))
     )
     return _observed(simulation, exact, noisy)
@@ -315,13 +301,13 @@ def _positive(**values: float) -> None:
 
 
 def _observed(
-    simulation: Simulation, exact: Sequence[Observation], noisy: Sequence[Observation]
+    simulation: Simulation, exact: Observations[Observation], noisy: Observations[Observation]
 ) -> Simulation:
     truth, block = simulation.truth, simulation.block
     return replace(
         simulation,
-        truth=truth.replace(observations=[*truth.observations, *exact]),
-        block=block.replace(observations=[*block.observations, *noisy]),
+        truth=truth.replace(observations=[truth.observations, exact]),
+        block=block.replace(observations=[block.observations, noisy]),
     )
 
 

@@ -9,14 +9,11 @@ import numpy as np
 from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Bools, Indices
 from photogram.network.block import Block
+from photogram.network.block_checks import rows_of
 from photogram.network.observations import Observation, Smoothness
 
-PHOTOS = (
-    *("photo_positions", "photo_attitudes", "photo_position_sd", "photo_attitude_sd"),
-    *("photo_positions_observed", "photo_attitudes_observed", "principal_distances", "photo_cameras"),
-)
-"""Arrays of a block with a row for each photo."""
-IMAGES = ("image_photos", "image_points", "image_xy", "image_sd")  # Arrays with a row for each image
+PHOTOS, IMAGES = (rows_of(Block, rows) for rows in ("photos", "images"))
+"""Arrays of a block with a row for each photo, and for each image."""
 
 
 def image_rows(network: object, kept: Indices | Bools) -> dict[str, Any]:

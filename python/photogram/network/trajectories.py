@@ -11,7 +11,7 @@ weighted or fixed. Times are in seconds.
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,17 +19,16 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import (
     argument_error,
-    names,
     number,
     numbers,
-    one_of,
     shaped,
     whole_number,
 )
-from photogram.arguments.objects import kind_error, require, require_kind
+from photogram.arguments.declared import check_fields, check_with, choice, instance, object_name
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.network.unknowns import Numbers, Unknown
+from photogram.network.unknowns import ROTATION, Numbers, Unknown, are_rotations
 
 __all__ = [
     "Clock",
@@ -151,12 +150,13 @@ class Table:
     attitude_times: Floats
     attitudes: Floats
     velocities: Floats | None = None
-    interpolation: Interpolation = "linear"
-    attitude_interpolation: Interpolation = "linear"
+    interpolation: Interpolation = field(default="linear", metadata=check_with(choice(Interpolation)))
+    attitude_interpolation: Interpolation = field(
+        default="linear", metadata=check_with(choice(Literal["linear", "lagrange"]))
+    )
 
     def __post_init__(self) -> None:
-        one_of("interpolation", self.interpolation, get_args(Interpolation))
-        one_of("attitude_interpolation", self.attitude_interpolation, ("linear", "lagrange"))
+        check_fields(self)
         given = self.velocities is not None
         require(
             given == (self.interpolation == "hermite"),
@@ -166,15 +166,14 @@ class Table:
             other="hermite",
         )
         times, turned = increasing("times", self.times), increasing("attitude_times", self.attitude_times)
-        self._set("times", times)
-        self._set("attitude_times", turned)
-        self._set("positions", shaped("positions", self.positions, (len(times), 3)))
-        self._set("attitudes", rotations("attitudes", self.attitudes, len(turned)))
+        vars(self).update(
+            times=times,
+            attitude_times=turned,
+            positions=shaped("positions", self.positions, (len(times), 3)),
+            attitudes=rotations("attitudes", self.attitudes, len(turned)),
+        )
         if self.velocities is not None:
-            self._set("velocities", shaped("velocities", self.velocities, (len(times), 3)))
-
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
+            vars(self)["velocities"] = shaped("velocities", self.velocities, (len(times), 3))
 
     @property
     def span(self) -> tuple[float, float]:
@@ -199,11 +198,10 @@ def increasing(name: str, values: ArrayLike) -> Floats:
 def rotations(name: str, values: ArrayLike, count: int) -> Floats:
     """Return validated rotation matrices (count, 3, 3)."""
     matrices = shaped(name, values, (count, 3, 3))
-    apart = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bad = (apart > 1e-6) | (np.linalg.det(matrices) < 0)
+    bad = ~are_rotations(matrices)
     if bad.any():
         row = int(np.argmax(bad))
-        raise kind_error(f"{name}[{row}]", "a rotation matrix", matrices[row].tolist())
+        raise kind_error(f"{name}[{row}]", ROTATION, matrices[row].tolist())
     return matrices
 
 
@@ -410,32 +408,27 @@ class Trajectory:
     """
 
     name: str
-    table: Table
+    table: Table = field(metadata=check_with(instance(Table)))
     position: Basis | None = None
     rotation: Basis | None = None
     body: tuple[ArrayLike, ArrayLike] | None = None
-    position_axes: PositionAxes = "table"
-    angles: Angles = "vector"
+    position_axes: PositionAxes = field(default="table", metadata=check_with(choice(PositionAxes)))
+    angles: Angles = field(default="vector", metadata=check_with(choice(Angles)))
     coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self._set("name", names("name of a trajectory", [self.name])[0])
-        require_kind(f"table of trajectory {self.name}", self.table, Table)
-        one_of(f"position_axes of trajectory {self.name}", self.position_axes, get_args(PositionAxes))
-        one_of(f"angles of trajectory {self.name}", self.angles, get_args(Angles))
+        vars(self)["name"] = object_name("name of a trajectory", self.name)
+        check_fields(self, f"trajectory {self.name}")
         if self.position_axes != "table" and len(self.table.times) < 2:
             raise argument_error(f"positions of trajectory {self.name}", "least", low=2, value=1)
         kinds = (("position", PositionCoefficient), ("rotation", RotationCoefficient))
-        self._set("coefficients", tuple(self._coefficients(name, kind) for name, kind in kinds))
+        vars(self)["coefficients"] = tuple(self._coefficients(name, kind) for name, kind in kinds)
         if self.body is not None:
             if not isinstance(self.body, tuple | list) or len(self.body) != 2:
                 raise kind_error(f"body of trajectory {self.name}", "a pair of times and matrices", self.body)
             times, matrices = self.body
             times = increasing("times of a body", times)
-            self._set("body", (times, rotations("matrices of a body", matrices, len(times))))
-
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
+            vars(self)["body"] = (times, rotations("matrices of a body", matrices, len(times)))
 
     def _coefficients(self, what: str, kind: type[Coefficient]) -> tuple[Coefficient, ...]:
         basis: Basis | None = getattr(self, what)
@@ -444,7 +437,7 @@ class Trajectory:
         if not isinstance(basis, Polynomial | Spline):
             raise kind_error(f"{what} of trajectory {self.name}", "a Polynomial or a Spline", basis)
         basis = basis.over(*self.table.span)
-        self._set(what, basis)
+        vars(self)[what] = basis
         value = _of_each(f"value of the {what} of {self.name}", basis.value, basis.count)
         sd = _of_each(f"sd of the {what} of {self.name}", basis.sd, basis.count)
         return tuple(kind(f"{self.name} {what} {k}", value=value[k], sd=sd[k]) for k in range(basis.count))

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, names, number, shaped
-from photogram.arguments.objects import kind_error, require
-from photogram.arguments.types import Floats
+from photogram.arguments.declared import check_fields, check_with, finite, optional
+from photogram.arguments.objects import require
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.words import phrase
@@ -43,15 +44,20 @@ UnknownRow = tuple[str, list[float], list[float], list[float]]
 """Type, position, rotation matrix row by row, and standard deviations: the row of an unknown for the core."""
 
 _ORTHONORMAL = 1e-6
+ROTATION = "a rotation matrix (with the determinant 1)"
 _UNKNOWNS = dict(_photocore.UNKNOWNS)
+
+
+def are_rotations(matrices: Floats) -> Bools:
+    """Return which (..., 3, 3) matrices are orthonormal to 1e-6 and not mirrored."""
+    apart = np.abs(np.swapaxes(matrices, -1, -2) @ matrices - np.eye(3)).max(axis=(-1, -2))
+    return np.asarray((apart < _ORTHONORMAL) & (np.linalg.det(matrices) > 0))
 
 
 def rotation(name: str, value: ArrayLike) -> Floats:
     """Return a rotation matrix (3, 3); InputError if it is mirrored or not orthonormal to 1e-6."""
     matrix = shaped(name, value, (3, 3))
-    orthonormal = np.abs(matrix.T @ matrix - np.eye(3)).max() < _ORTHONORMAL
-    if not orthonormal or np.linalg.det(matrix) < 0:
-        raise kind_error(name, "a rotation matrix (with the determinant 1)", matrix.tolist())
+    require(are_rotations(matrix), name, "kind", kind=ROTATION, value=matrix.tolist())
     return matrix
 
 
@@ -85,6 +91,7 @@ class Unknown:
     """Name of the type in results."""
     GIVEN: ClassVar[tuple[str, ...]] = ()
     """Fields of the initial values; all of them may be None if they are unknown."""
+    _PLACE: ClassVar[str] = "through"  # Field of the position
 
     position: Floats = field(init=False, repr=False)
     attitude: Floats = field(init=False, repr=False)
@@ -117,7 +124,12 @@ class Unknown:
         object.__setattr__(self, name, value)
 
     def _position(self) -> Floats:
-        raise NotImplementedError
+        if self.is_open:
+            return np.zeros(3)
+        value = getattr(self, self._PLACE)
+        if value is None:
+            raise InputError(phrase("block.unknown-value", unknown=self.title, names=list(self.GIVEN)))
+        return shaped(f"{self._PLACE} of {self.title}", value, (3,))
 
     def _attitude(self) -> Floats:
         return np.eye(3)
@@ -218,14 +230,11 @@ class Drift(Numbers):
 
     KIND = "drift"
 
-    epoch: float | None = None
+    epoch: float | None = field(default=None, metadata=check_with(optional(finite)))
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.epoch is not None:
-            epoch = number(f"epoch of {self.title}", self.epoch)
-            require(np.isfinite(epoch), f"epoch of {self.title}", "finite", value=epoch)
-            object.__setattr__(self, "epoch", epoch)
+        check_fields(self, self.title)
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,9 +342,6 @@ class PlumbLine(Unknown):
     through: ArrayLike | None = None
     sd: ArrayLike = np.inf
 
-    def _position(self) -> Floats:
-        return _place(self, self.through)
-
 
 @dataclass(frozen=True, eq=False)
 class Line(Unknown):
@@ -361,9 +367,6 @@ class Line(Unknown):
     direction: ArrayLike | None = None
     through: ArrayLike | None = None
     sd: ArrayLike = np.inf
-
-    def _position(self) -> Floats:
-        return _place(self, self.through)
 
     def _attitude(self) -> Floats:
         return np.eye(3) if self.is_open else _across(f"direction of {self.title}", self.direction)
@@ -394,9 +397,6 @@ class Plane(Unknown):
     through: ArrayLike | None = None
     sd: ArrayLike = np.inf
 
-    def _position(self) -> Floats:
-        return _place(self, self.through)
-
     def _attitude(self) -> Floats:
         return np.eye(3) if self.is_open else _across(f"normal of {self.title}", self.normal)
 
@@ -420,13 +420,11 @@ class Sensor(Unknown):
 
     KIND = "sensor"
     GIVEN = ("value", "matrix")
+    _PLACE = "value"
 
     value: ArrayLike | None = None
     matrix: ArrayLike | None = None
     sd: ArrayLike = np.inf
-
-    def _position(self) -> Floats:
-        return _place(self, self.value, "value")
 
     def _attitude(self) -> Floats:
         return np.eye(3) if self.matrix is None else rotation(f"matrix of {self.title}", self.matrix)
@@ -443,15 +441,6 @@ class Sensor(Unknown):
         flip = np.diag([1.0, -1.0, -1.0])
         value = -flip @ turned @ shaped(f"translation of sensor {name}", translation, (3,))
         return cls(name, value, flip @ turned @ flip, sd)
-
-
-def _place(own: Unknown, value: ArrayLike | None, what: str = "through") -> Floats:
-    """Return the position (3,); zero if the initial value is missing."""
-    if own.is_open:
-        return np.zeros(3)
-    if value is None:
-        raise InputError(phrase("block.unknown-value", unknown=own.title, names=list(own.GIVEN)))
-    return shaped(f"{what} of {own.title}", value, (3,))
 
 
 def _across(name: str, value: ArrayLike | None) -> Floats:

@@ -123,7 +123,7 @@ def point_kinds(block: Block) -> NDArray[np.str_]:
 
 def observed_control(block: Block) -> list[int]:
     """Return the control points with an observed covariance matrix."""
-    names = {each.point for each in block.observations if isinstance(each, Control)}
+    names = {each.point for each in block.observations.of_type(Control)}
     return [row for row, name in enumerate(block.point_ids) if name in names] if names else []
 
 
@@ -146,7 +146,7 @@ def _given(block: Block, rows: Indices, differences: Floats) -> tuple[Floats, Bo
         own = block.point_check_sd[rows]
     lacking: Bools = np.asarray((np.isnan(own) & np.isfinite(differences)).any(axis=1))
     # Standard deviations of observations are lengths, also in geographic blocks.
-    observed = [] if block.geographic else [e for e in block.observations if isinstance(e, Control)]
+    observed = [] if block.geographic else block.observations.of_type(Control)
     every = np.vstack([block.point_sd, *(np.sqrt(np.diag(each.precision)) for each in observed)])
     assumed = [np.median(held) if (held := column[np.isfinite(column)]).size else 0.0 for column in every.T]
     return np.asarray(np.where(np.isnan(own), assumed, own)), lacking

@@ -20,7 +20,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
-from photogram.network.rays import Rays, meet
+from photogram.network.rays import Rays, counts_of, meet, sums_of
 from photogram.statistics.likelihood import are_exchanged
 from photogram.words import Phrase
 
@@ -167,15 +167,10 @@ class _Fit:
         sd = block.image_sd[rows]
 
         def total(values: Floats) -> Floats:
-            flat = values.reshape(len(values), -1)
-            columns = [np.bincount(own, flat[:, k], count).astype(np.float64) for k in range(flat.shape[1])]
-            summed: Floats = np.stack(columns, axis=1).reshape(count, *values.shape[1:])
-            return summed
+            return sums_of(own, values, count)
 
         across, right = rays.equations()
-        position = meet(
-            total(across[rows]), total(right[rows]), np.bincount(own, minlength=count).astype(float)
-        )
+        position = meet(total(across[rows]), total(right[rows]), counts_of(own, count))
         # The axes are those of the block if priors are used, and a component may be unknown.
         given = block.point_positions[points] - self.rays.axes.origin
         prior_sd = self._prior_sd(points)

@@ -389,7 +389,7 @@ def _datum_is_loose(block: Block) -> bool:
 
 def observations_of_core(block: Block) -> list[Observation]:
     """Return the additional observations in the order of the core: by type."""
-    return [block.observations[row] for rows, _ in block.observation_groups for row in rows]
+    return [each for own in block.observations.columns for each in own.objects]
 
 
 class BlockSuspects(NamedSuspects):

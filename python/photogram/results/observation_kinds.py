@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,22 +59,23 @@ class ObservedKind:
 def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
     """Return the adjusted observations of a block by the names of their types."""
     found = iter(solution.adjusted_observations)
-    parts: dict[str, list[tuple[Observation, Sequence[int], tuple[Floats, ...]]]] = {}
-    for rows, (*_, covariances) in block.observation_groups:
-        first = block.observations[rows[0]]
+    parts: dict[str, list[tuple[Observation, Indices, tuple[Floats, ...]]]] = {}
+    for columns in block.observations.columns:
+        first, rows = columns.objects[0], columns.rows
         observed = np.ones((len(rows), len(first.components(geographic=block.geographic))), dtype=bool)
         if first.MISSING:
-            observed = ~np.isnan([block.observations[row].observed for row in rows])
+            observed = ~np.isnan(columns.table["observed"])
         tables = np.full((3, *observed.shape), np.nan)
         single = np.full((2, len(rows)), np.nan)
         adjusted = [next(found) for _ in rows]
         taken = np.array([each is not None for each in adjusted])
         if some := [each for each in adjusted if each is not None]:
-            columns = zip(*some, strict=True)
-            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(columns)) for _ in range(3)]
-            single[:, taken] = list(columns)
-        sd = np.sqrt(np.where(observed, np.diagonal(covariances, axis1=1, axis2=2), np.nan))
-        parts.setdefault(first.label, []).append((first, rows, (sd, *tables, *single)))
+            values = zip(*some, strict=True)
+            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(values)) for _ in range(3)]
+            single[:, taken] = list(values)
+        variances = np.diagonal(np.asarray(columns.table["precision"]), axis1=1, axis2=2)
+        sd = np.sqrt(np.where(observed, variances, np.nan))
+        parts.setdefault(columns.label, []).append((first, rows, (sd, *tables, *single)))
     kinds = {}
     for kind, groups in parts.items():  # Groups of one type have different numbers of unknowns
         first = groups[0][0]

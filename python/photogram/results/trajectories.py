@@ -222,7 +222,7 @@ def restarted_motion(
     turns = turns or {}
     found = {id(each.given): each for each in adjusted}
     # A prior observes the given value of its unknown.
-    observed = {id(each.unknown) for each in block.observations if isinstance(each, Prior)}
+    observed = {id(each.unknown) for each in block.observations.of_type(Prior)}
     moved = {key: each.restarted(observed, turns.get(each.name)) for key, each in found.items()}
     coefficients: dict[int, Coefficient] = {}
     for key, each in found.items():

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import (
     argument_error,
@@ -20,9 +19,19 @@ from photogram.arguments.arrays import (
     whole_number,
 )
 from photogram.arguments.equality import Valued
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import (
+    ALL,
+    NONE,
+    ONE,
+    Array,
+    BoolArray,
+    Bools,
+    Floats,
+    IndexArray,
+    OptionalArray,
+)
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.show.methods import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
@@ -30,7 +39,7 @@ MIN_CORNERS_PER_VIEW = 6
 _MAX_WIDTH_OF_LINE = 1e-3  # ratio of width and length of collinear corners of a view
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+@converting_dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Corners(Valued, Brief):
     """Corners of a board in P images of K cameras and V views; n corners.
 
@@ -66,33 +75,16 @@ class Corners(Valued, Brief):
     """
 
     pictures: Sequence[str]
-    cameras: Indices
-    views: Indices
+    cameras: IndexArray
+    views: IndexArray
     camera_names: Sequence[str]
     sizes: Sequence[tuple[int, int] | None]
-    picture: Indices
-    point: Indices
-    xy: Floats
-    sd: Floats = field(default_factory=lambda: np.array(1.0))
-    use: Bools = field(default_factory=lambda: np.array(True))
-    times: Floats | None = None
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            *,
-            pictures: Sequence[str],
-            cameras: ArrayLike,
-            views: ArrayLike,
-            camera_names: Sequence[str],
-            sizes: Sequence[tuple[int, int] | None],
-            picture: ArrayLike,
-            point: ArrayLike,
-            xy: ArrayLike,
-            sd: ArrayLike = ...,
-            use: ArrayLike = ...,
-            times: ArrayLike | None = None,
-        ) -> None: ...
+    picture: IndexArray
+    point: IndexArray
+    xy: Array
+    sd: Array = field(default=ONE)
+    use: BoolArray = field(default=ALL)
+    times: OptionalArray = field(default=NONE)
 
     def __post_init__(self) -> None:
         for name in ("pictures", "camera_names"):

@@ -148,7 +148,7 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
 def _shots(project: Project, world: _World, which: list[int]) -> list[str]:
     block = project.block
     turns = attitude_matrices(block) @ Y_DOWN
-    given = [each for each in block.observations if isinstance(each, Position)]
+    given = block.observations.of_type(Position)
     positions, sd = world.references(
         np.array([each.observed[:3] for each in given]).reshape(-1, 3),
         np.array([each.precision for each in given]).reshape(-1, 3, 3),

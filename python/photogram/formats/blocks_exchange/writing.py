@@ -45,7 +45,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     lines += [f"<SRS><Id>0</Id><Name>frame</Name><Definition>{escape(definition)}</Definition></SRS>"]
     lines += ["</SpatialReferenceSystems>", "<Block>", f"<Name>{_text(block.title or 'block')}</Name>"]
     lines += ["<Type>Aerial</Type>", "<SRSId>0</SRSId>", "<Photogroups>"]
-    gnss = {each.photos[0]: each.observed[:3] for each in block.observations if isinstance(each, Position)}
+    gnss = {each.photos[0]: each.observed[:3] for each in block.observations.of_type(Position)}
     rotations = Y_DOWN @ attitude_matrices(block).transpose(0, 2, 1)
     for row, (camera, size) in enumerate(zip(cameras, sizes_of(project), strict=True)):
         lines += ["<Photogroup>", *_camera(camera, size)]

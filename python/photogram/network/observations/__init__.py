@@ -5,14 +5,15 @@ observed values, and their standard deviations `sd` or covariance matrix `covari
 minus computed.
 """
 
-from photogram.network.observations.fiducial import FILM, Fiducial, KnownFilm, KnownTogether
-from photogram.network.observations.observation import (
-    Observation,
+from photogram.network.observations.columns import (
+    Observations,
     all_trajectories,
     moments,
     observation_rows,
     of_records,
 )
+from photogram.network.observations.fiducial import FILM, Fiducial, KnownFilm, KnownTogether
+from photogram.network.observations.observation import Observation
 from photogram.network.observations.photos import Attitude, Position, Range, Rate, Relative, Velocity
 from photogram.network.observations.points import (
     Control,
@@ -38,6 +39,7 @@ __all__ = [
     "KnownFilm",
     "KnownTogether",
     "Observation",
+    "Observations",
     "OnLevel",
     "OnLine",
     "OnPlane",

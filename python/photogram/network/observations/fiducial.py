@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped
-from photogram.arguments.objects import kind_error, require, require_kind
-from photogram.lazy_dataclasses import dataclass
+from photogram.arguments.declared import check_fields, check_with, instance, object_name
+from photogram.arguments.objects import kind_error, require
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
 from photogram.network.observations.observation import Observation
@@ -47,17 +48,15 @@ class Fiducial(Observation):
     VALUES = (("reading", (2,)),)
     COMPONENTS = ("x", "y")
 
-    photo: str
-    mark: Mark
-    film: Film
+    photo: str = field(metadata=check_with(object_name))
+    mark: Mark = field(metadata=check_with(instance(Mark)))
+    film: Film = field(metadata=check_with(instance(Film)))
     reading: ArrayLike
     sd: ArrayLike | None = None
     covariance: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        require_kind("mark of a fiducial", self.mark, Mark)
-        require_kind("film of a fiducial", self.film, Film)
-        self._set("photo", names("fiducial", [self.photo])[0])
+        check_fields(self, "a fiducial")
         super().__post_init__()
         self._set("unknowns", (self.mark, *self.film.unknowns))
         near = self.mark.position[:2]

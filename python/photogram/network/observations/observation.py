@@ -1,23 +1,28 @@
-"""Base class of all observation types."""
+"""Base class of all observation types, and the validation of their fields."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING as REQUIRED
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import argument_error, is_covariance, names, number, shaped
-from photogram.arguments.objects import kind_error
-from photogram.arguments.types import Floats, Indices
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.arguments.arrays import (
+    argument_error,
+    is_covariance,
+    length,
+    names,
+    numbers,
+    shaped,
+)
+from photogram.arguments.objects import kind_error, require, require_kind
+from photogram.arguments.types import Bools, Floats
+from photogram.lazy_dataclasses import dataclass, field, fields, replace
 from photogram.network.moving_photos import Moment
+from photogram.network.observations.columns import Columns, Observations, record_moment
 from photogram.network.trajectories import Clock, Trajectory
-from photogram.network.unknowns import Unknown, rotation
-
-Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
-"""Type; indices (k, p) of points, (k, q) photos, (k, c) unknowns; values (k, v), covariances (k, r, r)."""
+from photogram.network.unknowns import ROTATION, Unknown, are_rotations
 
 AXES = ("X", "Y", "Z")
 ROTATIONS = ("rotation x", "rotation y", "rotation z")
@@ -70,49 +75,78 @@ class Observation:
     precision: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        given = {name: getattr(self, name, None) for name in ("trajectory", "clock")}
-        for (name, value), kind in zip(given.items(), (Trajectory, Clock), strict=True):
-            if value is not None and not isinstance(value, kind):
-                raise kind_error(f"{name} of the {self.KIND}", f"{kind.__name__} or None", value)
-        if given["clock"] is not None and given["trajectory"] is None:
-            raise argument_error(self.KIND, "requires", name="clock", other="trajectory")
-        if hasattr(self, "time"):
-            time = number(f"time of the {self.KIND}", self.time)
-            if not np.isfinite(time):
-                raise argument_error(f"time of the {self.KIND}", "finite", value=time)
-            self._set("time", time)
-        moment = self.moment
-        self._set("points", tuple(names(self.KIND, [getattr(self, name) for name in self.POINTS])))
-        of = [getattr(self, name) for name in self.PHOTOS]
-        if moment is not None and any(each is not None for each in of):
-            raise argument_error(self.KIND, "exclusive", first="photo", second="trajectory")
-        self._set("photos", tuple(names(self.KIND, of if moment is None else [moment.name])))
-        self._set("unknowns", tuple(self._unknown(name, kind) for name, kind in self.UNKNOWNS))
-        known = [id(each) for each in self.unknowns if each is not None]
-        for kind_of, own in (("point", self.points), ("photo", self.photos), ("unknown", known)):
-            if len(set(own)) < len(own):
-                raise argument_error(self.KIND, "repeated", kind=kind_of, name=self.of[0])
-        values = [np.ravel(self._value(name, shape)) for name, shape in self.VALUES]
-        self._set("observed", np.concatenate(values) if values else np.zeros(0))
-        use = np.ones(len(self.own_components), dtype=bool)
-        if self.MISSING:
-            use = ~np.isnan(self.observed)
-        if not use.any():
-            raise argument_error(self.name, "missing", name="an observed component")
-        self._set("precision", self._covariance(use))
-        if self._POSITIVE and not self.observed[0] > 0:
-            name = self.VALUES[0][0]
-            raise argument_error(f"{name} of {self.name}", "positive", value=getattr(self, name))
+        given = {name: [value] for name, value in vars(self).items()}
+        self._set_columns(_related(type(self), 1, given))
+        components = len(self.own_components)
+        self._set_columns(_measured(type(self), None, vars(self), components, lambda _: self.name))
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    def _set_columns(self, columns: Mapping[str, Sequence[Any]]) -> None:
+        vars(self).update({name: column[0] for name, column in columns.items()})
+
+    @classmethod
+    def from_arrays(cls, **columns: Any) -> Observations[Self]:
+        """Create many observations of this type from arrays, faster than one by one.
+
+        Parameters
+        ----------
+        columns
+            Arguments of the class by name. Names of points and photos are lists of n names. Numbers are
+            arrays with one row for each observation, or one value for all. Unknowns, trajectories and clocks
+            are one object for all, or a list of n objects.
+
+        Returns
+        -------
+        n observations: a sequence for the argument `observations` of a block, or a part of it.
+
+        Raises
+        ------
+        InputError
+            If an argument is unknown or missing, an array has a wrong shape, or the class rejects a row.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from photogram import Position
+        >>> observed = Position.from_arrays(photo=["1", "2"], position=np.zeros((2, 3)), sd=0.05)
+        >>> len(observed), observed[1].photo
+        (2, '2')
+        """
+        usable = cls.__post_init__ is Observation.__post_init__
+        require(usable, "from_arrays", "kind", kind="called for a type with declared columns", value=cls.KIND)
+        given = {each.name: each.default for each in fields(cls) if each.init}
+        for name in columns:
+            require(name in given, cls.__name__, "unknown", kind="argument", name=name, names=list(given))
+        given |= columns
+        for name, value in given.items():
+            require(value is not REQUIRED, cls.__name__, "missing", name=name)
+        named = [name for name in (*cls.POINTS, *cls.PHOTOS) if given[name] is not None]
+        first = named[0] if named else cls.VALUES[0][0]
+        column: Any = given[first]
+        count = length(first, column)
+        if not count:
+            return Observations()
+        table = {name: _each(value, count, named=name in named) for name, value in given.items()}
+        for name, own in table.items():
+            require(len(own) == count, name, "count", count=count, actual=len(own))
+        if "time" in given:
+            times: Any = given["time"]
+            table["time"] = times
+        table |= _related(cls, count, table)
+
+        def title(row: int) -> str:
+            return f"{cls.KIND} {' - '.join(table['points'][row] + table['photos'][row])}"
+
+        table |= _measured(cls, count, given, len(cls.COMPONENTS), title)
+        return Observations([Columns(cls, cls.KIND, np.arange(count), table)])
 
     @property
     def moment(self) -> Moment | None:
         """Time on a trajectory to which the observation refers, instead of a photo."""
         own = vars(self)
-        trajectory = own.get("trajectory")
-        return None if trajectory is None else Moment(trajectory, float(own["time"]), own["clock"])
+        return record_moment(own.get("trajectory"), own.get("time"), own.get("clock"))
 
     @property
     def of(self) -> tuple[str, ...]:
@@ -146,133 +180,169 @@ class Observation:
         return ("east", "north", "up")[: len(own)] if geographic and self.LOCAL else own
 
     @classmethod
-    def values_of(cls, observations: Sequence[Observation]) -> Floats:
+    def core_values(cls, observed: Floats, unknowns: Sequence[tuple[Unknown | None, ...]]) -> Floats:
         """Return the values (k, v) for the core of all observations of this type in a block."""
-        return np.stack([each.observed for each in observations])
+        return observed
 
-    def _unknown(self, name: str, kind: type[Unknown]) -> Unknown | None:
-        value = getattr(self, name)
-        if isinstance(value, kind):
-            return value
-        known = (value is None and name not in self.NEEDS) or name in dict(self.VALUES)
-        if isinstance(value, Unknown) or not known:
-            raise kind_error(f"{name} of {self.KIND}", f"an object of the class {kind.__name__}", value)
-        return None
 
-    def _value(self, name: str, shape: tuple[int, ...]) -> Floats:
-        """Validate a field and return its numbers; zeros or the identity for shared unknowns."""
-        value = getattr(self, name)
-        turns = shape == (3, 3)
-        if isinstance(value, Unknown) or (value is None and turns):
-            return np.eye(3) if turns else np.zeros(shape)
-        array = shaped(f"{name} of {self.name}", value, shape, missing=self.MISSING)
-        if (np.isinf(array) if self.MISSING else ~np.isfinite(array)).any():
-            raise argument_error(f"{name} of {self.name}", "finite", value=array.tolist())
+def _each(value: Any, count: int, *, named: bool) -> Sequence[Any]:
+    """Return a column: a list of names or objects as it is, or one value for all rows."""
+    objects = isinstance(value, list | tuple) and all(
+        each is None or isinstance(each, Unknown | Trajectory) for each in value
+    )
+    return list(value) if named or objects else [value] * count
+
+
+def _related(kind: type[Observation], count: int, given: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
+    """Validate the times, points, photos and unknowns of observations, and return their columns."""
+    none: Sequence[Any] = [None] * count
+    found: dict[str, Any] = {}
+    if "time" in given:
+        what = f"time of the {kind.KIND}"
+        times = shaped(what, given["time"], (count,))
+        require(np.isfinite(times).all(), what, "finite", value=times.tolist())
+        found["time"] = times.tolist()
+    trajectories, clocks = (given.get(name, none) for name in ("trajectory", "clock"))
+    for name, column, of in (("trajectory", trajectories, Trajectory), ("clock", clocks, Clock)):
+        for value in _distinct(column):
+            require_kind(f"{name} of the {kind.KIND}", value, of, optional=True)
+    points, photos = ([given[name] for name in own] for own in (kind.POINTS, kind.PHOTOS))
+    for trajectory, clock in zip(trajectories, clocks, strict=True) if any(clocks) else ():
+        alone = clock is not None and trajectory is None
+        require(not alone, kind.KIND, "requires", name="clock", other="trajectory")
+    if any(trajectories):
+        moments = [*map(record_moment, trajectories, found["time"], clocks)]
+        pairs = list(zip(moments, *photos, strict=True))
+        both = any(own and each is not None for own, each in pairs)
+        require(not both, kind.KIND, "exclusive", first="photo", second="trajectory")
+        photos = [[own.name if own else each for own, each in pairs]]
+    for name, columns in (("points", points), ("photos", photos)):
+        found[name] = list(zip(*(names(kind.KIND, each) for each in columns), strict=True)) or [()] * count
+    unknowns = []
+    for name, kind_of in kind.UNKNOWNS:
+        known = {id(value): _unknown(kind, name, kind_of, value) for value in _distinct(given[name])}
+        unknowns.append([*map(known.get, map(id, given[name]))])
+    found["unknowns"] = list(zip(*unknowns, strict=True)) or [()] * count
+    for name in ("points", "photos", "unknowns"):
+        for row in set(found[name]) if count and len(found[name][0]) > 1 else ():
+            own = [each for each in row if each is not None]
+            title = getattr(own[0], "name", own[0]) if own else ""
+            require(len(set(own)) == len(own), kind.KIND, "repeated", kind=name[:-1], name=title)
+    return found
+
+
+def _distinct(column: Sequence[Any]) -> Iterable[Any]:
+    """Return the different objects of a column."""
+    if len(column) < 2 or column.count(column[0]) == len(column):
+        return column[:1]
+    return {id(value): value for value in column}.values()
+
+
+def _unknown(kind: type[Observation], name: str, kind_of: type[Unknown], value: object) -> Unknown | None:
+    if isinstance(value, kind_of):
+        return value
+    known = (value is None and name not in kind.NEEDS) or name in dict(kind.VALUES)
+    if isinstance(value, Unknown) or not known:
+        raise kind_error(f"{name} of {kind.KIND}", f"an object of the class {kind_of.__name__}", value)
+    return None
+
+
+def _measured(
+    kind: type[Observation],
+    count: int | None,
+    given: Mapping[str, Any],
+    components: int,
+    title: Callable[[int], str],
+) -> dict[str, Any]:
+    """Validate the numbers of observations, and return their columns; `count` is None for a single one."""
+    found: dict[str, Any] = {}
+    k = count or 1
+    where = title(0) if count is None else kind.KIND
+
+    def reject(bad: Bools, name: str, code: str, values: Floats, /, **fields: object) -> None:
+        if bad.any():
+            row = int(np.argmax(bad.reshape(k, -1).any(axis=1)))
+            what = f"{name} of {title(row)}" if name else title(row)
+            raise argument_error(what, code, **{"value": values[row].tolist()} | fields)
+
+    observed = [np.zeros((k, 0))]
+    for name, shape in kind.VALUES:
+        value, turns = given[name], shape == (3, 3)
+        if (value is None and turns) or _is_unknown(value):
+            observed.append(
+                np.broadcast_to(np.eye(3) if turns else np.zeros(shape), (k, *shape)).reshape(k, -1)
+            )
+            continue
+        array = _rows(f"{name} of {where}", value, shape, count, missing=kind.MISSING)
+        reject(np.isinf(array) if kind.MISSING else ~np.isfinite(array), name, "finite", array)
         if turns:
-            rotation(f"{name} of {self.name}", array)
-        self._set(name, array if shape else float(array))
-        return array
+            reject(~are_rotations(array), name, "kind", array, kind=ROTATION)
+        if kind._POSITIVE and name == kind.VALUES[0][0]:
+            reject(~(array > 0), name, "positive", array)
+        found[name] = array if shape else array.tolist()
+        observed.append(array.reshape(k, -1))
+    found["observed"] = np.concatenate(observed, axis=1)
+    found["observed"].flags.writeable = False
+    use: Any = True
+    if kind.MISSING:
+        use = ~np.isnan(found["observed"])
+        reject(~use.any(axis=1), "", "missing", use, name="an observed component")
+    sd: Any = given.get("sd")
+    covariance: Any = given.get("covariance")
+    require((sd is None) != (covariance is None), where, "exclusive", first="sd", second="covariance")
+    if covariance is None:
+        deviations = _rows(f"sd of {where}", sd, (components,), count, missing=True)
+        reject(~(deviations > 0) & use, "sd", "positive", deviations)
+        used = deviations if use is True else np.where(use, deviations, 1.0)
+        with np.errstate(over="ignore", under="ignore"):
+            variances = used**2
+        usable = (variances > 0) & (variances < np.inf)
+        reject(~usable, "sd", "range", deviations, low=1e-150, high=1e150)
+        found["precision"] = variances[:, :, np.newaxis] * np.eye(components)
+        if count is not None and np.ndim(sd) > (components > 1):
+            found["sd"] = deviations if components > 1 else deviations[:, 0].tolist()
+    else:
+        matrices = _rows(f"covariance of {where}", covariance, (components, components), count, missing=True)
+        used = matrices
+        if use is not True:
+            used = np.where(use[:, :, np.newaxis] & use[:, np.newaxis], matrices, np.eye(components))
+        reject(~is_covariance(used), "", "covariance", matrices)
+        found["precision"] = matrices
+        if np.ndim(covariance) > 2:
+            found["covariance"] = matrices
+    return found
 
-    def _covariance(self, use: NDArray[np.bool_]) -> Floats:
-        """Return the covariance matrix of the observed components `use`."""
-        r = len(self.own_components)
-        sd: ArrayLike | None = getattr(self, "sd", None)
-        covariance: ArrayLike | None = getattr(self, "covariance", None)
-        if sd is not None and covariance is None:
-            deviations = shaped(f"sd of {self.name}", sd, (r,), missing=True)
-            with np.errstate(over="ignore", under="ignore"):
-                own = deviations[use] ** 2
-            if not (deviations[use] > 0).all():
-                raise argument_error(f"sd of {self.name}", "positive", value=deviations.tolist())
-            if not ((own > 0) & np.isfinite(own)).all():  # squares must be finite and not 0
-                raise argument_error(
-                    f"sd of {self.name}", "range", low=1e-150, high=1e150, value=deviations.tolist()
-                )
-            return np.asarray(np.diag(np.where(use, deviations, 1.0) ** 2))
-        if sd is not None or covariance is None:
-            raise argument_error(self.name, "exclusive", first="sd", second="covariance")
-        matrix = shaped(f"covariance of {self.name}", covariance, (r, r), missing=True)
-        if not is_covariance(matrix[np.ix_(use, use)]):
-            raise argument_error(self.name, "covariance")
-        return matrix
+
+def _is_unknown(value: object) -> bool:
+    return isinstance(value[0] if isinstance(value, list) and value else value, Unknown)
+
+
+def _rows(name: str, value: Any, shape: tuple[int, ...], count: int | None, *, missing: bool) -> Floats:
+    """Return (count, *shape) numbers, a row for each observation or one for all; (1, *shape) for None."""
+    if count is None:
+        return shaped(name, value, shape, missing=missing)[np.newaxis]
+    array = numbers(name, value, missing=missing)
+    if shape == (1,) and array.shape == (count,):
+        array = array[:, np.newaxis]
+    if array.shape == shape:
+        array = np.broadcast_to(array, (count, *shape))
+    return shaped(name, array, (count, *shape), missing=missing)
+
+
+def checked_observations(given: object) -> Observations[Observation]:
+    """Return the validated observations of a block."""
+    if isinstance(given, Observations):
+        return given
+    if not isinstance(given, Sequence):
+        raise argument_error("observations", "list", value=given)
+    for row, each in enumerate(given):
+        if not (isinstance(each, Observations) or (isinstance(each, Observation) and each.KIND)):
+            raise kind_error(f"observations[{row}]", "an Observation", each)
+    return Observations.of(given)
 
 
 def with_unknowns(observation: Observation, others: Mapping[int, Unknown]) -> Observation:
     """Replace shared unknowns of an observation; keys of `others` are object identities."""
-    fields = zip(observation.UNKNOWNS, observation.unknowns if observation.UNKNOWNS else (), strict=True)
-    changes: dict[str, Any] = {name: others[id(own)] for (name, _), own in fields if id(own) in others}
+    own = zip(observation.UNKNOWNS, observation.unknowns if observation.UNKNOWNS else (), strict=True)
+    changes: dict[str, Any] = {name: others[id(each)] for (name, _), each in own if id(each) in others}
     return replace(observation, **changes) if changes else observation
-
-
-def moments(observations: Sequence[Observation]) -> list[Moment]:
-    """Return the different times on trajectories to which observations refer."""
-    return list({each.name: each for each in _moments(observations)}.values())
-
-
-def of_records(observations: Sequence[Observation]) -> list[Unknown]:
-    """Return the trajectory coefficients and clocks of record times, each once."""
-    found: dict[int, Unknown] = {}
-    seen: set[int] = set()
-    for each in _moments(observations):
-        own: list[Unknown] = []
-        # A trajectory has many records, and possibly many coefficients.
-        if id(each.trajectory) not in seen:
-            seen.add(id(each.trajectory))
-            own += [one for part in each.trajectory.coefficients for one in part]
-        own += [] if each.clock is None else [each.clock]
-        found |= {id(one): one for one in own}
-    return list(found.values())
-
-
-def all_trajectories(
-    of_photos: Sequence[Trajectory], observations: Sequence[Observation]
-) -> list[Trajectory]:
-    """Return the trajectories of photos, then of records, each once."""
-    of_times = (each.trajectory for each in _moments(observations))
-    return list({id(each): each for each in (*of_photos, *of_times)}.values())
-
-
-def _moments(observations: Sequence[Observation]) -> Iterator[Moment]:
-    """Yield the trajectory times of observations."""
-    return (moment for each in observations if (moment := each.moment) is not None)
-
-
-def observation_rows(
-    observations: Sequence[Observation],
-    points: Sequence[str],
-    photos: Sequence[str],
-    unknowns: Sequence[Unknown],
-) -> list[tuple[list[int], Group]]:
-    """Group observations by type: their row indices, and their arrays for the core.
-
-    Record times follow the photos. InputError if a point or photo is not in the block.
-    """
-    if not observations:
-        return []
-    all_photos = [*photos, *(each.name for each in moments(observations))]
-    of_points, of_photos = ({name: row for row, name in enumerate(each)} for each in (points, all_photos))
-    of_unknowns = {id(each): row for row, each in enumerate(unknowns)}
-
-    def places(each: Observation, own: tuple[str, ...], known: dict[str, int], what: str) -> list[int]:
-        for name in own:
-            if name not in known:
-                raise argument_error(f"observation {each.name}", "absent", kind=what, name=name)
-        return [known[name] for name in own]
-
-    alike: dict[tuple[str, int, int, int], list[int]] = {}
-    for row, each in enumerate(observations):
-        widths = len(each.unknowns), len(each.observed), len(each.precision)
-        alike.setdefault((each.label, *widths), []).append(row)
-    groups: list[tuple[list[int], Group]] = []
-    for rows in alike.values():
-        own = [observations[row] for row in rows]
-        indices = (
-            [places(each, each.points, of_points, "point") for each in own],
-            [places(each, each.photos, of_photos, "photo") for each in own],
-            [[-1 if one is None else of_unknowns[id(one)] for one in each.unknowns] for each in own],
-        )
-        first, second, third = (np.array(table, dtype=np.int64) for table in indices)
-        values = type(own[0]).values_of(own)
-        covariances = np.stack([each.precision for each in own])
-        groups.append((rows, (own[0].KIND, first, second, third, values, covariances)))
-    return groups

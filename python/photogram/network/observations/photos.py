@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.observations.columns import Observations
 from photogram.network.observations.observation import AXES, ROTATIONS, Observation, with_unknowns
 from photogram.network.trajectories import Clock, GyroBias, Trajectory
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Shift, Unknown
@@ -66,35 +67,36 @@ class Position(Observation):
     clock: Clock | None = None
 
     @classmethod
-    def values_of(cls, observations: Sequence[Observation]) -> Floats:
+    def core_values(cls, observed: Floats, unknowns: Sequence[tuple[Unknown | None, ...]]) -> Floats:
         """Return the values for the core; times are relative to the epochs of drifts."""
-        values = super().values_of(observations)
-        epochs = epochs_of(observations)
-        drifts = [each.unknowns[-1] for each in observations]
-        values[:, -1] -= [0.0 if each is None else epochs[id(each)] for each in drifts]
+        if not any(own[-1] for own in set(unknowns)):
+            return observed
+        epochs = _epochs(zip((own[-1] for own in unknowns), observed[:, -1].tolist(), strict=True))
+        values = observed.copy()
+        values[:, -1] -= [epochs.get(own[-1], 0.0) for own in unknowns]
         return values
 
 
-def epochs_of(observations: Iterable[Observation]) -> dict[int, float]:
-    """Return the epoch of each drift by object identity: given, or the mean observation time."""
-    times: dict[int, list[float]] = {}
-    given: dict[int, float] = {}
-    for each in observations:
-        if isinstance(each, Position) and each.drift is not None:
-            times.setdefault(id(each.drift), []).append(each.time)
-            if each.drift.epoch is not None:
-                given[id(each.drift)] = each.drift.epoch
-    return {key: float(np.mean(own)) for key, own in times.items()} | given
+def _epochs(drifts: Iterable[tuple[Unknown | None, float]]) -> dict[Unknown | None, float]:
+    """Return the epoch of each drift: given, or the mean of its observation times."""
+    times: dict[Drift, list[float]] = {}
+    for drift, time in drifts:
+        if isinstance(drift, Drift):
+            times.setdefault(drift, []).append(time)
+    return {
+        drift: float(np.mean(own)) if drift.epoch is None else drift.epoch for drift, own in times.items()
+    }
 
 
-def with_epochs(observations: Sequence[Observation]) -> list[Observation]:
+def with_epochs(observations: Observations[Observation]) -> Sequence[Observation]:
     """Fix the present epochs of all drifts, so that removals do not change them."""
-    epochs = epochs_of(observations)
-    dated: dict[int, Unknown] = {}
-    for each in (one for own in observations for one in own.unknowns):
-        if isinstance(each, Drift) and each.epoch is None and id(each) in epochs:
-            dated[id(each)] = each.replace(epoch=epochs[id(each)])
-    return [with_unknowns(each, dated) for each in observations] if dated else list(observations)
+    epochs = _epochs((each.drift, each.time) for each in observations.of_type(Position))
+    dated: dict[int, Unknown] = {
+        id(drift): drift.replace(epoch=epoch)
+        for drift, epoch in epochs.items()
+        if drift is not None and getattr(drift, "epoch") is None  # noqa: B009
+    }
+    return [with_unknowns(each, dated) for each in observations] if dated else observations
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,8 @@ from photogram.arguments.objects import kind_error, require
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.knots import Knot
-from photogram.network.observations.observation import Observation, all_trajectories
+from photogram.network.observations.columns import Observations, all_trajectories
+from photogram.network.observations.observation import Observation
 from photogram.network.trajectories import Coefficient, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
 
@@ -181,31 +182,31 @@ def smoothness_of(trajectory: Trajectory) -> list[Observation]:
 
 
 def with_smoothness(
-    observations: Sequence[Observation], trajectories: Sequence[Trajectory]
-) -> tuple[Observation, ...]:
+    observations: Observations[Observation], trajectories: Sequence[Trajectory]
+) -> Observations[Observation]:
     """Add the missing smoothness observations of trajectories."""
-    known: set[Unknown | None] = set()
-    for each in observations:
-        if isinstance(each, Smoothness):
-            known.update(each.unknowns)
-    found = list(observations)
-    for trajectory in all_trajectories(trajectories, observations):
-        found += [each for each in smoothness_of(trajectory) if not known.issuperset(each.unknowns)]
-    return tuple(found)
+    known = {one for each in observations.of_type(Smoothness) for one in each.unknowns}
+    missing = [
+        each
+        for trajectory in all_trajectories(trajectories, observations)
+        for each in smoothness_of(trajectory)
+        if not known.issuperset(each.unknowns)
+    ]
+    return Observations.of([observations, *missing]) if missing else observations
 
 
-def with_knots(observations: Sequence[Observation], cameras: Sequence[Camera]) -> tuple[Observation, ...]:
+def with_knots(
+    observations: Observations[Observation], cameras: Sequence[Camera]
+) -> Observations[Observation]:
     """Add priors for weighted knots of cameras: 0 radially and across.
 
     Priors of knots of other cameras are removed.
     """
     own = [knot for camera in cameras for knot in camera.knot_unknowns]
-    there = {id(each) for each in own}
-    found = [
-        each
-        for each in observations
-        if not (isinstance(each, Prior) and isinstance(each.unknown, Knot) and id(each.unknown) not in there)
-    ]
-    observed = {id(each.unknown) for each in found if isinstance(each, Prior)}
-    weighted = [each for each in own if each.covariance is not None and id(each) not in observed]
-    return (*found, *(Prior(each, covariance=each.covariance, value=np.zeros(2)) for each in weighted))
+    observed = {each.unknown: each for each in observations.of_type(Prior)}
+    others = {prior for knot, prior in observed.items() if isinstance(knot, Knot) and knot not in set(own)}
+    if others:
+        observations = Observations.of(each for each in observations if each not in others)
+    weighted = [each for each in own if each.covariance is not None and each not in observed]
+    missing = [Prior(each, covariance=each.covariance, value=np.zeros(2)) for each in weighted]
+    return Observations.of([observations, *missing]) if missing else observations

@@ -262,7 +262,7 @@ def _control_positions(block: Block) -> dict[str, Floats]:
     """Return (3,) given coordinates of control by name, also jointly observed."""
     held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
     found = {block.point_ids[row]: block.point_positions[row] for row in held.tolist()}
-    observed = [each for each in block.observations if isinstance(each, Control)]
+    observed = block.observations.of_type(Control)
     return found | {each.point: np.asarray(each.position, dtype=float) for each in observed}
 
 
@@ -320,7 +320,7 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
         factors = np.array([np.degrees(1.0) if axis.angle else 1.0 for axis in axes])
         x, y, z = ((axis.name, "deg" if axis.angle else axis.unit) for axis in axes)
         system = System("", (x, y, z), lambda positions: positions * factors)
-    observed = {each.point: each for each in block.observations if isinstance(each, Control)}
+    observed = {each.point: each for each in block.observations.of_type(Control)}
     kinds = result.point_kinds.copy()
     positions, sd = block.point_positions.copy(), block.point_sd.copy()
     for name, each in observed.items():
@@ -375,7 +375,7 @@ class LeftOut:
 def leave_one_out(result: Result) -> list[LeftOut]:
     """Return used control points predicted by the others, in order of names."""
     block, found = result.block, []
-    observed = {each.point: each for each in block.observations if isinstance(each, Control)}
+    observed = {each.point: each for each in block.observations.of_type(Control)}
     held_by = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     held_by[[row for row, name in enumerate(block.point_ids) if name in observed]] = True
     control = np.flatnonzero(result.used_points & held_by)

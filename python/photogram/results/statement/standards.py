@@ -336,7 +336,7 @@ def _control_rmse(result: Result) -> tuple[float, float]:
         known = np.isfinite(block.point_sd[row])
         own = np.abs(turns[row]) @ np.where(known, block.point_sd[row], 0.0)
         found.append(np.where(known, own, np.nan))
-    found += [np.sqrt(np.diag(each.precision)) for each in block.observations if isinstance(each, Control)]
+    found += [np.sqrt(np.diag(each.precision)) for each in block.observations.of_type(Control)]
     if not found:
         return math.nan, math.nan
     squares = np.array(found) ** 2
