@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NamedSuspects, NetworkTrial
+from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NamedSuspects, NetworkTrial, Out
 from photogram.statistics.findings import Removed
-from photogram.statistics.snooping.suspects import Out
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
