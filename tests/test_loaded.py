@@ -33,9 +33,10 @@ SELDOM = (
     "difflib",
     "numpy.ma",
     "photogram.network.simulated_scanner",
+    "photogram.results.network_trial",
     "photogram.results.reliability",
+    "photogram.results.snooping_log",
     "photogram.show.quantity",
-    "photogram.statistics.snooping.suspects",
     "photogram.statistics.verdict",
     "statistics",
 )

@@ -1,8 +1,6 @@
 """Data snooping against golden logs, published problems and planted blunders."""
 
 import json
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,18 +9,11 @@ from typer.testing import CliRunner
 import photogram
 import photogram.collection
 from golden_data import golden
-from linear_trial import LinearTrial
 from photogram import Block, Distance
 from photogram.adjustment.snooping import block_trial
 from photogram.cli import app
-from photogram.results import network_trial
+from photogram.results import snooping_log
 from photogram.statistics import lambda0
-from photogram.statistics.snooping.snooping import Settings, snooped
-from photogram.statistics.snooping.starts import _robust_sizes
-from photogram.statistics.snooping.suspects import Prediction
-from photogram.statistics.snooping.taking_out import with_prediction
-
-DATA = Path(__file__).parent / "data" / "statistics"
 
 
 def golden_block(given):
@@ -145,13 +136,14 @@ def test_correlations_on_a_point():
     trial.core.stand()
     for given in data["adjustment"]["test_correlations_on_a_point"]:
         point = block.point_ids.index(given["point"])
-        groups, _, r = trial.core.on_points([point])[0]
-        names = [str(trial.suspects.name(group)) for group in groups]
-        order = [
-            2 * names.index(called(["image", photo, given["point"]])) + "xy".index(axis)
+        groups = np.flatnonzero(trial.suspects.points == point).tolist()
+        number = {str(trial.suspects.name(group)): group for group in groups}
+        rows = [
+            trial.suspects.row_starts[number[called(["image", photo, given["point"]])]] + "xy".index(axis)
             for photo, axis in given["rows"]
         ]
-        r = r[np.ix_(order, order)]
+        columns = np.concatenate([trial.suspects.rows(group) for group in groups])
+        r = trial.core.responses(groups)[np.ix_(np.searchsorted(columns, rows), rows)]
         scale = np.sqrt(np.diagonal(r))
         assert r / np.outer(scale, scale) == pytest.approx(np.array(given["correlation"]), abs=1e-6)
 
@@ -161,7 +153,7 @@ def test_by_the_bound_as_exactly(monkeypatch):
     data = golden("statistics", "block6_blunders.json")
     block = golden_block(data["input"])
     exact = photogram.snoop(block, parts=False)
-    monkeypatch.setattr(network_trial, "WHOLE", 0)
+    monkeypatch.setattr(snooping_log, "MAX_ROWS", 0)
     bounded = photogram.snoop(block, parts=False)
     assert {entry.name for entry in bounded.removed} == {entry.name for entry in exact.removed}
     assert bounded.result.photo_positions == pytest.approx(exact.result.photo_positions, abs=1e-6)
@@ -176,40 +168,6 @@ def test_a_height_goes_alone():
         False,
         True,
     ]
-
-
-def test_swamping():
-    """A good observation between two bad ones goes first, and returns."""
-    given = json.loads((DATA / "small_problems.json").read_text(encoding="utf-8"))["swamping"]
-    partials = np.zeros((len(given["edges"]), 7))
-    for row, (start, end) in enumerate(given["edges"]):
-        partials[row, start], partials[row, end] = -1, 1
-    trial = LinearTrial(partials[:, 1:], given["dh"], given["sd"])
-    found = snooped(trial, Settings(level=0.05))
-    assert [entry.group for entry in found.log] == [
-        step["largest"] for step in given["forward"] if step["removed"]
-    ]
-    for entry, step in zip(found.log, given["forward"], strict=False):
-        assert np.exp(entry.log_probability) == pytest.approx(step["p"], rel=1e-8)
-    returned = [entry for entry in found.log if entry.returned is not None]
-    assert [entry.group for entry in returned] == [own["observation"] for own in given["returned"]]
-    assert np.exp(returned[0].prediction_log_probability) == pytest.approx(
-        given["returned"][0]["p"], rel=1e-8
-    )
-    assert [entry.group for entry in found.log if entry.is_out] == given["finally_removed"]
-    assert found.standing.weighted_sum_of_squares == pytest.approx(given["final"]["omega"], rel=1e-8)
-    assert trial.unknowns == pytest.approx(given["final"]["heights"], rel=1e-8)
-
-
-def test_three_outliers_that_mask_each_other():
-    """Rosner (1983): the first two steps are not significant, the third is."""
-    given = json.loads((DATA / "published_problems.json").read_text(encoding="utf-8"))["rosner"]
-    values = np.array(given["values"])
-    found = snooped(LinearTrial(np.ones((len(values), 1)), values, 1.0), Settings(known=False))
-    assert len(found.log) == given["published_outliers"]
-    for entry, step in zip(found.log, given["steps"], strict=False):
-        assert values[entry.group] == step["removed"]
-        assert np.sqrt(entry.fisher) == pytest.approx(step["t_external"], rel=1e-8)
 
 
 def small(seed, **options):
@@ -438,22 +396,6 @@ def test_check_points_are_compared_with_what_was_given_of_them():
     # What tells how good the block is has errors, in the size of its standard deviations.
     ratio = table[["d_X", "d_Y", "d_Z"]].to_numpy() / table[["sd_X", "sd_Y", "sd_Z"]].to_numpy()
     assert 0.5 < np.sqrt((ratio**2).mean()) < 2.0
-
-
-def test_nothing_is_robust_where_nothing_is_tested():
-    """Redundancy numbers that rounding has made negative in the mean: the square root was a traceback."""
-    suspects = SimpleNamespace(kinds=np.zeros(2, int), row_starts=np.array([0, 2, 4]))
-    for active in (True, False):
-        tests = SimpleNamespace(active=np.full(2, active), redundancy=np.full(4, -1e-17))
-        assert _robust_sizes(SimpleNamespace(tests=tests, suspects=suspects)) is None
-
-
-def test_what_the_rest_says_of_a_component_is_of_that_component():
-    """Components of a control point that leave in two rounds are two entries of one group."""
-    entry = SimpleNamespace(rows=(61,), with_=lambda **given: given)
-    prediction = Prediction(9.0, (59, 60, 61), (4.0, -7.0, -4792.0), (0.4, 7.0, 60.0))
-    found = with_prediction(SimpleNamespace(predicted={0: (prediction, -3.0)}, log=[entry]), 0)
-    assert found["prediction_error"] == (-4792.0,)
 
 
 @pytest.mark.parametrize("unit_weight", ["known", "unknown"])

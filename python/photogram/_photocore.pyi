@@ -1272,6 +1272,85 @@ class NetworkSuspects:
         """(M,) a-priori standard deviations, in the units of the observations."""
 
 @final
+class NetworkSnooping:
+    """Data snooping of a network: rounds of tests, removals and adjustments of a trial.
+
+    Methods raise the errors of the trial.
+    """
+
+    def __init__(
+        self,
+        trial: NetworkTrial,
+        consensus: tuple[Sequence[int], set[int]] | None,
+        *,
+        level: float,
+        is_rate: bool,
+        known: bool,
+        robust: bool | None,
+        max_rounds: int,
+        control: str,
+        rough: float,
+        exact: float,
+        max_rows: int,
+        is_supported: list[bool],
+    ) -> None:
+        """Adjust and test all observations, or those of a consensus.
+
+        Parameters
+        ----------
+        trial
+            The network.
+        consensus
+            Groups of images, and photos, that a consensus removes; None for all observations.
+        level, is_rate
+            Joint level of all tests, or the false discovery rate.
+        known
+            Whether the unit weight is known: chi-square decides, otherwise F.
+        robust
+            Whether to start robustly; None: only if many observations are wrong.
+        max_rounds
+            Largest number of rounds.
+        control
+            Parts of control points and poses that may be removed alone: `whole` (none), `plan and height` or
+            `components`.
+        rough, exact
+            Convergence limits of rounds with many rows, and of others; see `NetworkTrial.adjust`.
+        max_rows
+            Largest number of rows for which R of all rows is computed.
+        is_supported
+            (P,) whether the pose of each photo is determined without images.
+        """
+
+    @property
+    def needs_consensus(self) -> bool:
+        """Whether the adjustment diverges, or residuals exceed plausible sizes."""
+
+    @property
+    def may_have_common_errors(self) -> bool:
+        """Whether the residuals are too large before any removal."""
+
+    def restart(self, trial: NetworkTrial, consensus: tuple[Sequence[int], set[int]]) -> None:
+        """Continue from the result of a consensus."""
+
+    def adjust_exactly(self, trial: NetworkTrial) -> tuple[str, float, int]:
+        """Adjust to `exact`; return status, weighted sum of squares and degrees of freedom."""
+
+    def run(self, trial: NetworkTrial) -> None:
+        """Remove groups in rounds until nothing changes."""
+
+    def finish(self) -> dict[str, Any]:
+        """Return the log, once.
+
+        Returns
+        -------
+        `removals`: a dictionary for each; see `photogram.results.snooping_log.Removal`. `rounds`: number,
+        standing (status, weighted sum of squares, degrees of freedom), limit, removed, returned. `remarks`:
+        code, values, factors by type. `rows` (M,), `points`, `photos`: removed ones. `tests`: number of
+        tested groups. `before`, `after`: standings. `factors` of standard deviations by type. `active` (G,):
+        any row is in use.
+        """
+
+@final
 class NetworkTrial:
     """Repeated adjustment of a network without some observations, with one symbolic analysis.
 
@@ -1321,21 +1400,6 @@ class NetworkTrial:
         Status, iterations, weighted sum of squares, degrees of freedom, points that converged to a station.
         """
 
-    def resist(
-        self,
-        loss: str,
-        scale: float,
-        *,
-        iterations: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
-    ) -> _Floats | None:
-        """Adjust with a robust loss from the state of the last trial, and store the new state.
-
-        Returns
-        -------
-        (G,) factors of the weights; None if it diverges, and the state is then unchanged.
-        """
-
     def tests(self) -> dict[str, NDArray[Any]]:
         """Test every active group.
 
@@ -1343,10 +1407,9 @@ class NetworkTrial:
         -------
         `active` (G,): any row is in use. `rank` (G,): number of detectable directions of an error.
         `statistic` (G,): T, the decrease of the sum of squares without the group. `least` (G,): smallest
-        redundancy of a detectable direction. `shared` (G,): h of the bound of correlations with others.
-        `residual` (M,): normalised residual. `cofactors`: square blocks of R. `error`, `error_sd` (M,):
-        estimated error and its standard deviation (a-priori unit weight), in the units of the observations.
-        NaN for removed groups.
+        redundancy of a detectable direction. `residual` (M,): normalised residual. `cofactors`: square blocks
+        of R. `error`, `error_sd` (M,): estimated error and its standard deviation (a-priori unit weight), in
+        the units of the observations. NaN for removed groups.
         """
 
     def hypotheses(
@@ -1398,26 +1461,6 @@ class NetworkTrial:
         `effect`: points beyond the limit, the same without points of the group, the largest change in
         standard deviations, its point and coordinate, the largest change, and the changes of `checks`. Then
         the (s, s) correlations of the scores of sets.
-        """
-
-    def predictions(
-        self, suspects: list[int]
-    ) -> list[tuple[float, list[int], list[float], list[float]] | None]:
-        """Test removed observations of some groups against their prediction from the rest.
-
-        Returns
-        -------
-        For each: the chi-square statistic with one degree of freedom per removed row; these rows; observed
-        minus predicted of each row, and its standard deviation. None if nothing is removed, or its point or
-        photo is.
-        """
-
-    def on_points(self, points: list[int], *, gone: bool = False) -> list[tuple[list[int], _Floats, _Floats]]:
-        """Return all observations of points together: groups, normalised residuals, and R.
-
-        Empty for points with additional observations. `gone`: for points that are removed with all
-        observations, as if they were in use, each separately against the photos as determined by others. Then
-        also empty if the rays do not determine the point.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:

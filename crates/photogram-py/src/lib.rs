@@ -77,6 +77,8 @@ mod _photocore {
     #[pymodule_export]
     use crate::network::node::{FormedNode, Node};
     #[pymodule_export]
+    use crate::network::snooping::NetworkSnooping;
+    #[pymodule_export]
     use crate::network::solution::{BlockSolution, CollectionSolution};
     #[pymodule_export]
     use crate::network::state::BlockState;

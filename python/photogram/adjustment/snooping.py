@@ -46,16 +46,18 @@ from photogram.results.network_trial import (
     IMAGE,
     OBSERVATION,
     POSITION,
+    LostSupportError,
     NetworkTrial,
+    Out,
+    Standing,
+    Tests,
     network_trial,
 )
 from photogram.results.result import Result
+from photogram.results.snooping_log import Aside, Outcome, Settings, snooped
 from photogram.results.snooping_result import Snooped, recorded
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
-from photogram.statistics.snooping.snooping import Outcome, snooped
-from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Tests
-from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import Phrase, phrase
 
 MOST_PHOTOS = 0.2  # Maximum part of photos without a consistent pose; beyond it the consensus is wrong
@@ -192,7 +194,7 @@ def _snoop_block(
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
         parts = trial, tests, facts, block, point_axes(block), standing.sum_and_freedom, MAX_BIAS_RATIO
-        found = hypotheses(*parts, known=True)
+        found = hypotheses(*parts, known=settings.known)
         return found.common_errors() if found.common_is_harmful else []
 
     try:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from photogram.diagnosis import Diagnosis
     from photogram.network.core_arrays import CoreOptions
     from photogram.results.group_sums import Grouping, Observables
-    from photogram.statistics.snooping.taking_out import Settings
+    from photogram.results.snooping_log import Settings
 
 __all__ = ["Collection"]
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.remarks import too_coarse
-from photogram.arguments.types import Indices
 from photogram.collection.parameters import POSE
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.memory import available_memory
 from photogram.network.core_arrays import CoreOptions
-from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
+from photogram.results.network_trial import KINDS, NamedSuspects, NetworkTrial
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -73,30 +71,19 @@ def collection_trial(
     """Create the trial of a collection for tests."""
     return NetworkTrial(
         core=core,
-        suspects=_Named(collection, core.suspects, parts),
+        suspects=_Named(collection, core.suspects),
         supported=np.asarray(np.isfinite(collection.photo_sd).all(axis=1)),
         rough=ROUGH,
         exact=EXACT,
+        control="components" if parts else "whole",
     )
 
 
 class _Named(NamedSuspects):
-    def __init__(self, collection: Collection, core: _photocore.NetworkSuspects, parts: bool) -> None:
+    def __init__(self, collection: Collection, core: _photocore.NetworkSuspects) -> None:
         components = ("XYZ", POSE[3:], POSE[:3])
-        super().__init__(collection, core, apart=parts, components=components, lengths=("",) * 3)
+        super().__init__(collection, core, components=components, lengths=("",) * 3)
         self.parameters = collection.parameters[len(POSE) :]
-
-    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return the row sets to remove: single rows, and for control also all rows."""
-        size = int(self.row_starts[group + 1] - self.row_starts[group])
-        if not self.apart or int(self.kinds[group]) == IMAGE or size < 2:
-            return None
-        single = [(row,) for row in range(size)]
-        return [*single, tuple(range(size))] if int(self.kinds[group]) == CONTROL else single
-
-    def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photo to which the camera belongs."""
-        return np.array([subject])
 
     def other_name(self, kind: int, subject: int) -> Phrase:
         """Return the name of the camera of a photo."""

@@ -30,17 +30,23 @@ from photogram.network.cameras import Camera
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.subset import image_rows
 from photogram.results.exchanged_names import exchanged_names
-from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
+from photogram.results.network_trial import (
+    ATTITUDE,
+    CONTROL,
+    IMAGE,
+    POSITION,
+    LostSupportError,
+    NetworkTrial,
+    Out,
+)
+from photogram.results.snooping_log import Aside, Outcome, Settings, snooped
 from photogram.results.snooping_result import Snooped
-from photogram.statistics.snooping.snooping import Outcome, snooped
-from photogram.statistics.snooping.starts import MEDIAN_OF_TWO
-from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
-from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.collection import Collection
 
+MEDIAN_OF_TWO = 1.1774100225154747  # Median of the length of a vector of two standard normal variables
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
 FAR = 5.0  # Initial rejection limit of images after a robust adjustment, in robust standard deviations
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"

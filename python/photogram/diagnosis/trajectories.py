@@ -29,7 +29,7 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.diagnosis.findings import Words
-    from photogram.statistics.snooping.log import Removal
+    from photogram.results.snooping_log import Removal
 
 
 def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[Section], Result | None]:

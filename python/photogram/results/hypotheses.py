@@ -20,11 +20,10 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.unadjusted import Given
 from photogram.results.hypothesis_facts import NO_FACTS, Facts
-from photogram.results.network_trial import NamedSuspects, NetworkTrial
+from photogram.results.network_trial import NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
 from photogram.statistics.findings import Tested
-from photogram.statistics.snooping.suspects import Suspects, Tests
 from photogram.words import Phrase, phrase
 
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
@@ -357,10 +356,15 @@ def hypotheses(
     numbers = Counter(kinds)
     count, statistic = np.array([numbers[kind] for kind in kinds]), of("statistic")
     k = np.maximum(np.count_nonzero(~np.isnan(estimate), axis=1), 1)
-    change = statistic
-    if estimated is not None:
-        change = -estimated[1] * np.log(np.maximum(1 - statistic / estimated[0], 1e-300))
-    odds = _log_odds(change, k, np.maximum(of("observations"), k + 1), count)
+
+    def change(statistic: ArrayLike) -> Floats:
+        """Return twice the logarithms of the likelihood ratios against no error."""
+        if estimated is None:
+            return np.asarray(statistic)
+        omega, freedom = estimated
+        return -freedom * np.log(np.maximum(1 - np.asarray(statistic) / omega, 1e-300))
+
+    odds = _log_odds(change(statistic), k, np.maximum(of("observations"), k + 1), count)
     odds -= np.nansum(np.square(estimate / plausible), axis=1) / 2
     effects = {}
     for row, own in enumerate(rows):
@@ -368,7 +372,7 @@ def hypotheses(
             of_checks, of_points = np.split(np.reshape(effect[-1], (-1, 3)), [checks])
             effects[row] = Effect(_is_checked(of_checks, check_sd), of_points, *effect[:-1])
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
-    of_images = float(_log_odds(largest, 2, 3, max(int(np.count_nonzero(images)), 1)))
+    of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
     kind, index = of("group"), of("index")
     sets = int(np.count_nonzero(kind < 0))
     return Hypotheses(
@@ -409,7 +413,7 @@ def _padded(rows: Sequence[Mapping[str, Any]], name: str, width: int) -> Floats:
     return found
 
 
-def _groups(suspects: Suspects, kinds: Indices, subjects: Indices) -> Indices:
+def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:
     """Return the groups with these types and subjects; -1 for a negative type."""
     most = max(int(suspects.subjects.max(initial=0)), int(subjects.max(initial=0))) + 1
     others = np.flatnonzero(suspects.kinds != 0)

@@ -284,8 +284,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         computed = bool(finite_rows(self.redundancy)[self.used_images].all())
         if not (computed and self.converged and self.degrees_of_freedom > 0):
             return None
+        from photogram.results.network_trial import LostSupportError
         from photogram.results.reliability_summary import reliability_summary
-        from photogram.statistics.snooping.suspects import LostSupportError
 
         try:
             found = self.reliability(unit_weight="known" if self.KNOWN else "unknown")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
@@ -12,35 +12,76 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
-from photogram.network.observations import Observation, Smoothness
-from photogram.network.trajectories import Trajectory
+from photogram.network.observations import Observation
 from photogram.network.unadjusted import Given
 from photogram.results.observation_kinds import kind_words, named_observation
 from photogram.statistics.findings import Text
 from photogram.statistics.groups import INVISIBLE
-from photogram.statistics.snooping.suspects import (
-    LostSupportError,
-    Out,
-    Prediction,
-    Standing,
-    Suspects,
-    Tests,
-)
+from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
 
 KINDS = ("image", "control", "position", "attitude", "observation", "camera", "unknown")
 """Items of the suspects of the core by number."""
 IMAGE, CONTROL, POSITION, ATTITUDE, OBSERVATION = range(5)
 
-WHOLE = 1500  # Largest number of rows for the complete R; an exact round has this number of solutions
-SUPPORT = 3  # Smallest number of images of a photo with a free pose
-HUBER, CAUCHY = 1.50, 2.55  # Scales of the losses of a robust start, in standard deviations of an image point
-ROBUST_ITERATIONS = 20
-
-_TESTS = ("active", "rank", "statistic", "least", "shared", "residual", "error", "error_sd")
+_TESTS = ("active", "rank", "statistic", "least", "residual", "error", "error_sd")
 
 T = TypeVar("T")
+
+
+@dataclass(eq=False)
+class Out:
+    """Excluded observations."""
+
+    rows: Bools  # (M,) excluded rows
+    # Excluded points and photos, with all their observations
+    points: set[int] = field(default_factory=set)
+    photos: set[int] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """State of a network without the excluded observations."""
+
+    status: str  # `converged`, or another end of the iteration
+    # weighted_sum_of_squares, degrees_of_freedom: Omega and f of the included observations
+    weighted_sum_of_squares: float
+    degrees_of_freedom: int
+
+    @property
+    def sum_and_freedom(self) -> tuple[float, float]:
+        return self.weighted_sum_of_squares, self.degrees_of_freedom
+
+
+@dataclass(frozen=True, eq=False)
+class Tests:
+    """Tests of all groups; NaN if excluded."""
+
+    active: Bools  # (G,) whether any row is included
+    rank: Indices  # (G,) directions in which an error is visible
+    statistic: Floats  # (G,) T, the decrease of Omega without the group
+    least: Floats  # (G,) the smallest redundancy of a visible direction
+    residual: Floats  # (M,) of unit weight
+    redundancy: Floats  # (M,) redundancy numbers
+    # error, error_sd: (M,) estimated error and its standard deviation, in the units of the rows
+    error: Floats
+    error_sd: Floats
+
+    def testable(self, row_starts: Indices) -> Bools:
+        """Return (G,) groups with a direction of notable errors in own residuals."""
+        largest = np.maximum.reduceat(np.nan_to_num(self.redundancy), row_starts[:-1])
+        return np.asarray(self.active & (self.rank > 0) & (largest > TESTABLE))
+
+
+class LostSupportError(Exception):
+    """The exclusions make unknowns of these points and photos undetermined."""
+
+    def __init__(self, points: Sequence[int], photos: Sequence[int]) -> None:
+        super().__init__(f"undetermined: points {list(points)}, photos {list(photos)}")
+        self.points = tuple(points)
+        self.photos = tuple(photos)
 
 
 class NetworkTrial:
@@ -53,11 +94,12 @@ class NetworkTrial:
         supported: Bools,
         rough: float,
         exact: float,
+        control: str,
     ) -> None:
         self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
         self.deviations: Floats = core.suspects.deviations
-        self._supported = supported  # (P,) whether the pose of a photo is determined without images
-        self._is_image = np.asarray(core.suspects.subjects[0] == IMAGE)
+        self.supported = supported  # (P,) whether the pose of a photo is determined without images
+        self.control = control  # Parts that may be removed alone: `whole`, `plan and height`, `components`
         starts = suspects.row_starts
         sizes = np.diff(starts)
         self._block_starts = np.concatenate([[0], np.cumsum(sizes**2)])
@@ -70,27 +112,7 @@ class NetworkTrial:
         """Continue the same network from other initial values; its groups are unchanged."""
         self.core, self._tests = core, {}
 
-    @property
-    def whole(self) -> bool:
-        """Whether the network is small enough for R of all rows."""
-        return int(self.suspects.row_starts[-1]) <= WHOLE
-
-    def adjust(self, out: Out, *, exact: bool = False) -> Standing:
-        tolerance = self.exact if self.whole or exact else self.rough
-        standing = self._asked(
-            self.core.adjust,
-            out.rows,
-            sorted(out.points),
-            sorted(out.photos),
-            tolerance=tolerance,
-            progress=None,
-        )
-        status, _, omega, freedom, collapsed = standing
-        if collapsed:
-            raise LostSupportError(collapsed, [])
-        return Standing(status, omega, freedom)
-
-    def _asked(self, ask: Callable[..., T], *arguments: Any, **options: Any) -> T:
+    def asked(self, ask: Callable[..., T], *arguments: Any, **options: Any) -> T:
         """Call the core; undetermined unknowns are a LostSupportError."""
         try:
             return ask(*arguments, **options)
@@ -103,15 +125,21 @@ class NetworkTrial:
             if kind == "undetermined photos":
                 photos = {photo for combination in combinations for photo in combination[0]}
                 # In the core, times on trajectories follow the photos.
-                own = sorted(photo for photo in photos if photo < len(self._supported))
+                own = sorted(photo for photo in photos if photo < len(self.supported))
                 raise LostSupportError([], own) from error
             raise
 
     def stand(self) -> Standing:
         """Use the final state of the adjustment; with a loss, adjust without removed observations."""
         if self.out is not None:
-            return self.adjust(self.out, exact=True)
-        status, _, omega, freedom, _ = self.core.stand()
+            rows, photos = self.out.rows, sorted(self.out.photos)
+            options = {"tolerance": self.exact, "progress": None}
+            found = self.asked(self.core.adjust, rows, sorted(self.out.points), photos, **options)
+        else:
+            found = self.core.stand()
+        status, _, omega, freedom, collapsed = found
+        if collapsed:
+            raise LostSupportError(collapsed, [])
         return Standing(status, omega, freedom)
 
     def correlation(self, first: int, second: int, between: Floats) -> float:
@@ -130,106 +158,11 @@ class NetworkTrial:
         redundancy = np.where(inside, found["cofactors"][self._diagonal], math.nan)
         return Tests(**{name: found[name] for name in _TESTS}, redundancy=redundancy)
 
-    def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        found = self.core.predictions(list(groups))
-        return [
-            None
-            if own is None
-            else Prediction(
-                own[0],
-                tuple(int(self.suspects.row_starts[group]) + row for row in own[1]),
-                tuple(own[2]),
-                tuple(own[3]),
-            )
-            for group, own in zip(groups, found, strict=True)
-        ]
-
-    def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return, for the points of some groups, all their groups with residuals and R."""
-        points = [int(self.suspects.points[group]) for group in groups]
-        on_points = iter(self.core.on_points([point for point in points if point >= 0]))
-        found = []
-        for group, point in zip(groups, points, strict=True):
-            own: tuple[list[int], Floats, Floats] = next(on_points) if point >= 0 else ([], None, None)  # type: ignore[assignment]
-            if own[0]:
-                of_point, values, response = own
-                rows = np.concatenate([self.suspects.rows(each) for each in of_point])
-                out = np.isnan(self._tests["residual"][rows])
-                response[out] = 0.0
-                response[:, out] = 0.0
-                found.append((of_point, np.where(out, 0.0, values), response))
-            else:
-                residuals = np.nan_to_num(self._tests["residual"][self.suspects.rows(group)])
-                found.append(([group], residuals, self.own_block(group)))
-        return found
-
-    def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return all groups of excluded points with residuals and R as if used.
-
-        Empty for points with additional observations, and for those that their rays do not determine.
-        """
-        return self.core.on_points(list(points), gone=True)
-
     def own_block(self, group: int) -> Floats:
         """Return R of a group."""
         start, end = self._block_starts[group : group + 2]
         size = math.isqrt(int(end - start))
         return np.asarray(self._tests["cofactors"][start:end].reshape(size, size))
-
-    def response(self) -> tuple[Floats, Floats]:
-        """Return residuals of unit weight and R of all rows; zero for excluded ones."""
-        residuals = self._tests["residual"]
-        out = np.isnan(residuals)
-        response = self.core.responses(list(range(len(self.suspects))))
-        response[out] = 0.0
-        response[:, out] = 0.0
-        return np.where(out, 0.0, residuals), response
-
-    def resist(self, scale: float) -> Floats | None:
-        """Adjust by Huber's, then Cauchy's loss: (G,) lengths of residuals.
-
-        None if either diverges; the next trial then begins at the last valid state.
-        """
-        weights: Floats | None = None
-        for loss, limit in (("huber", HUBER), ("cauchy", CAUCHY)):
-            weights = self._asked(
-                self.core.resist, loss, limit * scale, iterations=ROBUST_ITERATIONS, progress=None
-            )
-            if weights is None:
-                return None
-        # The weight of Cauchy's loss is 1 / (1 + (size / scale)^2).
-        least = np.maximum(np.asarray(weights), 1e-12)
-        return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / least - 1.0, 0.0)))
-
-    def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
-        """Return points with few rays, and unsupported photos, without a group."""
-        suspects = self.suspects
-        point, photo = int(suspects.points[group]), int(suspects.photos[group])
-        points: set[int] = set()
-        photos = {photo} if photo >= 0 and self._is_image[group] else set()
-        leaving: Indices = np.empty(0, dtype=np.int64)
-        if point >= 0 and point not in out.points:
-            own = suspects.on_point(point)
-            images = own[self._is_image[own]]
-            rays = images[self._are_in(out, images)]
-            held = own[~self._is_image[own]]
-            components = sum(int((~out.rows[suspects.rows(each)]).sum()) for each in held.tolist())
-            if not rays.size or (rays.size == 1 and components <= 1):
-                points, leaving = {point}, rays
-                photos |= {int(suspects.photos[image]) for image in rays.tolist()}
-        return points, {each for each in photos if self._falls(out, each, leaving)}
-
-    def _are_in(self, out: Out, images: Indices) -> Bools:
-        return np.asarray(~out.rows[self.suspects.row_starts[images]])
-
-    def _falls(self, out: Out, photo: int, leaving: Indices) -> bool:
-        """Whether a photo is left with too few images, excluding those of removed points."""
-        if self._supported[photo] or photo in out.photos:
-            return False
-        own = self.suspects.on_photo(photo)
-        images = own[self._is_image[own]]
-        gone = np.isin(images, leaving).sum() if leaving.size else 0
-        return int(self._are_in(out, images).sum() - gone) < SUPPORT
 
 
 def type_name(kind: int, label: str = "") -> Phrase:
@@ -240,11 +173,11 @@ def type_name(kind: int, label: str = "") -> Phrase:
     return phrase("test.control" if name == "control" else f"test.{name}s")
 
 
-class NamedSuspects(Suspects):
-    """Observation groups of a network with their names.
+class NamedSuspects(ABC):
+    """G groups of observations of a network with M rows in all, and their names.
 
-    They contain arrays, not the core, so that names remain available after the tests. Subclasses return the
-    parts of groups, and names of observations that are not images, control or poses.
+    They contain arrays, not the core, so that names remain available after the tests. Subclasses return names
+    of observations that are not images, control or poses.
     """
 
     def __init__(
@@ -252,7 +185,6 @@ class NamedSuspects(Suspects):
         given: Given,
         core: _photocore.NetworkSuspects,
         *,
-        apart: bool,  # Whether parts of a control point or of a station may be removed separately
         # Components of coordinates of points, positions and attitudes; units of the first two
         components: tuple[Sequence[str], Sequence[str], Sequence[str]],
         lengths: Sequence[str],
@@ -265,27 +197,23 @@ class NamedSuspects(Suspects):
         points[control] = subjects[control]
         station = (kinds == POSITION) | (kinds == ATTITUDE)
         photos[station] = subjects[station]
-        removable = np.asarray(kinds <= OBSERVATION)
-        super().__init__(core.row_starts, kinds, KINDS, subjects, points, photos, removable)
-        self.given, self.apart, self.components = given, apart, core.components
+        self.row_starts: Indices = core.row_starts  # (G + 1,) first row of each group
+        self.kinds, self.kind_names = kinds, KINDS  # (G,) types by their numbers: `image`, `control`, ...
+        self.subjects = subjects  # (G,) number of the image, point, observation, ... of a group
+        self.points, self.photos = points, photos  # (G,) point and photo of a group, or -1
+        self.given, self.components = given, core.components
         self._names = dict(zip((CONTROL, POSITION, ATTITUDE), components, strict=True)) | {IMAGE: "xy"}
         images, angles = (given.image_unit,) * 2, ("rad",) * 3
         self._units = {IMAGE: images, CONTROL: lengths, POSITION: lengths, ATTITUDE: angles}
 
-    def photos_of_point(self, point: int) -> Indices:
-        groups = self.on_point(point)
-        return np.asarray(self.photos[groups[self.kinds[groups] == IMAGE]])
+    def __len__(self) -> int:
+        return len(self.kinds)
 
-    def loads(self, group: int) -> Indices:
-        """Return the photos that a group affects."""
-        kind, subject = int(self.kinds[group]), int(self.subjects[group])
-        if kind == IMAGE:
-            return self.photos_of_point(int(self.points[group]))
-        if kind == CONTROL:
-            return self.photos_of_point(subject)
-        if kind in (POSITION, ATTITUDE):
-            return np.array([subject])
-        return self.other_loads(kind, subject)
+    def kind(self, group: int) -> str:
+        return self.kind_names[int(self.kinds[group])]
+
+    def rows(self, group: int) -> Indices:
+        return np.arange(self.row_starts[group], self.row_starts[group + 1])
 
     def touched(self, group: int) -> tuple[list[int], list[int]]:
         """Return the points and photos that a group observes."""
@@ -342,9 +270,6 @@ class NamedSuspects(Suspects):
         return self.other_row(kind, int(self.subjects[group]), component)
 
     @abstractmethod
-    def other_loads(self, kind: int, subject: int) -> Indices: ...
-
-    @abstractmethod
     def other_name(self, kind: int, subject: int) -> Phrase: ...
 
     @abstractmethod
@@ -368,10 +293,11 @@ def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = 
     on_shared = np.array([name in shared for name in block.photo_ids], dtype=bool)
     return NetworkTrial(
         core=core,
-        suspects=BlockSuspects(block, core.suspects, parts),
+        suspects=BlockSuspects(block, core.suspects),
         supported=np.asarray(np.isfinite(deviations).all(axis=1) | on_shared),
         rough=EXACT if _datum_is_loose(block) else ROUGH,
         exact=EXACT,
+        control="plan and height" if parts else "whole",
     )
 
 
@@ -393,14 +319,13 @@ def observations_of_core(block: Block) -> list[Observation]:
 
 
 class BlockSuspects(NamedSuspects):
-    """The observation groups of a block; `parts` may be removed separately."""
+    """The observation groups of a block."""
 
-    def __init__(self, block: Block, core: _photocore.NetworkSuspects, parts: bool = True) -> None:
+    def __init__(self, block: Block, core: _photocore.NetworkSuspects) -> None:
         axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
         plan = "rad" if block.geographic else block.linear_unit
-        super().__init__(
-            block, core, apart=parts, components=(axes, axes, ANGLES), lengths=(plan, plan, block.linear_unit)
-        )
+        lengths = (plan, plan, block.linear_unit)
+        super().__init__(block, core, components=(axes, axes, ANGLES), lengths=lengths)
         self.block = block
         self.observations = observations_of_core(block)
 
@@ -413,52 +338,11 @@ class BlockSuspects(NamedSuspects):
     def photo_row(self) -> dict[str, int]:
         return {name: row for row, name in enumerate(self.block.photo_ids)}
 
-    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return separately removable parts of control points and stations."""
-        if not self.apart:
-            return None
-        kind = int(self.kinds[group])
-        components = self.components[self.row_starts[group] : self.row_starts[group + 1]].tolist()
-        if kind == CONTROL and len(components) == 3:
-            return [(0, 1, 2), (2,), (0, 1)]
-        if kind in (CONTROL, POSITION, ATTITUDE) and len(components) > 1:
-            return [(row,) for row in range(len(components))]
-        return None
-
     def touched(self, group: int) -> tuple[list[int], list[int]]:
         if self.kinds[group] != OBSERVATION:
             return super().touched(group)
         own = self.observations[int(self.subjects[group])]
         return [self.point_row[name] for name in own.points], [self.photo_row[name] for name in own.photos]
-
-    def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photos that an additional observation affects; all if common."""
-        if kind != OBSERVATION:
-            return np.arange(len(self.block.photo_ids))
-        observation = self.observations[subject]
-        if observation.moment is not None:
-            return self._flown(observation.moment.trajectory)
-        if isinstance(observation, Smoothness):
-            smoothed = self._of_coefficients.get(id(observation.unknowns[0]))
-            return np.zeros(0, dtype=np.int64) if smoothed is None else self._flown(smoothed)
-        seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
-        own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
-        return np.unique(np.concatenate([own, *seen]))
-
-    def _flown(self, trajectory: Trajectory) -> Indices:
-        return self._on_trajectories.get(id(trajectory), np.zeros(0, dtype=np.int64))
-
-    @cached_property
-    def _on_trajectories(self) -> dict[int, Indices]:
-        found: dict[int, list[int]] = {}
-        for each, own in zip(self.block.timed, self.block.trajectories, strict=True):
-            found.setdefault(id(own), []).append(self.photo_row[each.photo])
-        return {key: np.array(sorted(rows), dtype=np.int64) for key, rows in found.items()}
-
-    @cached_property
-    def _of_coefficients(self) -> dict[int, Trajectory]:
-        every = {id(each): each for each in self.block.trajectories}.values()
-        return {id(one): each for each in every for all_ in each.coefficients for one in all_}
 
     def type(self, kind: int, subject: int) -> Phrase:
         return type_name(kind, self.observations[subject].label if kind == OBSERVATION else "")

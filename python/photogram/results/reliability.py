@@ -28,14 +28,22 @@ from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, Selection
-from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial
+from photogram.results.network_trial import (
+    CONTROL,
+    IMAGE,
+    OBSERVATION,
+    NamedSuspects,
+    NetworkTrial,
+    Out,
+    Standing,
+    Tests,
+)
 from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.quantity import Table, column, members, records
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.findings import Removed
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
-from photogram.statistics.snooping.suspects import Out, Standing, Suspects, Tests
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
@@ -102,7 +110,7 @@ class Reliability:
         self.downweighted = downweighted
         self.standing: Standing = trial.stand()
         self.tests: Tests = trial.tests()
-        self.suspects: Suspects = trial.suspects
+        self.suspects: NamedSuspects = trial.suspects
 
     @property
     def sd(self) -> Floats:

@@ -15,11 +15,11 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.hypotheses import Hypotheses
+from photogram.results.network_trial import NamedSuspects, Standing, Tests
 from photogram.results.reliability import Downweighted, Inseparable, Reliability
 from photogram.show.page import Part, Remarks, about
 from photogram.show.quantity import Quantities, Quantity, Table, column, members, records
 from photogram.statistics.reliability import TESTABLE
-from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +45,7 @@ class ReliabilitySummary:
     pairs_found: int  # number of these pairs among the examined points
     # Number of examined points: those with the least redundancy, at most `LOOKED_INTO`
     points_looked_into: int
-    suspects: Suspects  # all groups, and their tests
+    suspects: NamedSuspects  # all groups, and their tests
     tests: Tests
     hypotheses: Hypotheses  # Errors of sets and single observations, and their effects if undetected
     standing: Standing  # sum of squares and degrees of freedom of the tested observations
@@ -169,7 +169,7 @@ def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
     ]
 
 
-def _points(suspects: Suspects, tests: Tests) -> tuple[int, list[int]]:
+def _points(suspects: NamedSuspects, tests: Tests) -> tuple[int, list[int]]:
     """Return the number of two-ray points, and points with possible pairs."""
     at = suspects.points
     takes_part = tests.active & (at >= 0)

@@ -12,16 +12,13 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_trial import Standing
+from photogram.results.snooping_log import Outcome, Removal, Rival, Settings, disputes
 from photogram.show.methods import Brief, Documented, Rows, few
 from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section, about
 from photogram.show.quantity import Quantity, Table, members, members_of_each, of_each, records
 from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
-from photogram.statistics.snooping.disputes import disputes
-from photogram.statistics.snooping.log import Removal, Rival
-from photogram.statistics.snooping.snooping import Outcome
-from photogram.statistics.snooping.suspects import Standing
-from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
@@ -168,7 +165,7 @@ def recorded(found: Snooped) -> Snooped:
             record | {"subject": entry.subject}
             for record, entry in zip(records(log_table(found.removed).columns), found.removed, strict=True)
         ],
-        found.suspects.counts(found.outcome.out.rows, found.outcome.final.active),
+        found.suspects.counts(found.outcome.out.rows, found.outcome.active),
         rivals=found.rivals,
         exchanged=[each.sentence for each in found.exchanged],
         kept=[

@@ -78,6 +78,7 @@ mod problem;
 mod responses;
 mod screens;
 mod selection;
+pub mod snooping;
 mod solution;
 mod state;
 mod station_values;

@@ -29,6 +29,21 @@ pub enum Subject {
     Common(usize),
 }
 
+impl Subject {
+    /// Returns the number of its type, in the order of the types.
+    pub fn kind(self) -> usize {
+        match self {
+            Self::Image(_) => 0,
+            Self::Control(_) => 1,
+            Self::Position(_) => 2,
+            Self::Attitude(_) => 3,
+            Self::Observation(_) => 4,
+            Self::Camera(_) => 5,
+            Self::Common(_) => 6,
+        }
+    }
+}
+
 /// One component of a test group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Row {

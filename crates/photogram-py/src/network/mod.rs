@@ -6,6 +6,7 @@ pub mod collection;
 pub mod covariances;
 pub mod first_values;
 pub mod node;
+pub mod snooping;
 pub mod solution;
 pub mod state;
 pub mod steps;

@@ -13,16 +13,14 @@ pub struct NetworkSuspects(pub(super) Arc<Suspects>);
 
 /// Returns the number of the type, and the index.
 pub(super) fn subject(subject: Subject) -> (u8, i64) {
-    let (kind, index) = match subject {
-        Subject::Image(index) => (0, index),
-        Subject::Control(index) => (1, index),
-        Subject::Position(index) => (2, index),
-        Subject::Attitude(index) => (3, index),
-        Subject::Observation(index) => (4, index),
-        Subject::Camera(index) => (5, index),
-        Subject::Common(index) => (6, index),
-    };
-    (kind, index as i64)
+    let (Subject::Image(index)
+    | Subject::Control(index)
+    | Subject::Position(index)
+    | Subject::Attitude(index)
+    | Subject::Observation(index)
+    | Subject::Camera(index)
+    | Subject::Common(index)) = subject;
+    (subject.kind() as u8, index as i64)
 }
 
 #[pymethods]

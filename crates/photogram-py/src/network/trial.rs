@@ -1,7 +1,6 @@
 //! Outlier session: a network adjusted without some of its observations.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
-use photocore::adjustment::Loss;
 use photocore::network::hypotheses::{About, Facts, Hypotheses, Hypothesis};
 use photocore::network::{Moved, Network, Options, Out, Outcome, Trial, UnknownOf};
 use pyo3::prelude::*;
@@ -10,20 +9,19 @@ use pyo3::types::PyDict;
 use super::covariances::Refused;
 use super::state::BlockState;
 use super::suspects::{NetworkSuspects, subject};
-use crate::arrays::{Array, Matrix, Vector, rows, table};
-use crate::options::named_loss;
+use crate::arrays::{Array, Matrix, rows, table};
 use crate::solution::status_name;
 use crate::work::{Workers, watched};
 
 /// Network that is adjusted without some of its observations.
 #[pyclass(module = "photogram._photocore")]
 pub struct NetworkTrial {
-    trial: Trial,
+    pub(super) trial: Trial,
     images: usize,
     /// Number of photos without trajectory records.
     photos: usize,
     threads: usize,
-    refused: Refused,
+    pub(super) refused: Refused,
 }
 
 /// Status, iterations, weighted sum of squares, degrees of freedom, points that collapsed into a station.
@@ -33,9 +31,6 @@ fn outcome_row(outcome: Outcome) -> OutcomeRow {
     let Outcome { status, iterations, sum_of_squares, degrees_of_freedom, collapsed } = outcome;
     (status_name(status), iterations, sum_of_squares, degrees_of_freedom, collapsed)
 }
-
-/// Statistic, excluded rows, error and standard deviation of the error per row.
-type PredictionRow = (f64, Vec<usize>, Vec<f64>, Vec<f64>);
 
 /// Converts a hypothesis to a dictionary; see the stub.
 fn hypothesis_row(py: Python<'_>, own: Hypothesis) -> PyResult<Bound<'_, PyDict>> {
@@ -71,7 +66,7 @@ fn hypothesis_row(py: Python<'_>, own: Hypothesis) -> PyResult<Bound<'_, PyDict>
 }
 
 impl NetworkTrial {
-    fn workers(&self) -> Workers {
+    pub(super) fn workers(&self) -> Workers {
         Workers::of(self.threads, self.images)
     }
 }
@@ -147,25 +142,6 @@ impl NetworkTrial {
         found.map(outcome_row).map_err(|error| refused(&error))
     }
 
-    #[pyo3(signature = (loss, scale, *, iterations, progress))]
-    fn resist<'py>(
-        &mut self,
-        py: Python<'py>,
-        loss: &str,
-        scale: f64,
-        iterations: usize,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Option<Vector<'py>>> {
-        let Some(loss): Option<Loss> = named_loss(Some((loss, scale)))? else {
-            return Ok(None);
-        };
-        let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
-        let found =
-            watched(py, workers, progress, |pool, watch| trial.resist(loss, iterations, pool, watch))?;
-        let weights = found.map_err(|error| refused(&error))?;
-        Ok(weights.map(|weights| PyArray1::from_vec(py, weights)))
-    }
-
     fn tests<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = watched(py, self.workers(), None, |pool, _| self.trial.tests(pool))?;
         let tests = found.map_err(|error| (self.refused)(&error))?;
@@ -176,7 +152,6 @@ impl NetworkTrial {
         for (name, values) in [
             ("statistic", tests.statistic),
             ("least", tests.least),
-            ("shared", tests.shared),
             ("residual", tests.residual),
             ("cofactors", tests.cofactors),
             ("error", tests.error),
@@ -224,37 +199,6 @@ impl NetworkTrial {
         let Hypotheses { all, sets, correlations } = found.map_err(|error| (self.refused)(&error))?;
         let rows = all.into_iter().map(|own| hypothesis_row(py, own)).collect::<PyResult<_>>()?;
         Ok((rows, PyArray1::from_vec(py, correlations).reshape([sets, sets])?))
-    }
-
-    fn predictions(&self, py: Python<'_>, suspects: Vec<usize>) -> PyResult<Vec<Option<PredictionRow>>> {
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.predictions(&suspects, pool))?;
-        let predictions = found.map_err(|error| (self.refused)(&error))?;
-        Ok(predictions
-            .into_iter()
-            .map(|own| own.map(|own| (own.statistic, own.rows, own.error, own.error_sd)))
-            .collect())
-    }
-
-    #[pyo3(signature = (points, *, gone = false))]
-    #[allow(clippy::type_complexity, reason = "a tuple of arrays for each point")]
-    fn on_points<'py>(
-        &self,
-        py: Python<'py>,
-        points: Vec<usize>,
-        gone: bool,
-    ) -> PyResult<Vec<(Vec<usize>, Vector<'py>, Matrix<'py>)>> {
-        let found = watched(py, self.workers(), None, |pool, _| match gone {
-            true => self.trial.on_gone_points(&points, pool),
-            false => self.trial.on_points(&points, pool),
-        })?;
-        let rows = found.map_err(|error| (self.refused)(&error))?;
-        rows.into_iter()
-            .map(|own| {
-                let count = own.residual.len();
-                let cofactors = PyArray1::from_vec(py, own.cofactors).reshape([count, count])?;
-                Ok((own.suspects, PyArray1::from_vec(py, own.residual), cofactors))
-            })
-            .collect()
     }
 
     fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Matrix<'py>> {

@@ -1,0 +1,177 @@
+//! Rounds of data snooping: select, exclude, adjust, test again.
+
+use super::super::NetworkError;
+use super::super::trial::Trial;
+use super::choosing::is_beyond;
+use super::consensus::Consensus;
+use super::groups::Groups;
+use super::log::{Log, Remark, Round, Standing};
+use super::settings::Settings;
+use super::state::Snooping;
+use super::tried::{Running, Tried};
+use super::unit_weight::Criticals;
+use crate::Threads;
+use crate::adjustment::{Status, Watch};
+
+impl Trial {
+    /// Excludes gross errors.
+    ///
+    /// # Errors
+    /// Errors of [`Trial::adjust`].
+    pub fn snoop(
+        &mut self,
+        settings: Settings,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Log, NetworkError> {
+        let mut snooping = Snooping::new(self, settings, None, threads, watch)?;
+        snooping.run(self, threads, watch)?;
+        Ok(snooping.finish())
+    }
+}
+
+impl Snooping {
+    /// Adjusts and tests all observations, or those of a consensus if they have no adjustment together.
+    ///
+    /// # Errors
+    /// Errors of [`Trial::adjust`].
+    pub fn new(
+        trial: &mut Trial,
+        settings: Settings,
+        consensus: Option<&Consensus>,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Self, NetworkError> {
+        let groups = Groups::new(trial, &settings);
+        let network = &mut Running { trial, threads, watch };
+        let Some(consensus) = consensus else { return Self::begin(network, groups, settings, None) };
+        let out = groups.excluded_by(consensus);
+        let mut new = Self::begin(network, groups, settings, Some(out))?;
+        new.decide(network, consensus, false)?;
+        Ok(new)
+    }
+
+    /// Continues from another start: the result of a consensus, which excludes some observations.
+    ///
+    /// # Errors
+    /// Errors of [`Trial::adjust`].
+    pub fn restart(
+        &mut self,
+        trial: &mut Trial,
+        consensus: &Consensus,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<(), NetworkError> {
+        self.decide(&mut Running { trial, threads, watch }, consensus, true)
+    }
+
+    /// Returns whether the residuals are too large, before any exclusion: errors of whole sets of observations may be the reason. The global
+    /// test decides; if the unit weight is unknown, the tests of all groups.
+    pub fn may_have_common_errors(&self) -> bool {
+        let is_significant = || {
+            let mut critical = Criticals::new(self.unit(), self.level.limit(0));
+            let allowed = self.allowed();
+            (0..self.groups.len())
+                .any(|group| allowed[group] && is_beyond(&self.tests, &self.scales, &mut critical, group))
+        };
+        self.removals.is_empty()
+            && self.standing.status == Status::Converged
+            && self.unit().is_rejected(1.0).unwrap_or_else(is_significant)
+    }
+
+    /// Adjusts without the exclusions to the convergence limit of tests of sets.
+    ///
+    /// # Errors
+    /// Errors of [`Trial::adjust`].
+    pub fn adjust_exactly(
+        &mut self,
+        trial: &mut Trial,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Standing, NetworkError> {
+        let (out, exact) = (self.out.clone(), self.settings.exact);
+        let adjusted = self.adjust_to(&mut Running { trial, threads, watch }, out, exact)?;
+        adjusted.map_err(NetworkError::from)?;
+        Ok(self.standing)
+    }
+
+    /// Excludes groups in rounds until nothing changes.
+    ///
+    /// # Errors
+    /// Errors of [`Trial::adjust`].
+    pub fn run(
+        &mut self,
+        trial: &mut Trial,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<(), NetworkError> {
+        self.run_rounds(&mut Running { trial, threads, watch })
+    }
+
+    pub(super) fn run_rounds(&mut self, network: &mut dyn Tried) -> Result<(), NetworkError> {
+        self.exclude_bad_photos(network)?;
+        if self.needs_robust_start() {
+            self.start_robustly(network)?;
+        } else {
+            self.set_scales();
+        }
+        for number in 1..=self.settings.max_rounds {
+            if !self.round(network, number)? {
+                return Ok(());
+            }
+        }
+        self.remarks.push(Remark::NotEnded);
+        Ok(())
+    }
+
+    /// Executes a round; returns whether anything has changed.
+    fn round(&mut self, network: &mut dyn Tried, number: usize) -> Result<bool, NetworkError> {
+        let (standing, before) = (self.standing, self.tests.clone());
+        let excluded = self.removals.iter().filter(|entry| entry.is_out()).count();
+        let choices = self.choosing(self.allowed(), excluded, true).choose(network)?;
+        // In a large network, earlier exclusions are reinstated in the adjustment that excludes others.
+        let mut returned = if self.groups.is_small { vec![] } else { self.agreeing(network)? };
+        let removed = self.apply(network, self.entries(&choices, number), &returned)?;
+        self.note_return(&returned, number);
+        let mut removed = self.without_disputed(network, removed, &choices, &before)?;
+        if self.groups.is_small {
+            returned = self.reinstate(network, number)?;
+        }
+        removed.extend(self.exclude_photos(network, number)?);
+        let goes_on = !removed.is_empty() || !returned.is_empty();
+        self.note_round(number, standing, removed, returned, excluded);
+        Ok(goes_on)
+    }
+
+    pub(super) fn note_round(
+        &mut self,
+        number: usize,
+        standing: Standing,
+        removed: Vec<usize>,
+        returned: Vec<usize>,
+        excluded: usize,
+    ) {
+        let limit = self.level.limit(excluded);
+        self.rounds.push(Round { number, standing, limit, removed, returned });
+    }
+
+    /// Returns the log with the predictions of the excluded observations.
+    pub fn finish(mut self) -> Log {
+        for place in 0..self.removals.len() {
+            if self.removals[place].is_out() {
+                self.note_prediction(place);
+            }
+        }
+        Log {
+            removals: self.removals,
+            rounds: self.rounds,
+            remarks: self.remarks,
+            out: self.out,
+            tests: self.level.tests,
+            before: self.before,
+            after: self.standing,
+            factors: self.factors,
+            active: self.tests.active.clone(),
+        }
+    }
+}

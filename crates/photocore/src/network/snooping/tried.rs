@@ -1,0 +1,121 @@
+//! Operations of a network that data snooping requires.
+
+use super::super::group_tests::Tests;
+use super::super::predictions::{OnPoint, Prediction};
+use super::super::trial::{Out, Trial};
+use super::super::{Combination, NetworkError, Outcome};
+use super::groups::Excluded;
+use super::log::Standing;
+use crate::Threads;
+use crate::adjustment::{Loss, Watch};
+
+/// Scales of Huber's and Cauchy's loss, in standard deviations of an image point.
+const HUBER: f64 = 1.50;
+const CAUCHY: f64 = 2.55;
+/// Maximum number of iterations with each loss.
+const ROBUST_ITERATIONS: usize = 20;
+/// Smallest weight factor.
+const LEAST_WEIGHT: f64 = 1e-12;
+
+/// A network that can be adjusted without some observations; see the methods of [`Trial`].
+pub(super) trait Tried {
+    fn adjust(&mut self, out: &Excluded, tolerance: f64) -> Result<Standing, NetworkError>;
+
+    fn tests(&mut self) -> Result<Tests, NetworkError>;
+
+    fn predictions(&mut self, groups: &[usize]) -> Result<Vec<Option<Prediction>>, NetworkError>;
+
+    fn on_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError>;
+
+    fn on_gone_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError>;
+
+    /// Returns R of all rows.
+    fn responses(&mut self) -> Result<Vec<f64>, NetworkError>;
+
+    /// Adjusts robustly: errors beyond `scale` standard deviations lose weight. Returns the length of the residuals of unit weight of each
+    /// group, zero for groups without loss. None if it diverges; then the state is unchanged.
+    fn resist(&mut self, scale: f64) -> Result<Option<Vec<f64>>, NetworkError>;
+}
+
+/// A trial with its threads and progress.
+pub(super) struct Running<'a> {
+    pub trial: &'a mut Trial,
+    pub threads: &'a Threads,
+    pub watch: Watch<'a>,
+}
+
+impl Tried for Running<'_> {
+    fn adjust(&mut self, out: &Excluded, tolerance: f64) -> Result<Standing, NetworkError> {
+        let (points, photos): (Vec<usize>, Vec<usize>) =
+            (out.points.iter().copied().collect(), out.photos.iter().copied().collect());
+        let own = Out { rows: &out.rows, points: &points, photos: &photos };
+        let Outcome { status, sum_of_squares, degrees_of_freedom, collapsed, .. } =
+            self.trial.adjust(own, Some(tolerance), self.threads, self.watch)?;
+        if collapsed.is_empty() {
+            return Ok(Standing { status, sum_of_squares, degrees_of_freedom });
+        }
+        Err(NetworkError::UndeterminedPoints(collapsed))
+    }
+
+    fn tests(&mut self) -> Result<Tests, NetworkError> {
+        self.trial.tests(self.threads)
+    }
+
+    fn predictions(&mut self, groups: &[usize]) -> Result<Vec<Option<Prediction>>, NetworkError> {
+        self.trial.predictions(groups, self.threads)
+    }
+
+    fn on_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError> {
+        self.trial.on_points(points, self.threads)
+    }
+
+    fn on_gone_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError> {
+        self.trial.on_gone_points(points, self.threads)
+    }
+
+    fn responses(&mut self) -> Result<Vec<f64>, NetworkError> {
+        let all: Vec<usize> = (0..self.trial.suspects().subjects().count()).collect();
+        self.trial.responses(&all, self.threads)
+    }
+
+    fn resist(&mut self, scale: f64) -> Result<Option<Vec<f64>>, NetworkError> {
+        let huber = Loss::Huber(HUBER * scale);
+        if self.trial.resist(huber, ROBUST_ITERATIONS, self.threads, self.watch)?.is_none() {
+            return Ok(None);
+        }
+        let limit = CAUCHY * scale;
+        let weights = self.trial.resist(Loss::Cauchy(limit), ROBUST_ITERATIONS, self.threads, self.watch)?;
+        // The weight of Cauchy's loss is 1 / (1 + (size / limit)^2).
+        let size = |weight: f64| limit * (weight.max(LEAST_WEIGHT).recip() - 1.0).max(0.0).sqrt();
+        Ok(weights.map(|weights| weights.into_iter().map(size).collect()))
+    }
+}
+
+/// Objects without support: the reason why an adjustment without some observations fails.
+pub(super) struct Lost {
+    pub points: Vec<usize>,
+    pub photos: Vec<usize>,
+}
+
+impl From<Lost> for NetworkError {
+    fn from(Lost { points, photos }: Lost) -> Self {
+        match points.is_empty() {
+            false => Self::UndeterminedPoints(points),
+            true => Self::Undetermined(vec![Combination { photos, ..Combination::default() }]),
+        }
+    }
+}
+
+/// Separates a loss of support from other errors.
+pub(super) fn unless_lost<T>(result: Result<T, NetworkError>) -> Result<Result<T, Lost>, NetworkError> {
+    match result {
+        Ok(value) => Ok(Ok(value)),
+        Err(NetworkError::UndeterminedPoints(points)) => Ok(Err(Lost { points, photos: vec![] })),
+        Err(NetworkError::NotFinite) => Ok(Err(Lost { points: vec![], photos: vec![] })),
+        Err(NetworkError::Undetermined(combinations)) => {
+            let photos = combinations.into_iter().flat_map(|own| own.photos).collect();
+            Ok(Err(Lost { points: vec![], photos }))
+        }
+        Err(error) => Err(error),
+    }
+}

@@ -1,0 +1,312 @@
+"""Data snooping in the core, with its log: all removals and their reasons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from photogram import _photocore
+from photogram.arguments.types import Bools
+from photogram.lazy_dataclasses import dataclass
+from photogram.results.network_trial import KINDS, LostSupportError, Out, Standing, Tests
+from photogram.statistics.distributions import LEVEL
+from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram.results.network_trial import NamedSuspects, NetworkTrial
+
+MAX_ROWS = 1500  # Largest number of rows for the complete R; an exact round has this number of solutions
+NEAR = 3.0  # Likelihood ratio of alternatives in the log
+ODDS = 20.0  # Largest likelihood ratio of alternatives
+KEPT = {
+    code: Phrase(f"snooping.{code}") for code in ("needed", "photo-undetermined", "disputed")
+}  # Reasons for not removing a group although its test rejects
+
+
+@dataclass(frozen=True)
+class Settings:
+    level: float = LEVEL  # Joint level of all tests, or the false discovery rate
+    fdr: bool = False  # Whether `level` is the false discovery rate
+    known: bool = True  # Whether the unit weight is known: chi-square decides, otherwise F
+    robust: bool | None = None  # Whether to start robustly; None if many observations are wrong
+    max_rounds: int = 20
+
+
+@dataclass(frozen=True)
+class Aside:
+    """Exclusions by the consensus from which a network was restarted."""
+
+    # Groups, by number, that do not agree with most of their point and photo
+    images: tuple[int, ...]
+    photos: dict[int, str | Phrase]  # Photos whose observations agree with no pose, with the reason
+    found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
+
+
+@dataclass(frozen=True)
+class Rival:
+    name: str
+    statistic: float  # T when the other was chosen
+    dimension: int
+    odds: float  # likelihood ratio of the chosen group and this one
+
+
+@dataclass(frozen=True)
+class Removal:
+    """A removed group of observations, or a part of one."""
+
+    round: int  # from 1; 0: by a robust adjustment before the first
+    group: int  # number among all groups
+    kind: str  # type of its observations
+    subject: Phrase
+    rows: tuple[int, ...]  # removed rows
+    components: tuple[str, ...]
+    units: tuple[str, ...]
+    dimension: int  # m', number of directions in which the error is visible
+    first_statistic: float  # T at the start of the round
+    # statistic, fisher: T conditional on earlier removals of the round, and its F
+    statistic: float
+    fisher: float
+    log_probability: float  # Natural logarithm of the p-value
+    limit: float  # Level it was compared with
+    # Estimated errors of the rows and standard deviations (a priori unit weight), in the units of the rows
+    error: tuple[float, ...]
+    error_sd: tuple[float, ...]
+    redundancy: float  # The smallest redundancy of a visible direction
+    rivals: tuple[Rival, ...] = ()  # groups that may contain the error instead
+    consequences: tuple[Phrase | str, ...] = ()  # further removals and their reasons
+    # prediction, prediction_log_probability, prediction_error: T of it, its log-probability, and observed
+    # minus predicted, from the other observations; None if its point or photo is excluded
+    prediction: float | None = None
+    prediction_log_probability: float | None = None
+    prediction_error: tuple[float, ...] = ()
+    returned: int | None = None  # round of reinstatement; None while it is excluded
+    kept: Phrase | str = ""  # reason for not removing it although its test rejects
+
+    @property
+    def name(self) -> str:
+        """Name of the group in English."""
+        return str(self.subject)
+
+    @property
+    def is_out(self) -> bool:
+        """Whether it is removed and not reinstated."""
+        return self.returned is None and not self.kept
+
+    @property
+    def in_dispute(self) -> tuple[Rival, ...]:
+        """Alternatives that are nearly as likely: likelihood ratio of less than three."""
+        return tuple(rival for rival in self.rivals if rival.odds < NEAR)
+
+    @property
+    def sentence(self) -> Phrase:
+        """The removed group with its alternatives."""
+        return _alternatives(self, self.in_dispute)
+
+
+@dataclass(frozen=True)
+class Round:
+    number: int  # From 1; 0 for the robust start
+    status: str  # of the adjustment at the start of the round
+    weighted_sum_of_squares: float  # Omega and f at the start
+    degrees_of_freedom: int
+    tests: int  # number of tested groups
+    limit: float  # Probability below which a group is removed
+    removed: Sequence[int]  # numbers in the log
+    returned: Sequence[int]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Result of data snooping."""
+
+    log: list[Removal]  # all removals in order
+    rounds: list[Round]  # the last one is without removals
+    out: Out  # excluded observations
+    tests: int  # number of tested groups, as at the start
+    before: Standing  # with all observations, and without the excluded ones
+    standing: Standing
+    # Robust factors of standard deviations by type; empty if the given ones are used
+    factors: dict[str, float]
+    active: Bools  # (G,) groups in use at the end
+    remarks: list[Phrase]
+
+
+def snooped(
+    trial: NetworkTrial,
+    settings: Settings,
+    afresh: Callable[[], Aside | None] | None = None,
+    common: Callable[[Tests, Standing], Sequence[Phrase]] | None = None,
+) -> Outcome:
+    """Remove gross errors from a network and return the outcome.
+
+    Parameters
+    ----------
+    trial
+        The network.
+    settings
+        Settings of data snooping.
+    afresh
+        Restarts the trial from a consensus of its observations if its adjustment diverges. Returns the
+        observations that the consensus rejects; None without consensus.
+    common
+        Returns common errors of sets that explain the test values better than errors of single observations.
+        Then nothing is removed: removing the members one after the other would hide the cause.
+    """
+    begin = partial(
+        _photocore.NetworkSnooping,
+        level=settings.level,
+        is_rate=settings.fdr,
+        known=settings.known,
+        robust=settings.robust,
+        max_rounds=settings.max_rounds,
+        control=trial.control,
+        rough=trial.rough,
+        exact=trial.exact,
+        max_rows=MAX_ROWS,
+        is_supported=trial.supported.tolist(),
+    )
+    aside = None
+    try:
+        core = trial.asked(begin, trial.core, None)
+    except LostSupportError:
+        aside = None if settings.robust is False or afresh is None else afresh()
+        if aside is None:
+            raise
+        core = trial.asked(begin, trial.core, (aside.images, set(aside.photos)))
+    else:
+        if afresh is not None and core.needs_consensus and (aside := afresh()) is not None:
+            trial.asked(core.restart, trial.core, (aside.images, set(aside.photos)))
+    errors: Sequence[Phrase] = []
+    if common is not None and core.may_have_common_errors:
+        standing = Standing(*trial.asked(core.adjust_exactly, trial.core))
+        errors = common(trial.tests(), standing)
+    if not errors:
+        trial.asked(core.run, trial.core)
+    log = core.finish()
+    names = _Names(trial.suspects, aside)
+    remarks = [names.remark(*remark, settings.max_rounds) for remark in log["remarks"]]
+    if errors:
+        remarks.append(phrase("snooping.common", errors=list(errors)))
+    return Outcome(
+        log=[names.removal(**removal) for removal in log["removals"]],
+        rounds=[
+            Round(number, *standing, log["tests"], limit, removed, returned)
+            for number, standing, limit, removed, returned in log["rounds"]
+        ],
+        out=Out(log["rows"], set(log["points"]), set(log["photos"])),
+        tests=log["tests"],
+        before=Standing(*log["before"]),
+        standing=Standing(*log["after"]),
+        factors={KINDS[kind]: factor for kind, factor in log["factors"]},
+        active=log["active"],
+        remarks=remarks,
+    )
+
+
+class _Names:
+    """Names for the numbers of the log of the core."""
+
+    def __init__(self, suspects: NamedSuspects, aside: Aside | None) -> None:
+        self.suspects, self.aside = suspects, aside
+
+    def removal(
+        self,
+        *,
+        group: int,
+        photo: int | None,
+        rows: list[int],
+        error: list[float],
+        error_sd: list[float],
+        rivals: list[tuple[int, float, int, float]],
+        consequences: list[tuple[str, list[float]]],
+        prediction: tuple[float, float, list[float]] | None,
+        kept: str | None,
+        **values: Any,
+    ) -> Removal:
+        """Return an entry of the log of the core with names and units."""
+        suspects = self.suspects
+        components = tuple(map(suspects.row_name, rows))
+        if photo is not None:
+            subject = Phrase("named.whole", suspects.photo_name(photo).fields)
+        elif len(rows) < len(suspects.rows(group)):
+            axes = [Phrase(f"axis.{each}") for each in components]
+            subject = Phrase("named.parts", {"axes": axes, "named": suspects.name(group)})
+        else:
+            subject = suspects.name(group)
+        predicted: dict[str, Any] = {}
+        if prediction is not None:
+            names = ("prediction", "prediction_log_probability", "prediction_error")
+            predicted = dict(zip(names, (*prediction[:2], tuple(prediction[2])), strict=True))
+        return Removal(
+            group=group,
+            kind=suspects.kind(group) if photo is None else "photo",
+            subject=subject,
+            rows=tuple(rows),
+            components=components,
+            units=tuple(map(suspects.unit, rows)),
+            error=tuple(error),
+            error_sd=tuple(error_sd),
+            rivals=tuple(Rival(str(suspects.name(rival)), *others) for rival, *others in rivals),
+            consequences=tuple(self._consequence(*each) for each in consequences),
+            kept=KEPT[kept] if kept else "",
+            **predicted,
+            **values,
+        )
+
+    def _consequence(self, code: str, values: list[float]) -> Phrase | str:
+        fields: dict[str, Any] = {}
+        if code == "contradicted" and self.aside is not None:
+            return self.aside.photos[int(values[0])]
+        if code == "single-ray":
+            fields = {"name": self.suspects.name(int(values[0]))}
+        elif code == "median":
+            fields = dict(zip(("median", "usual"), values, strict=True))
+        elif code == "singly":
+            fields = dict(zip(("removed", "images"), map(int, values), strict=True))
+        return Phrase(f"snooping.{code}", fields)
+
+    def remark(self, code: str, values: list[float], factors: list[tuple[int, float]], rounds: int) -> Phrase:
+        """Return a remark; `rounds` is the largest number of rounds."""
+        if code == "factors":
+            named = [phrase("snooping.factor", kind=KINDS[kind], factor=factor) for kind, factor in factors]
+            return phrase("snooping.factors", overall=values[0], factors=named)
+        if code == "aside":
+            return phrase("snooping.aside", start=phrase("snooping.robust"), n=int(values[0]))
+        if code == "not-ended" or self.aside is None:
+            return phrase("snooping.not-ended", n=rounds)
+        images, agreeing = map(int, values)
+        parts = [phrase("snooping.images", n=images)] if images else []
+        parts += [self.suspects.photo_name(photo) for photo in self.aside.photos]
+        return Phrase(f"snooping.{code}", {"start": self.aside.found_by, "parts": parts, "n": agreeing})
+
+
+def disputes(log: Sequence[Removal]) -> list[Phrase]:
+    """Return the observations of the log that have alternatives, each with these and their odds.
+
+    Observations other than images, none of which can be removed without losing the datum, are alternatives of
+    each other.
+    """
+    found = [_alternatives(each, each.rivals) for each in log if each.kept == KEPT["disputed"]]
+    needed = [each for each in log if each.kept == KEPT["needed"] and each.kind != "image"]
+    needed.sort(key=lambda each: -each.statistic)
+    if len(needed) > 1:
+        first, *others = needed
+        rivals = [
+            Rival(
+                each.name,
+                each.statistic,
+                each.dimension,
+                math.exp(min(first.statistic - each.statistic, 1e3) / 2),
+            )
+            for each in others
+        ]
+        if near := [rival for rival in rivals if rival.odds < ODDS]:
+            found.append(_alternatives(first, near))
+    return found
+
+
+def _alternatives(entry: Removal, rivals: Sequence[Rival]) -> Phrase:
+    names = [phrase("snooping.rival", name=rival.name, odds=rival.odds) for rival in rivals]
+    return phrase("snooping.rivals", groups=[entry.subject, *names])

@@ -1,1 +1,0 @@
-"""Iterative data snooping: detection and removal of gross errors."""
