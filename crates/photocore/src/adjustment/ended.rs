@@ -40,7 +40,7 @@ impl Adjustment {
             cofactors: None,
             lost: None,
             selected: None,
-            linearized: None,
+            factor: None,
             joint: None,
             undetermined: None,
             counts: problem.counts(&[]),

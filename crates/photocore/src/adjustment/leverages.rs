@@ -51,9 +51,10 @@ impl Leverages {
         let (selected, cofactors) = (adjustment.selected.take()?, adjustment.cofactors.take()?);
         let residuals = std::mem::take(&mut adjustment.residuals);
         let values = values.to_vec();
-        let copied = adjustment.linearized.take();
-        let linearized = copied.map(|own| Linearized { values: values.clone(), ..own });
-        Some(Self { values, held: adjustment.datum.clone(), residuals, cofactors, selected, linearized })
+        let held = adjustment.datum.clone();
+        let factor = adjustment.factor.take();
+        let linearized = factor.map(|factor| Linearized::of_factor(factor, values.clone(), held.clone()));
+        Some(Self { values, held, residuals, cofactors, selected, linearized })
     }
 
     /// Linearizes and inverts a problem at given values with some unknowns constrained.
@@ -73,12 +74,12 @@ impl Leverages {
         let forming = FactorOptions::UNCACHED;
         let formed =
             Linearized::of(&equations, values, held, &forming, threads, &mut between)?.determined()?;
-        let copied = formed.copied();
+        let factor = formed.small_factor();
         let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
         let found = formed.invert(&equations, &inverting, threads, &mut between)?;
         let Inverted { values, held, cofactors, selected, .. } = found;
         let residuals = problem.residuals(threads, &values);
-        let linearized = copied.map(|own| Linearized { values: values.clone(), ..own });
+        let linearized = factor.map(|factor| Linearized::of_factor(factor, values.clone(), held.clone()));
         Ok(Self { values, held, residuals, cofactors, selected, linearized })
     }
 

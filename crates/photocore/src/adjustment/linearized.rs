@@ -121,9 +121,24 @@ impl Linearized {
         })
     }
 
-    /// A copy for hypotheses; None if the factor is large, because forming the normal equations again takes time, but no memory.
-    pub(super) fn copied(&self) -> Option<Self> {
-        (self.factor.bytes() <= COPIED).then(|| self.clone())
+    /// A copy of the factor for hypotheses; None if it is large, because forming the normal equations again takes time, but no memory.
+    pub(super) fn small_factor(&self) -> Option<(Factor, Prior)> {
+        (self.factor.bytes() <= COPIED).then(|| (self.factor.clone(), self.prior.clone()))
+    }
+
+    /// A factor at the values of a negligible step later.
+    pub(super) fn of_factor((factor, prior): (Factor, Prior), values: Vec<f64>, held: Vec<usize>) -> Self {
+        Self {
+            values,
+            held,
+            reweighting: None,
+            prior,
+            sum_of_squares: factor.sum_of_squares,
+            factor,
+            basis: None,
+            transformation: None,
+            seconds: Seconds::default(),
+        }
     }
 
     /// Returns the linearization point.

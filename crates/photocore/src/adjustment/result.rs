@@ -2,12 +2,13 @@
 
 use thiserror::Error;
 
-use super::linearized::Linearized;
 use super::options::NEGLIGIBLE;
 use super::options::{Iteration, Status};
 use super::statistics::{Counts, Observed, square, standardized};
 use crate::Stopped;
-use crate::normals::{Cofactors, LayoutError, Operations, Ordering, SelectedInverse, SystemError};
+use crate::normals::{
+    Cofactors, Factor, LayoutError, Operations, Ordering, Prior, SelectedInverse, SystemError,
+};
 
 /// Computing time of each phase in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
@@ -75,7 +76,7 @@ pub struct Adjustment {
     /// The inverse from which they were computed, if tests of groups will follow.
     pub(super) selected: Option<SelectedInverse>,
     /// The factor before it was inverted, if tests of groups will follow and it is small.
-    pub(super) linearized: Option<Linearized>,
+    pub(super) factor: Option<(Factor, Prior)>,
     /// Cofactors of all pairs of the requested unknowns, row by row (see [`super::adjust_by_groups`]).
     pub joint: Option<Vec<f64>>,
     /// Reason for missing cofactors, if they were requested.
