@@ -329,8 +329,8 @@ class Rows(network_trial.BlockSuspects):
         own = kind == network_trial.ATTITUDE
         found[own] = grouping.photos[subject[own], 3 + component[own]]
         own = kind == network_trial.OBSERVATION
-        of = [row for rows, _ in self.block.observation_groups for row in rows]
-        found[own] = grouping.observations[np.array(of, dtype=np.int64)[subject[own]]]
+        of = np.array(self.block.observations.core_order, dtype=np.int64)
+        found[own] = grouping.observations[of[subject[own]]]
         return found
 
 
