@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.plots.picture_data import Deviations, enlarged
+from photogram.plots.picture_data import Deviations, display_unit
 from photogram.plots.selection import first_panels
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, level, spread
 from photogram.show.sketch.plot import Plot
@@ -29,7 +29,7 @@ def features(result: Any) -> Plot:
 
 
 def _panel(each: Deviations) -> Panel:
-    factor, unit = enlarged(each.unit, float(np.abs(each.values).max(initial=0.0)))
+    factor, unit = display_unit(each.unit, float(np.abs(each.values).max(initial=0.0)))
     places, count = np.arange(len(each.points)), len(each.directions)
     values, bars = factor * each.values, factor * np.nan_to_num(each.expanded)
     # Side by side, so that bars do not overlap.

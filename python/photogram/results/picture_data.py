@@ -26,7 +26,7 @@ from photogram.plots.picture_data import (
     Pictured,
     Plan,
     VectorField,
-    enlarged,
+    display_unit,
 )
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
@@ -280,7 +280,7 @@ def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
     if field is None:
         raise InputError(phrase("plot.lens-field", camera=camera.name))
     unit = str(camera.camera.unit)
-    factor, written = enlarged(unit)
+    factor, written = display_unit(unit)
     longest = float(np.hypot(*field.vectors.T).max())
     spacing = float(np.ptp(field.positions[:, 0])) / 8
     scale = round_length(longest) / spacing if longest > 0 else 1.0
