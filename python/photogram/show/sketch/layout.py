@@ -197,13 +197,15 @@ def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
 
 
 def _curves(panel: Panel) -> list[Floats]:
-    """Return (n, 2) points that a legend should not cover."""
-    marks = [
-        mark.lines if isinstance(mark, Line) else mark.places
-        for mark in panel.marks
-        if isinstance(mark, (Line, Markers, Polygons))
-    ]
-    return [places.reshape(-1, 2) for mark in marks for places in mark]
+    """Return (n, 2) points that a legend should not cover; straight lines have points between their ends."""
+    ends, found = np.sort(panel.limits, axis=0), list[Floats]()
+    for mark in panel.marks:
+        if isinstance(mark, Line):
+            lines = (np.clip(line, *ends) for line in mark.lines)
+            found += [np.linspace(line[0], line[-1], 60) if len(line) == 2 else line for line in lines]
+        elif isinstance(mark, (Markers, Polygons)):
+            found += [places.reshape(-1, 2) for places in mark.places]
+    return found
 
 
 def _inside(places: Floats, corner: tuple[float, float], size: tuple[float, float]) -> int:

@@ -320,6 +320,7 @@ class Sketch:
 
     @property
     def rows(self) -> int:
+        """Number of rows of panels."""
         return -(-len(self.panels) // self.columns)
 
 
