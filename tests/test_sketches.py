@@ -25,7 +25,7 @@ from photogram.show.sketch.marks import (
     Sketch,
     Texts,
     contours,
-    level,
+    horizontal_line,
     rgb,
 )
 from photogram.show.sketch.svg import svg_of
@@ -278,7 +278,7 @@ def test_centred_names_are_on_their_points_if_there_is_space():
 
 def test_names_of_panels_below_each_other_are_aligned():
     panels = [
-        Panel(np.array([[0.0, 0.0], [1.0, top]]), [level(0.0, "black")], up=f"up {top}")
+        Panel(np.array([[0.0, 0.0], [1.0, top]]), [horizontal_line(0.0, "black")], up=f"up {top}")
         for top in (1.0, 123456.0)
     ]
     drawn = svg_of(Sketch(5.0, 6.0, panels, 1), "name", "")

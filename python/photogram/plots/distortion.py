@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.plots.picture_data import Curve, Curves, display_unit
-from photogram.show.sketch.marks import Line, Mark, Panel, band, level, spread
+from photogram.show.sketch.marks import Line, Mark, Panel, band, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
 from photogram.words import phrase
@@ -63,7 +63,7 @@ def _column(curves: Curves) -> list[Panel]:
             # Bands are thin on curves of hundreds of micrometres, and are therefore also drawn separately.
             deviations += _dashed(curves.radii, factor * sd, seen, colour, f"sd of the {name}")
             sizes.append(factor * sd)
-        marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), level(0.0, FAINT)]
+        marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), horizontal_line(0.0, FAINT)]
         title = curve.name if number else f"Radial distortion of {curves.camera}"
         below = "" if banded or number + 1 < len(curves.curves) else named
         limits = np.column_stack([across, _reach(curves, curve)])

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.plots.picture_data import Deviations, display_unit
 from photogram.plots.selection import first_panels
-from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, level, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 
@@ -34,7 +34,7 @@ def _panel(each: Deviations) -> Panel:
     values, bars = factor * each.values, factor * np.nan_to_num(each.expanded)
     # Side by side, so that bars do not overlap.
     across = places[:, np.newaxis] + 0.2 * (np.arange(count) - (count - 1) / 2)
-    marks: list[Mark] = [level(0.0, FAINT, 0.8)]
+    marks: list[Mark] = [horizontal_line(0.0, FAINT, 0.8)]
     for k, direction in enumerate(each.directions):
         at = np.column_stack([across[:, k], values[:, k]])
         ends = error_bars(at, at[:, 1] - bars[:, k], at[:, 1] + bars[:, k])

@@ -26,7 +26,7 @@ from photogram.show.sketch.marks import (
     around,
     ellipse_axes,
     error_bars,
-    level,
+    horizontal_line,
     spread,
 )
 from photogram.show.sketch.plot import Plot
@@ -98,7 +98,7 @@ def lengths(found: Lengths, texts: Texts) -> Plot:
     marks: list[Mark] = [
         Line(error_bars(places, *ends), BLUE, 0.7),
         Markers(places, "o", 3.0, BLUE),
-        level(0.0, SOFT, 0.6),
+        horizontal_line(0.0, SOFT, 0.6),
     ]
     if test.limits is not None:
         for limit in (test.limits, -test.limits):

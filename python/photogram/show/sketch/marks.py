@@ -157,7 +157,7 @@ class Names(Mark):
     layer: float = field(default=9.0, kw_only=True)
 
 
-def level(height: float, colour: str, width: float = 0.5, dash: str = "") -> Line:
+def horizontal_line(height: float, colour: str, width: float = 0.5, dash: str = "") -> Line:
     """Return a horizontal line over the whole panel."""
     return Line(np.array([[-np.inf, height], [np.inf, height]]), colour, width, dash)
 
