@@ -17,6 +17,7 @@ from photogram.giant import read_project
 from photogram.plots import Plot
 from photogram.plots.accessor import PLOTS
 from photogram.plots.cells import cells
+from photogram.plots.selection import first_panels
 from photogram.show.sketch.marks import Names, Panel
 
 ALWAYS = {"network", "residuals", "redundancy", "undetected", "tests"}
@@ -150,6 +151,18 @@ def test_a_name_without_room_is_omitted():
     names = Names(places, ["a long name"] * 12, ["black"] * 12)
     axes = Plot(2.0, 2.0, [Panel(np.array([[0.0, 0.0], [1.0, 1.0]]), [names])]).figure().axes[0]
     assert 0 < len(axes.texts) < 12
+
+
+def test_only_the_first_parts_are_drawn_with_a_note():
+    def draw(part):
+        return Panel(np.array([[0.0, 0.0], [1.0, 1.0]]), title=f"{part}", notes=["a note"])
+
+    panels = first_panels("films", "fields", [1, 2, 3], 2, draw)
+    assert [(panel.title, len(panel.notes)) for panel in panels] == [("1", 1), ("2", 2)]
+    assert panels[-1].notes[-1] == "the first 2 of 3 fields are drawn"
+    with pytest.raises(InputError) as error:
+        first_panels("films", "fields", [], 2, draw)
+    assert error.value.code == "plot.films"
 
 
 def test_means_of_cells():

@@ -25,7 +25,7 @@ from photogram.show.sketch.marks import (
     Sketch,
     Texts,
     contours,
-    level,
+    horizontal_line,
     rgb,
 )
 from photogram.show.sketch.svg import svg_of
@@ -252,9 +252,33 @@ def test_equal_ratios_are_equally_long_along_logarithmic_axes():
     assert placed.across.texts == ["1", "2", "5", "10", "20", "50", "100"]
 
 
+def test_legends_are_outside_or_in_the_emptiest_corner():
+    marks = [Markers(np.array([[0.05, 0.95], [0.95, 0.95], [0.95, 0.05]]), "o", 3.0, label="point")]
+    limits = [[0.0, 0.0], [1.0, 1.0]]
+    placed = {name: placed_on(limits, marks, legend=name) for name in ("beside", "below", "best")}
+    assert placed["beside"].legend[0] > placed["beside"].box[2]
+    assert placed["below"].legend[1] > placed["below"].box[3]
+    left, top, right, low = placed["best"].box
+    x, y, *_ = placed["best"].legend
+    assert left < x < (left + right) / 2
+    assert (top + low) / 2 < y < low
+
+
+def test_centred_names_are_on_their_points_if_there_is_space():
+    mark = Names(np.array([[0.5, 0.5], [0.51, 0.5]]), ["one", "two"], ["black"] * 2, centred=True)
+    [(said, (left, top, right, low))] = [
+        each
+        for each in boxes(elements(Sketch(5.0, 4.0, [Panel(np.array([[0.0, 0.0], [1.0, 1.0]]), [mark])]))[0])
+        if each[0] in mark.texts
+    ]
+    at = placed_on([[0.0, 0.0], [1.0, 1.0]], [mark]).at(mark.places[0])
+    assert said == "one"
+    assert [(left + right) / 2, (top + low) / 2] == pytest.approx(at.tolist(), abs=2.0)
+
+
 def test_names_of_panels_below_each_other_are_aligned():
     panels = [
-        Panel(np.array([[0.0, 0.0], [1.0, top]]), [level(0.0, "black")], up=f"up {top}")
+        Panel(np.array([[0.0, 0.0], [1.0, top]]), [horizontal_line(0.0, "black")], up=f"up {top}")
         for top in (1.0, 123456.0)
     ]
     drawn = svg_of(Sketch(5.0, 6.0, panels, 1), "name", "")

@@ -39,7 +39,7 @@ def control_plot(
         f"Y, {unit}",
         equal=True,
         bars=[(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else [],
-        legend="beside",
+        legend="below",
     )
     return Plot(6.5, high + 1.8, [panel])
 

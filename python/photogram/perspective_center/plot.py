@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, around, band, level
+from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, around, band, horizontal_line
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, MARKED, round_length
 
@@ -58,7 +58,7 @@ def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:
         label = f"± standard error of unit weight, {sigma[0]:.1f} µm"
         marks.append(band(np.array([0.0, right]), -sigma, sigma, "#e4e4e4", 1.0, label=label))
     places = np.column_stack([radius, distortion])
-    marks += [level(0.0, INK, 0.8), Markers(places, "o", 3.5, opacity=0.75, label="points")]
+    marks += [horizontal_line(0.0, INK, 0.8), Markers(places, "o", 3.5, opacity=0.75, label="points")]
     if (radius > 0).any():
         marks.append(Line(_means(places[radius > 0]), MARKED, 1.8, label="mean of equal radii"))
     limits = np.array([[0.0, -reach], [right, reach]])

@@ -10,8 +10,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import Curve, Curves, enlarged
-from photogram.show.sketch.marks import Line, Mark, Panel, band, level, spread
+from photogram.plots.picture_data import Curve, Curves, display_unit
+from photogram.show.sketch.marks import Line, Mark, Panel, band, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
 from photogram.words import phrase
@@ -45,7 +45,7 @@ def side_by_side(cameras: Sequence[Curves]) -> list[Panel | None]:
 
 
 def _column(curves: Curves) -> list[Panel]:
-    factor, unit = enlarged(curves.unit)
+    factor, unit = display_unit(curves.unit)
     seen = curves.radii <= curves.observed
     across, colours = spread(curves.radii), cycle(COLOURS)
     found, deviations, sizes = list[Panel](), list[Mark](), list[Floats]()
@@ -63,7 +63,7 @@ def _column(curves: Curves) -> list[Panel]:
             # Bands are thin on curves of hundreds of micrometres, and are therefore also drawn separately.
             deviations += _dashed(curves.radii, factor * sd, seen, colour, f"sd of the {name}")
             sizes.append(factor * sd)
-        marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), level(0.0, FAINT)]
+        marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), horizontal_line(0.0, FAINT)]
         title = curve.name if number else f"Radial distortion of {curves.camera}"
         below = "" if banded or number + 1 < len(curves.curves) else named
         limits = np.column_stack([across, _reach(curves, curve)])
@@ -76,7 +76,7 @@ def _column(curves: Curves) -> list[Panel]:
 
 def _reach(curves: Curves, curve: Curve) -> tuple[float, float]:
     """Return the limits of a curve, without effect of extreme single photos."""
-    factor, _ = enlarged(curves.unit)
+    factor, _ = display_unit(curves.unit)
     ends = [*np.quantile(curves.others, [0.1, 0.9], axis=0)] if len(curves.others) else []
     bands = (curve.values + sign * sd for sd in curve.bands.values() for sign in (-1, 1))
     return spread(0.0, *(factor * each for each in (curve.values, *ends, *bands)))

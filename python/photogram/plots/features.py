@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from photogram.plots.picture_data import Deviations, enlarged
+from photogram.plots.picture_data import Deviations, display_unit
 from photogram.plots.selection import first_panels
-from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, level, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 
@@ -29,12 +29,12 @@ def features(result: Any) -> Plot:
 
 
 def _panel(each: Deviations) -> Panel:
-    factor, unit = enlarged(each.unit, float(np.abs(each.values).max(initial=0.0)))
+    factor, unit = display_unit(each.unit, float(np.abs(each.values).max(initial=0.0)))
     places, count = np.arange(len(each.points)), len(each.directions)
     values, bars = factor * each.values, factor * np.nan_to_num(each.expanded)
     # Side by side, so that bars do not overlap.
     across = places[:, np.newaxis] + 0.2 * (np.arange(count) - (count - 1) / 2)
-    marks: list[Mark] = [level(0.0, FAINT, 0.8)]
+    marks: list[Mark] = [horizontal_line(0.0, FAINT, 0.8)]
     for k, direction in enumerate(each.directions):
         at = np.column_stack([across[:, k], values[:, k]])
         ends = error_bars(at, at[:, 1] - bars[:, k], at[:, 1] + bars[:, k])

@@ -16,7 +16,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.statistics.findings import Tested
 
 
-def enlarged(unit: str, largest: float = 0.0) -> tuple[float, str]:
+def display_unit(unit: str, largest: float = 0.0) -> tuple[float, str]:
     """Return the factor of small lengths in plots, and their unit there."""
     small = {"m": (1e6, "µm") if largest < 1e-3 else (1e3, "mm"), "mm": (1e3, "µm")}
     return small[unit] if unit in small and largest < 1.0 else (1.0, unit)

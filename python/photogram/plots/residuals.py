@@ -9,7 +9,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
-from photogram.plots.picture_data import Images, enlarged
+from photogram.plots.picture_data import Images, display_unit
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Panel, ScaleBar
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED, round_length
@@ -70,7 +70,7 @@ def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
 def _field(images: Images, camera: int, left_out: str) -> Panel | None:
     own = images.cameras == camera
     xy, vectors = images.xy[own], images.residuals[own]
-    factor, unit = enlarged(images.unit)
+    factor, unit = display_unit(images.unit)
     if not len(xy):
         return None
     longer = int(np.clip(np.sqrt(len(xy) / MEAN_IMAGES_OF_CELL), 6, MAX_CELLS))

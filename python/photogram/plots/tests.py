@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.show.sketch.marks import Line, Mark, Markers, Names, Panel, band, bars, level, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Names, Panel, band, bars, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
@@ -107,7 +107,7 @@ def _quantiles(values: Floats, marked: Bools, worst: list[tuple[float, str]], un
     if beyond.any():
         label = f"outliers of the verdict ({int(marked.sum()):,})"
         marks.append(Markers(places[beyond], "D", 4.0, MARKED, label=label))
-    marks += [level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
+    marks += [horizontal_line(height, FAINT, 0.7, ":") for height in (limit, -limit)]
     if worst:
         sizes, names = zip(*worst, strict=True)
         at = normal_quantiles((np.minimum(np.searchsorted(every, sizes), n - 1) + 0.5) / n)

@@ -265,7 +265,7 @@ def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
     if field is None:
         raise InputError(phrase("plot.lens-field", camera=camera.name))
     unit = str(camera.camera.unit)
-    factor, written = plots.enlarged(unit)
+    factor, written = plots.display_unit(unit)
     longest = float(np.hypot(*field.vectors.T).max())
     spacing = float(np.ptp(field.positions[:, 0])) / 8
     scale = round_length(longest) / spacing if longest > 0 else 1.0

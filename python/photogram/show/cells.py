@@ -97,7 +97,7 @@ def _columns(
 ) -> Iterator[tuple[Column, Iterable[Cell]]]:
     axes, of = each.axes, each.of
     if each.kind == "name" or not axes:
-        yield Column(each.head, text=each.kind == "name"), _looked_at(_plain(each), each.marked, numeral)
+        yield Column(each.head, text=each.kind == "name"), _with_marks(_plain(each), each.marked, numeral)
         return
     mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
     decimals, marked = _decimals(each, by, mixed), each.marked
@@ -110,7 +110,7 @@ def _columns(
         ]
         head = each.head.format(axis.label or axis.name) if of is None else each.head
         own = None if marked is None else np.reshape(marked, values.shape)[:, k]
-        yield Column(head, "" if mixed else _unit(each, axis)), _looked_at(cells, own, numeral)
+        yield Column(head, "" if mixed else _unit(each, axis)), _with_marks(cells, own, numeral)
 
 
 def _unit(each: Quantity, axis: Axis) -> str:
@@ -176,7 +176,7 @@ def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cel
     return Cell(number_text(value, decimals, each.figures), value)
 
 
-def _looked_at(cells: list[Cell], marked: Bools | None, numeral: Callable[[str], str]) -> Iterable[Cell]:
+def _with_marks(cells: list[Cell], marked: Bools | None, numeral: Callable[[str], str]) -> Iterable[Cell]:
     """Return cells with their marks, and numbers in another language."""
     if numeral is not str:
         cells = [cell if cell.number is None else cell._replace(text=numeral(cell.text)) for cell in cells]

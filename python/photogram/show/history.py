@@ -14,7 +14,7 @@ from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Document, Drawing, Section, layered
 from photogram.show.page import about as explanation
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each
-from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, level, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 
@@ -149,7 +149,7 @@ def _chart(history: History, own: Series) -> Panel:
         Line(error_bars(places, own.values - own.sd, own.values + own.sd), INK, 1.0),
         Markers(places, "o", 3.5),
         *(Line(np.column_stack([t, expected + sign * room]), FAINT, 0.8, "--") for sign in (-1, 1)),
-        level(own.mean, FAINT, 0.8),
+        horizontal_line(own.mean, FAINT, 0.8),
     ]
     changed = Line(np.column_stack([t, own.model]), MARKED, 1.2)
     marks.append(changed if own.changes else Markers(places[beyond], "o", 6.0, MARKED, "none"))

@@ -47,12 +47,6 @@ class Axis:
         """Return an axis in radians, whose deviations are seconds of arc."""
         return cls(name, "rad", angle, "_deg" if angle else "_rad", "arcsec", 1.0 / ARCSEC)
 
-    def outward(self, kind: str) -> float:
-        """Return the factor of numbers of a kind in reports."""
-        if kind == "value":
-            return math.degrees(1.0) if self.angle == "deg" else 1.0
-        return self.factor
-
 
 @dataclass(frozen=True)
 class Link:
@@ -106,8 +100,11 @@ class Quantity:
         if self.seen is not None:
             values = np.where(self.seen, values, np.nan)
         if self.kind in ("value", "deviation", "difference") and self.axes:
-            factors = np.array([axis.outward(self.kind) for axis in self.axes])
-            values = values * (factors if self.of is None else factors[self.of])
+            own = {"deg": math.degrees(1.0)}
+            factors = [
+                own.get(axis.angle, 1.0) if self.kind == "value" else axis.factor for axis in self.axes
+            ]
+            values = values * np.array(factors)[... if self.of is None else self.of]
         return values
 
     def at(self, rows: Indices, axes: Indices | None = None) -> Quantity:

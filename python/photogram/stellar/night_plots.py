@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, ScaleBar, around, level
+from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, ScaleBar, around, horizontal_line
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.drawing import band, bells, curves, vectors
@@ -106,13 +106,13 @@ def _of_brown(result: CalibratedNight) -> Plot:
         ("radial", radial @ camera.values[4:7], error),
         ("decentering", f * r**2 * size, f * r**2 * size_error),
     )
-    distortion, errors = list[Mark](), list[Mark]()
+    distortion, errors = list[Mark]([horizontal_line(0.0, FAINT, 0.8)]), list[Mark]()
     for colour, (label, value, own) in zip(COLOURS, found, strict=False):
         distortion += band(f * r, value, own, colour, label)
         errors.append(Line(np.column_stack([f * r, own]), colour, label=label))
     across = "distance from the principal point, px"
     panels = [
-        curves([*distortion, level(0.0, FAINT, 0.8)], across, "px", "Distortion, with its mean error"),
+        curves(distortion, across, "px", "Distortion, with its mean error"),
         curves(errors, across, "px", "Its mean error"),
     ]
     used = float(np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max())

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.sketch.marks import Line, Mark, Markers, Panel, ScaleBar, around, level, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, ScaleBar, around, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
@@ -76,7 +76,7 @@ def _distortion(result: Result) -> Plot:
     found = distortion_curves(replace(result, problem=replace(problem, options=fine)))
     d = 1e3 * found.distance
     marks = [
-        level(0.0, FAINT, 0.8),
+        horizontal_line(0.0, FAINT, 0.8),
         *band(d, 1e6 * found.radial, 1e6 * found.radial_error, COLOURS[0], "radial"),
         *band(d, 1e6 * found.transformed, 1e6 * found.transformed_error, COLOURS[1], "radial, transformed"),
         *band(d, 1e6 * found.decentering, 1e6 * found.decentering_error, COLOURS[2], "decentering"),
@@ -105,7 +105,7 @@ def _refraction(result: Result) -> Plot:
         line = np.column_stack([ends, height])
         marks.append(Line(line, COLOURS[group], 5.0, label=f"field of {GROUPS[group]}"))
     panel = curves(
-        [*marks, level(0.0, FAINT, 0.8)],
+        [*marks, horizontal_line(0.0, FAINT, 0.8)],
         "observed zenith distance, degrees",
         "corrected minus given refraction, arcsec",
         "Refraction",

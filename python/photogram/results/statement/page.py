@@ -434,7 +434,7 @@ def drawn_lengths(found: Lengths, texts: Texts) -> Plot:
     marks: list[shapes.Mark] = [
         shapes.Line(shapes.error_bars(places, *ends), BLUE, 0.7),
         shapes.Markers(places, "o", 3.0, BLUE),
-        shapes.level(0.0, SOFT, 0.6),
+        shapes.horizontal_line(0.0, SOFT, 0.6),
     ]
     if test.limits is not None:
         for limit in (test.limits, -test.limits):

@@ -57,13 +57,18 @@ class Placed:
         return 6.0 + TITLE_LINE * len(self.title) + BAR_LINE * len(self.panel.bars)
 
     @property
-    def below(self) -> float:
+    def axis_below(self) -> float:
         """Height of the numbers and of the name of the axis below the box."""
         panel, numbers = self.panel, 0.0
         if self.numbered:
             turned = widest(panel.across_names, NUMBER) if panel.turned else 0.0
             numbers = 5.0 + max(turned, NUMBER + 2.0)
         return numbers + (LABEL + 5.0 if panel.across else 0.0) + 3.0
+
+    @property
+    def below(self) -> float:
+        """Height of axis and legend below the box, down to its notes."""
+        return self.axis_below + (self.legend_size[1] + GAP / 2 if self.panel.legend == "below" else 0.0)
 
     @property
     def legend_size(self) -> tuple[float, float]:
@@ -73,10 +78,11 @@ class Placed:
 
     @property
     def legend(self) -> Box:
-        """Left, upper, right and lower side of the legend: beside the box, or in the emptiest corner."""
+        """Left, upper, right and lower side of the legend: outside the box, or in its emptiest corner."""
         (left, top, right, low), (wide, high) = self.box, self.legend_size
-        if self.panel.legend == "beside":
-            return right + GAP, top, right + GAP + wide, top + high
+        if self.panel.legend in ("beside", "below"):
+            x, y = (right + GAP, top) if self.panel.legend == "beside" else (left, low + self.axis_below)
+            return x, y, x + wide, y + high
         curves = np.concatenate([np.empty((0, 2)), *map(self.at, _curves(self.panel))])
         inner = left + GAP / 2, top + GAP / 2, right - wide - GAP / 2, low - high - GAP / 2
         corners = [(x, y) for y in (inner[1], inner[3]) for x in (inner[2], inner[0])]
@@ -97,6 +103,7 @@ class Placed:
             right + 0.5 * widest(self.across.texts[-1:], NUMBER),
             0.5 * (left + right + width(self.across.named(panel.across), LABEL)),
             self.right_side + (GAP + COLOUR_BAR if panel.shades else 0.0),
+            left + self.legend_size[0] if panel.legend == "below" else 0.0,
             *(left + self.scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars),
         ]
         down = low + self.below + NOTE_LINE * len(self.notes)
@@ -190,13 +197,15 @@ def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
 
 
 def _curves(panel: Panel) -> list[Floats]:
-    """Return (n, 2) points that a legend should not cover."""
-    marks = [
-        mark.lines if isinstance(mark, Line) else mark.places
-        for mark in panel.marks
-        if isinstance(mark, (Line, Markers, Polygons))
-    ]
-    return [places.reshape(-1, 2) for mark in marks for places in mark]
+    """Return (n, 2) points that a legend should not cover; straight lines have points between their ends."""
+    ends, found = np.sort(panel.limits, axis=0), list[Floats]()
+    for mark in panel.marks:
+        if isinstance(mark, Line):
+            lines = (np.clip(line, *ends) for line in mark.lines)
+            found += [np.linspace(line[0], line[-1], 60) if len(line) == 2 else line for line in lines]
+        elif isinstance(mark, (Markers, Polygons)):
+            found += [places.reshape(-1, 2) for places in mark.places]
+    return found
 
 
 def _inside(places: Floats, corner: tuple[float, float], size: tuple[float, float]) -> int:

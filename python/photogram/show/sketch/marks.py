@@ -157,7 +157,7 @@ class Names(Mark):
     layer: float = field(default=9.0, kw_only=True)
 
 
-def level(height: float, colour: str, width: float = 0.5, dash: str = "") -> Line:
+def horizontal_line(height: float, colour: str, width: float = 0.5, dash: str = "") -> Line:
     """Return a horizontal line over the whole panel."""
     return Line(np.array([[-np.inf, height], [np.inf, height]]), colour, width, dash)
 
@@ -281,7 +281,7 @@ class Panel:
     equal: bool = False  # Whether both axes have the same scale
     notes: Sequence[str] = ()  # Notes below the panel
     bars: Sequence[ScaleBar] = ()  # Scale bars of enlarged marks, below the title
-    legend: Literal["", "beside", "best"] = ""  # Beside the panel, or in its emptiest corner
+    legend: Literal["", "beside", "below", "best"] = ""  # Outside the panel, or in its emptiest corner
     # Names at 0, 1, 2 ... instead of numbers
     across_names: Sequence[str] = ()
     up_names: Sequence[str] = ()
@@ -320,6 +320,7 @@ class Sketch:
 
     @property
     def rows(self) -> int:
+        """Number of rows of panels."""
         return -(-len(self.panels) // self.columns)
 
 

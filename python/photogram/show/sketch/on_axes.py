@@ -16,7 +16,11 @@ from photogram.show.style import FAINT, INK, styled
 from photogram.words import phrase
 
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
-BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
+LEGENDS: dict[str, dict[str, Any]] = {
+    "beside": {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0},
+    "below": {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "borderaxespad": 4.5},
+    "best": {"loc": "best"},
+}
 ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 
@@ -87,7 +91,7 @@ def _around(axes: Any, panel: Panel) -> None:
     from matplotlib.transforms import ScaledTranslation
 
     if panel.legend:
-        legend = axes.legend(**(BESIDE if panel.legend == "beside" else {"loc": "best"}))
+        legend = axes.legend(**LEGENDS[panel.legend])
         for handle in legend.legend_handles:
             if isinstance(handle, PathCollection):
                 handle.set_sizes(np.maximum(handle.get_sizes(), 16.0))

@@ -84,7 +84,7 @@ def _axes(placed: Placed) -> str:
     numbers = "".join(text(left - 6.0, y + 0.36 * NUMBER, each) for y, each in rows)
     found.append(element("g", numbers, text_anchor="end"))
     if panel.across:
-        name, down = placed.across.named(panel.across), low + placed.below - 5.0
+        name, down = placed.across.named(panel.across), low + placed.axis_below - 5.0
         found.append(text(0.5 * (left + right), down, name, turned=False, **NAMED))
     if name := placed.up.named(panel.up):
         x, y = left - 12.0 - placed.beside, 0.5 * (top + low)
@@ -120,7 +120,7 @@ def _legend(placed: Placed) -> tuple[str, list[Box]]:
         return "", []
     box = placed.legend
     entries = [_entry(mark, box[0], box[1] + LEGEND_LINE * (k + 0.5)) for k, mark in enumerate(marks)]
-    if where != "beside":
+    if where == "best":
         entries.insert(0, element("rect", **place(*box), fill="white", opacity=0.85))
     return "".join(entries), [box]
 
