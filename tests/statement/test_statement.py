@@ -357,7 +357,7 @@ def test_a_statement_of_what_has_not_converged_is_refused(result):
     with pytest.raises(photogram.AdjustmentError) as error:
         stopped.statement()
     assert error.value.code == "request.not-converged"
-    with pytest.raises(photogram.InputError, match="must be a Result"):
+    with pytest.raises(photogram.InputError, match="must be Result"):
         photogram.statement("block")
 
 

@@ -101,9 +101,8 @@ class AdjustOptions(Checked):
         check_datum(self.constraints)
         if self.covariance != "verdict":
             truth_value("covariance", self.covariance)
-        if not isinstance(self.tolerance, AsPublished):
-            good = number("tolerance", self.tolerance) > 0
-            require(good, "tolerance", "positive", value=self.tolerance)
+        limit = self.tolerance.percent if isinstance(self.tolerance, AsPublished) else self.tolerance
+        require(number("tolerance", limit) > 0, "tolerance", "positive", value=limit)
 
     @property
     def constraints(self) -> InnerConstraints | MinimumConstraints | None:

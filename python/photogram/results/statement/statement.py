@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.objects import require_kind
 from photogram.errors import AdjustmentError, InputError
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
@@ -274,6 +275,7 @@ def statement(
     OutOfMemoryError, KeyboardInterrupt
         As in :meth:`photogram.Result.covariances`.
     """
+    require_kind("result", result, Result)
     options = Asked.checked(**asked)
     if not result.converged:
         raise AdjustmentError(phrase("request.not-converged", status=result.status))
