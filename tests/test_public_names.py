@@ -3,6 +3,7 @@
 import ast
 import inspect
 import re
+from dataclasses import fields
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -12,6 +13,7 @@ from types import FunctionType
 import pytest
 
 import public_api
+from photogram.adjustment.options import AdjustKeywords, AdjustOptions
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted({ROOT / "README.md", *(ROOT / "docs").rglob("*.md")} - {ROOT / "docs" / "extending.md"})
@@ -100,3 +102,8 @@ def test_public_names_have_docstrings():
                 found[value.__qualname__] = value
     assert len(found) > 1000
     assert [name for name, value in found.items() if not (value.__doc__ or "").strip()] == []
+
+
+def test_keywords_of_adjust_are_the_fields_of_its_options():
+    types = {name: own.__forward_arg__ for name, own in AdjustKeywords.__annotations__.items()}
+    assert types == {each.name: each.type for each in fields(AdjustOptions)}

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, get_args
+from typing import Unpack, get_args
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.first_features import started
-from photogram.adjustment.options import AdjustOptions, AsPublished, Ordering
+from photogram.adjustment.options import AdjustKeywords, AdjustOptions, AsPublished, Ordering
 from photogram.adjustment.remarks import (
     behind,
     check_cameras,
@@ -81,7 +81,7 @@ def adjust(
     *,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
-    **changes: Any,
+    **changes: Unpack[AdjustKeywords],
 ) -> Result:
     """Adjust a block by least squares.
 

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 import orjson
@@ -22,7 +22,7 @@ from photogram.adjustment.adjustment import (
     with_datum,
 )
 from photogram.adjustment.first_features import started
-from photogram.adjustment.options import AdjustOptions
+from photogram.adjustment.options import AdjustKeywords, AdjustOptions
 from photogram.adjustment.remarks import check_cameras
 from photogram.arguments.fields import options_of
 from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
@@ -67,7 +67,7 @@ def adjust_in_parts(
     *,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
-    **changes: Any,
+    **changes: Unpack[AdjustKeywords],
 ) -> Result:
     """Adjust a block in parts, on a cluster or sequentially (docs/distributed.md).
 
@@ -120,7 +120,7 @@ def plan_in_parts(
     block: Block,
     division: Division,
     options: AdjustOptions | None = None,
-    **changes: Any,
+    **changes: Unpack[AdjustKeywords],
 ) -> PartsPlan:
     """Plan the adjustment of a block in parts: work, memory, traffic and time.
 

@@ -139,6 +139,10 @@ class Observations(Sequence[_Row]):
             by_key.setdefault(key, []).append(Columns.of(objects))
         return cls(same[0] if len(same) == 1 else Columns.merged(same) for same in by_key.values())
 
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(part.rows)} {part.label}" for part in self.columns)
+        return f"Observations({counts})"
+
     def __len__(self) -> int:
         return self._count
 
