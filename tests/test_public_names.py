@@ -13,7 +13,8 @@ from types import FunctionType
 import pytest
 
 import public_api
-from photogram.adjustment.options import AdjustKeywords, AdjustOptions
+from photogram import AdjustOptions
+from photogram.adjustment.options import AdjustKeywords
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted({ROOT / "README.md", *(ROOT / "docs").rglob("*.md")} - {ROOT / "docs" / "extending.md"})
