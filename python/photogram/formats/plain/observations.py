@@ -102,6 +102,7 @@ def _read(
     if table is None:
         return
     make = getattr(observations, TABLES[name].class_name)
+    wanted = {"clock", *(field for field, _ in make.UNKNOWNS)}
     of: Sequence[dict[str, Any] | None] = [{}] * table.count
     members: Sequence[Mapping[str, Any]] = of  # type: ignore[assignment]
     fields: dict[str, Any] = {}
@@ -110,7 +111,7 @@ def _read(
     for part in TABLES[name].parts:
         if isinstance(part, Parameter):
             own = read_unknowns(tables, table, part, [name] * table.count)
-            members = [{part.field: each} for each in own]
+            members = [{} if each is None else {part.field: each} for each in own]
         elif part.kind == "subject":
             of = _subjects(tables, table, known)
         elif part.kind in ("point", "photo"):
@@ -121,7 +122,11 @@ def _read(
         elif part.kind == "shared":
             fields[part.field] = _named(table, part, shared[f"{part.names[0]}s"])
         elif part.kind == "group":
-            members = _members(tables, table, part.field, shared[part.field])
+            groups = {
+                group: {field: own for field, own in each.items() if own is not None and field in wanted}
+                for group, each in shared[part.field].items()
+            }
+            members = _members(tables, table, part.field, groups)
         elif part.kind.endswith("matrix"):
             fields |= _precision(tables, table, part, missing)
         elif part.field:
@@ -131,17 +136,14 @@ def _read(
     if place:
         positions, covariances = transform.positions(name, fields[place], fields["covariance"], table)
         fields |= {place: positions, "covariance": covariances}
-    wanted, times = {field for field, _ in make.UNKNOWNS}, table.numbers("time").tolist()
-    for row, (subject, group) in enumerate(zip(of, members, strict=True)):
+    times = table.numbers("time").tolist() if make is Position else []
+    for row, (subject, group, *values) in enumerate(zip(of, members, *fields.values(), strict=True)):
         if subject is None:
             continue
-        given = {**subject, **{field: values[row] for field, values in fields.items()}}
-        given |= {field: value for field, value in group.items() if field in wanted}
-        if (clock := group.get("clock")) is not None:
-            if "trajectory" not in subject:
-                raise table.error(row, phrase("plain.clock-of-photo"))
-            given["clock"] = clock
-        if make is Position and subject["photo"] is not None:
+        given = {**subject, **dict(zip(fields, values, strict=True)), **group}
+        if "clock" in group and "trajectory" not in subject:
+            raise table.error(row, phrase("plain.clock-of-photo"))
+        if make is Position and given["photo"] is not None:
             time = times[row]
             if math.isnan(time):
                 time = known.times[known.photos[given["photo"]]]

@@ -43,8 +43,11 @@ _Kind = TypeVar("_Kind", bound=Unknown)
 
 def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any, **more: Any) -> _Made:
     """Create an object from a row; its errors name the row."""
-    with at_place(table.place(row)):
+    try:
         return make(*values, **more)
+    except InputError:
+        with at_place(table.place(row)):
+            raise
 
 
 def called(cell: str, title: str) -> str:
