@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling
-from photogram import PhotogramError, Position
+from photogram import AdjustOptions, PhotogramError, Position
 from photogram.adjustment.adjustment import core_options
-from photogram.adjustment.options import AdjustOptions
 from photogram.network import (
     Attitude,
     Clock,

@@ -8,9 +8,8 @@ from test_blocks import agrees
 
 import test_moving
 from moving_blocks import rolling, scanned
-from photogram import adjust, adjust_in_parts, simulate
+from photogram import AdjustOptions, adjust, adjust_in_parts, simulate
 from photogram.adjustment.adjustment import core_options
-from photogram.adjustment.options import AdjustOptions
 from photogram.distributed import Division
 from photogram.distributed.adjust import fingerprint
 from photogram.network import LineScanner, Polynomial, RollingShutter

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram import RankError
+from photogram import AdjustOptions, RankError
 from photogram.adjustment.adjustment import core_options
-from photogram.adjustment.options import AdjustOptions
 from photogram.distributed.cut import Incidence, Tree, cut, homes, tree_of
 
 SD, STATION_SD = 0.01, 0.05

@@ -12,15 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.errors import InputError
+from photogram import Attitudes, Camera, InputError
+from photogram.formats import Format, Project, Wishes
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import cards, has_suffix
-from photogram.formats.format import Format, Wishes
 from photogram.formats.images import lens_of, sizes_of, to_corner
 from photogram.formats.plain.writing import known_cameras
-from photogram.formats.project import Project
-from photogram.network.attitudes import Attitudes
-from photogram.network.cameras import Camera
 from photogram.words import phrase
 
 FILE, TITLE = "block.lines", "file of lines"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from line_format import FORMAT
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.formats import Wishes
 from photogram.formats.models import lost
 

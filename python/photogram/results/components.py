@@ -74,8 +74,8 @@ class VarianceComponents(Judged, Documented, Brief):
             ends = np.column_stack([np.sqrt(each.interval), [place, place]])
             marks += [Line(ends, colour), Markers(at, "o", 6.0, colour)]
         values = [each.factor_of_sd for each in self.components]
-        ends = [np.sqrt(each.interval) for each in self.components if not each.held]
-        known = np.concatenate([values, *ends, [1.0]])
+        intervals = [np.sqrt(each.interval) for each in self.components if not each.held]
+        known = np.concatenate([values, *intervals, [1.0]])
         known = known[np.isfinite(known) & (known > 0)]
         up = (len(self.components) - 0.5, -0.5)
         limits = np.column_stack([(known.min() / MARGIN, known.max() * MARGIN), up])
