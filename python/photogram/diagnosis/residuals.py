@@ -36,6 +36,7 @@ def residuals(result: Result, spread: float) -> Section:
     if len(plain.image_xy) < len(result.block.image_xy):
         section.remark("images beyond what the lens sees: no patterns over the frame")
         return section
+    spread = max(spread, ROUNDING)
     _frame_pattern(result, plain, spread, section)
     _photo_patterns(result, spread, section)
     return section

@@ -142,7 +142,8 @@ def plan_in_parts(
     """
     block, core, row = _ready(block, options_of(AdjustOptions, options, changes))
     with _run(block, core, row, division, None) as run:
-        return run.plan()
+        plan: PartsPlan = run.plan()
+        return plan
 
 
 def _ready(block: Block, options: AdjustOptions) -> tuple[Block, CoreOptions, DatumRow | None]:
