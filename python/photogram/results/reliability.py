@@ -180,11 +180,6 @@ class Reliability:
         """(M, 3) effect of a detectable error on the own point; NaN without one."""
         return np.asarray(self._effects[:, :3] * (self.detectable / self.sd)[:, np.newaxis])
 
-    @property
-    def own_photo_effect(self) -> Floats:
-        """(M, 6) effect on the pose of its own photo: position, omega, phi, kappa."""
-        return np.asarray(self._effects[:, 3:] * (self.detectable / self.sd)[:, np.newaxis])
-
     def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
         """Return effects of detectable errors of the worst group rows on their points.
 
