@@ -276,6 +276,17 @@ def test_the_last_support_stays():
     assert on_photo.sum() == 3
 
 
+@pytest.mark.parametrize(("factor", "unit_weight"), [(1, "known"), (1, "unknown"), (10, "unknown")])
+def test_a_common_error_is_named_with_any_unit_weight(factor, unit_weight):
+    block = small(3, strips=3, photos_per_strip=6, points_per_photo=25, position_sd=0.05).block
+    positions = block.point_positions.copy()
+    positions[np.isfinite(block.point_sd).all(axis=1), 2] += 3.0 * factor
+    sd = {name: factor * getattr(block, name) for name in ("image_sd", "point_sd", "photo_position_sd")}
+    found = photogram.snoop(block.replace(point_positions=positions, **sd), unit_weight=unit_weight)
+    assert not found.removed
+    assert [remark.code for remark in found.outcome.remarks] == ["snooping.common"]
+
+
 def test_collections():
     made = photogram.collection.simulate(seed=4)
     collection = made.collection

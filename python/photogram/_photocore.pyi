@@ -1325,9 +1325,8 @@ class NetworkSnooping:
     def needs_consensus(self) -> bool:
         """Whether the adjustment diverges, or residuals exceed plausible sizes."""
 
-    @property
-    def may_have_common_errors(self) -> bool:
-        """Whether the residuals are too large before any removal."""
+    def may_have_common_errors(self, trial: NetworkTrial) -> bool:
+        """Return whether the residuals are too large before any removal."""
 
     def restart(self, trial: NetworkTrial, consensus: tuple[Sequence[int], set[int]]) -> None:
         """Continue from the result of a consensus."""

@@ -179,7 +179,7 @@ def snooped(
         if afresh is not None and core.needs_consensus and (aside := afresh()) is not None:
             trial.asked(core.restart, trial.core, (aside.images, set(aside.photos)))
     errors: Sequence[Phrase] = []
-    if common is not None and core.may_have_common_errors:
+    if common is not None and trial.asked(core.may_have_common_errors, trial.core):
         standing = Standing(*trial.asked(core.adjust_exactly, trial.core))
         errors = common(trial.tests(), standing)
     if not errors:

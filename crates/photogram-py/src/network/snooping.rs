@@ -178,9 +178,16 @@ impl NetworkSnooping {
         Ok(self.state()?.needs_consensus())
     }
 
-    #[getter]
-    fn may_have_common_errors(&self) -> PyResult<bool> {
-        Ok(self.state()?.may_have_common_errors())
+    fn may_have_common_errors(
+        &self,
+        py: Python<'_>,
+        mut trial: PyRefMut<'_, NetworkTrial>,
+    ) -> PyResult<bool> {
+        let snooping = self.state()?;
+        let (workers, refused, own) = (trial.workers(), trial.refused, &mut trial.trial);
+        let found =
+            watched(py, workers, None, |pool, watch| snooping.may_have_common_errors(own, pool, watch))?;
+        found.map_err(|error| refused(&error))
     }
 
     fn restart(

@@ -2,14 +2,12 @@
 
 use super::super::NetworkError;
 use super::super::trial::Trial;
-use super::choosing::is_beyond;
 use super::consensus::Consensus;
 use super::groups::Groups;
 use super::log::{Log, Remark, Round, Standing};
 use super::settings::Settings;
 use super::state::Snooping;
 use super::tried::{Running, Tried};
-use super::unit_weight::Criticals;
 use crate::Threads;
 use crate::adjustment::{Status, Watch};
 
@@ -66,17 +64,24 @@ impl Snooping {
     }
 
     /// Returns whether the residuals are too large, before any exclusion: errors of whole sets of observations may be the reason. The global
-    /// test decides; if the unit weight is unknown, the tests of all groups.
-    pub fn may_have_common_errors(&self) -> bool {
-        let is_significant = || {
-            let mut critical = Criticals::new(self.unit(), self.level.limit(0));
-            let allowed = self.allowed();
-            (0..self.groups.len())
-                .any(|group| allowed[group] && is_beyond(&self.tests, &self.scales, &mut critical, group))
-        };
-        self.removals.is_empty()
-            && self.standing.status == Status::Converged
-            && self.unit().is_rejected(1.0).unwrap_or_else(is_significant)
+    /// test decides; if the unit weight is unknown, whether a round would exclude any group.
+    ///
+    /// # Errors
+    /// Errors of [`Trial::adjust`].
+    pub fn may_have_common_errors(
+        &self,
+        trial: &mut Trial,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<bool, NetworkError> {
+        if !self.removals.is_empty() || self.standing.status != Status::Converged {
+            return Ok(false);
+        }
+        if let Some(is_rejected) = self.unit().is_rejected(1.0) {
+            return Ok(is_rejected);
+        }
+        let network = &mut Running { trial, threads, watch };
+        Ok(!self.choosing(self.allowed(), 0, true).choose(network)?.is_empty())
     }
 
     /// Adjusts without the exclusions to the convergence limit of tests of sets.
