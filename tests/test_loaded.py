@@ -78,7 +78,12 @@ def test_import_and_help_load_no_numbers(program, tmp_path):
 @pytest.mark.parametrize("command", ["giant", "adjust"])
 def test_examples_load_what_they_need(command, tmp_path):
     program = COMMAND.format(arguments=[command, "--example", "--no-html", "--quiet"])
-    others = ("photogram.comparator", "photogram.stellar", "photogram.collection", "photogram.distributed")
+    others = (
+        "photogram.comparator",
+        "photogram.stellar",
+        "photogram.collection",
+        "photogram.distributed.run",
+    )
     assert loaded(program, (*HEAVY, *others, "photogram._photocore"), tmp_path) == ["photogram._photocore"]
 
 

@@ -186,14 +186,14 @@ def snooped(
         trial.asked(core.run, trial.core)
     log = core.finish()
     names = _Names(trial.suspects, aside)
-    remarks = [names.remark(*remark, settings.max_rounds) for remark in log["remarks"]]
+    remarks = [names.remark(*remark, rounds=settings.max_rounds) for remark in log["remarks"]]
     if errors:
         remarks.append(phrase("snooping.common", errors=list(errors)))
     return Outcome(
         log=[names.removal(**removal) for removal in log["removals"]],
         rounds=[
-            Round(number, *standing, log["tests"], limit, removed, returned)
-            for number, standing, limit, removed, returned in log["rounds"]
+            Round(number, status, omega, freedom, log["tests"], limit, removed, returned)
+            for number, (status, omega, freedom), limit, removed, returned in log["rounds"]
         ],
         out=Out(log["rows"], set(log["points"]), set(log["photos"])),
         tests=log["tests"],
@@ -248,7 +248,7 @@ class _Names:
             units=tuple(map(suspects.unit, rows)),
             error=tuple(error),
             error_sd=tuple(error_sd),
-            rivals=tuple(Rival(str(suspects.name(rival)), *others) for rival, *others in rivals),
+            rivals=tuple(Rival(str(suspects.name(rival)), t, rank, odds) for rival, t, rank, odds in rivals),
             consequences=tuple(self._consequence(*each) for each in consequences),
             kept=KEPT[kept] if kept else "",
             **predicted,
@@ -267,7 +267,9 @@ class _Names:
             fields = dict(zip(("removed", "images"), map(int, values), strict=True))
         return Phrase(f"snooping.{code}", fields)
 
-    def remark(self, code: str, values: list[float], factors: list[tuple[int, float]], rounds: int) -> Phrase:
+    def remark(
+        self, code: str, values: list[float], factors: list[tuple[int, float]], *, rounds: int
+    ) -> Phrase:
         """Return a remark; `rounds` is the largest number of rounds."""
         if code == "factors":
             named = [phrase("snooping.factor", kind=KINDS[kind], factor=factor) for kind, factor in factors]
