@@ -39,6 +39,7 @@ MOST = 60  # Maximum number of compared control points
 FEWEST = 3
 TRIPLES = 400  # Maximum number of tried triples of control points
 CLEARLY = 2 * math.log(20)  # Additional cost of an explanation by single points (likelihood ratio of 20)
+PAIRS = 15  # Maximum number of tried exchanges
 GROWTHS = 5
 NEAR = 6.0  # Standard deviations within which a point agrees with a similarity
 STEPS = 30
@@ -109,13 +110,36 @@ class FreeModel:
 
     def _best(self, target: Floats) -> tuple[float, _Similarity]:
         if not np.isfinite(target).all():
-            return math.inf, _UNIT
-        starts = [replace(_UNIT, shift=(target - self.model).mean(axis=0))]
+            return math.inf, _Similarity.start(self.model, self.model)
+        starts = [_Similarity.start(self.model, target)]
         full = self.held.all(axis=1)
         if full.sum() >= FEWEST:
-            starts.append(_Similarity.closest(self.model[full], target[full]))
+            starts.append(self._closest(np.flatnonzero(full), target))
         rows = np.flatnonzero(self.held.ravel())
         return min((self._fitted(each, target, rows) for each in starts), key=lambda each: each[0])
+
+    def two_exchanged(self) -> float:
+        """Return Omega after the best exchange of two points."""
+        target = self._target(None)
+        _, similarity = self._nearest(target)
+        placed = similarity.of(self.model)
+        pairs = [
+            pair
+            for pair in combinations(range(len(target)), 2)
+            if (self.held[pair[0]] == self.held[pair[1]]).all()
+        ]
+
+        def apart(pair: tuple[int, int]) -> float:
+            own, swapped = target[list(pair)], target[list(pair[::-1])]
+            at = placed[list(pair)]
+            return float(((at - swapped) ** 2).sum() - ((at - own) ** 2).sum())
+
+        left = math.inf
+        for pair in sorted(pairs, key=apart)[:PAIRS]:
+            swapped = target.copy()
+            swapped[list(pair)] = target[list(pair[::-1])]
+            left = min(left, self._best(swapped)[0])
+        return left
 
     def some_wrong(self, change: Change | None = None) -> float:
         """Return the cost of explaining the misfit, under a hypothesis, by wrong points.
@@ -134,14 +158,15 @@ class FreeModel:
         for _ in range(GROWTHS):
             rows = np.flatnonzero((self.held & right[:, np.newaxis]).ravel())
             some = full[right[full]]
-            start = _Similarity.closest(self.model[some], target[some])
+            start = self._closest(some, target)
             omega, similarity = self._fitted(start, target, rows)
             misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
             now = np.abs(misses).max(axis=1) < NEAR
             if right[full].sum() < FEWEST or now[full].sum() < FEWEST or (now == right).all():
                 break
             right = now
-        tests = misses[~right]
+        gone = np.flatnonzero((self.held & ~right[:, np.newaxis]).ravel())
+        tests = self._left_out(similarity, target, gone)
         count = int((~right).sum()) * math.log(3 * len(right))
         return omega + 2 * (count + float(np.log(np.maximum(np.abs(tests), 1.0)).sum()))
 
@@ -154,14 +179,26 @@ class FreeModel:
     def _nearest(self, target: Floats) -> tuple[Floats, _Similarity]:
         """Return the three-point similarity that most points fit, after (k, 3) misfits."""
         deviations = self._deviations
-        best, nearest = math.inf, (np.zeros(target.shape), _UNIT)
+        best, nearest = math.inf, (np.zeros(target.shape), _Similarity.start(self.model, target))
         for three in _triples(np.flatnonzero(self.held.all(axis=1))):
-            similarity = _Similarity.closest(self.model[three], target[three])
+            similarity = self._closest(three, target)
             misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
             cost = float(np.log1p(misses**2).sum())
             if cost < best:
                 best, nearest = cost, (misses, similarity)
         return nearest
+
+    def _left_out(self, similarity: _Similarity, target: Floats, gone: Indices) -> Floats:
+        """Return errors of omitted components by the others, in standard deviations."""
+        rows = np.flatnonzero(self.held.ravel())
+        error, design, own = self._equations(similarity, target, rows)
+        weighted = np.linalg.solve(own, design)
+        projector = np.linalg.inv(own) - weighted @ np.linalg.pinv(design.T @ weighted) @ weighted.T
+        place = np.searchsorted(rows, gone)
+        cofactor = np.linalg.pinv(projector[np.ix_(place, place)])
+        errors = cofactor @ (projector @ error)[place]
+        tests: Floats = errors / np.sqrt(np.maximum(np.diag(cofactor), np.finfo(np.float64).tiny))
+        return tests
 
     def _equations(
         self, similarity: _Similarity, target: Floats, rows: Indices
@@ -178,6 +215,10 @@ class FreeModel:
         meant = supplied if change is None else change(supplied)
         # A free component carries no information: it has the coordinate of the model.
         return self.axes.positions(np.where(self.held, meant, self.given))
+
+    def _closest(self, which: Indices, target: Floats) -> _Similarity:
+        some = self.model[which]
+        return _Similarity.closest(some, target[which]).about(some, self.model)
 
     def _fitted(self, similarity: _Similarity, target: Floats, rows: Indices) -> tuple[float, _Similarity]:
         """Return Omega of some rows and the similarity after Gauss-Newton steps."""
@@ -196,7 +237,7 @@ class FreeModel:
             if abs(before - now) <= CONVERGED * max(now, 1.0):
                 return now, similarity
             before = now
-            similarity = similarity.moved(step, similarity.of(self.model).mean(axis=0))
+            similarity = similarity.moved(step)
         return before, similarity
 
 
@@ -210,33 +251,40 @@ def _triples(points: Indices) -> list[Indices]:
 
 @dataclass(frozen=True, eq=False)
 class _Similarity:
-    """Positions in object space: scale x rotation x model + shift."""
-
     scale: float
     rotation: Floats
     shift: Floats
 
     @classmethod
+    def start(cls, model: Floats, target: Floats) -> _Similarity:
+        """Return the shift between the means of two sets of points."""
+        return cls(1.0, np.eye(3), target.mean(axis=0) - model.mean(axis=0))
+
+    @classmethod
     def closest(cls, model: Floats, target: Floats) -> _Similarity:
         """Return the unweighted least-squares similarity."""
         scale, rotation, _ = turn_and_scale(model, target)
-        scale = max(scale, 1e-6)
-        return cls(scale, rotation, target.mean(axis=0) - scale * rotation @ model.mean(axis=0))
+        return cls(max(scale, 1e-6), rotation, target.mean(axis=0) - model.mean(axis=0))
 
     def of(self, model: Floats) -> Floats:
-        """Return (k, 3) transformed model points."""
-        placed: Floats = self.scale * model @ self.rotation.T + self.shift
+        """Return (k, 3) transformed model points; rotation and scale about their mean."""
+        centre = model.mean(axis=0)
+        placed: Floats = self.scale * (model - centre) @ self.rotation.T + centre + self.shift
         return placed
 
-    def moved(self, step: Floats, centre: Floats) -> _Similarity:
-        """Return the similarity after a step of translation, scale and rotation about a centre."""
-        factor = math.exp(float(np.clip(step[3], -1, 1)))
-        turn = Attitudes.of("rotation_vector", step[np.newaxis, 4:]).matrices[0]
-        shift = centre + factor * turn @ (self.shift - centre) + step[:3]
-        return _Similarity(self.scale * factor, turn @ self.rotation, shift)
+    def about(self, some: Floats, model: Floats) -> _Similarity:
+        """Return the same similarity about the mean of all points."""
+        from_some, to_all = some.mean(axis=0), model.mean(axis=0)
+        moved = self.scale * (to_all - from_some) @ self.rotation.T + from_some + self.shift - to_all
+        return _Similarity(self.scale, self.rotation, moved)
 
-
-_UNIT = _Similarity(1.0, np.eye(3), np.zeros(3))
+    def moved(self, step: Floats) -> _Similarity:
+        """Return the similarity after a step of translation, scale and rotation."""
+        return _Similarity(
+            self.scale * math.exp(float(np.clip(step[3], -1, 1))),
+            Attitudes.of("rotation_vector", step[np.newaxis, 4:]).matrices[0] @ self.rotation,
+            self.shift + step[:3],
+        )
 
 
 def doubtful(first: Result | None, *kinds: str) -> bool:
@@ -311,7 +359,7 @@ def explain(model: FreeModel) -> Explained | None:
         if model.block.spheroid is None or "heights" in each.kind or each.kind == EXCHANGED
     ]
     changed = [model.omega(each.change) for each in sets]
-    single = model.some_wrong()
+    single = min(model.some_wrong(), model.two_exchanged())
     verdict = judged(model.omega(), changed, model.degrees_of_freedom)
     if verdict is None or min(changed) + CLEARLY > single:
         # Other wrong points hide a mistake in the set: both are compared with the cost of wrong points.
