@@ -12,7 +12,9 @@ class Declared(Extension):
 
     def on_alias_instance(self, *, alias: Alias, **_: Any) -> None:
         """Let a dataclass of `photogram.lazy_dataclasses` be one of the standard library: with parameters."""
-        alias.target_path = alias.target_path.replace("photogram.lazy_dataclasses.", "dataclasses.")
+        for name in ("converting_dataclass", "dataclass", "field"):
+            if alias.target_path == f"photogram.lazy_dataclasses.{name}":
+                alias.target_path = f"dataclasses.{name.removeprefix('converting_')}"
 
     def on_module_members(self, *, mod: Module, **_: Any) -> None:
         """Let the names that a package's stub imports, which `lazy_loader` loads, be public."""

@@ -1,8 +1,6 @@
 """Work in a notebook: what things show of themselves, equality, pickles, what can be reached and given."""
 
-import ast
 import copy
-import inspect
 import pickle
 import subprocess
 import sys
@@ -16,7 +14,7 @@ import pytest
 import photogram
 import typed_uses
 from example_scripts import load
-from photogram import Block, Camera, Iteration, Progress, adjust, collection, errors, simulate
+from photogram import Camera, Iteration, Progress, adjust, collection, errors, simulate
 from photogram.arguments.equality import alike
 from photogram.stellar import read_plain
 
@@ -179,27 +177,6 @@ def test_what_checkers_of_types_accept_works():
     assert len(typed_uses.collection().image_xy) == 1
     with pytest.raises(TypeError):
         typed_uses.refused()
-
-
-@pytest.mark.parametrize("kind", [Block, collection.Collection])
-def test_checkers_of_types_are_told_the_arguments_that_there_are(kind):
-    tree = ast.parse(inspect.getsource(sys.modules[kind.__module__]))
-    [told] = [
-        node
-        for each in ast.walk(tree)
-        if isinstance(each, ast.ClassDef) and each.name == kind.__name__
-        for node in ast.walk(each)
-        if isinstance(node, ast.FunctionDef) and node.name == "__init__"
-    ]
-    arguments = told.args
-    names = [each.arg for each in (*arguments.args, *arguments.kwonlyargs)]
-    there = inspect.signature(kind).parameters
-    assert set(names[1:]) == set(there)
-    defaults = [None] * (len(arguments.args) - 1 - len(arguments.defaults)) + arguments.defaults
-    given = dict(zip(names[1:], [*defaults, *arguments.kw_defaults], strict=True))
-    assert {name for name, default in given.items() if default is None} == {
-        name for name, each in there.items() if each.default is inspect.Parameter.empty
-    }
 
 
 def made(kind):

@@ -9,7 +9,7 @@ import photogram
 from fuzz.networks import random_network
 from photogram import adjust
 
-TESTED = ("active", "rank", "statistic", "least", "shared", "residual", "redundancy", "error", "error_sd")
+TESTED = ("active", "rank", "statistic", "least", "residual", "redundancy", "error", "error_sd")
 SEED = 5
 HIDDEN = 1e-3
 """Redundancy from which on an error is more than the rounding of what hides it."""

@@ -116,7 +116,7 @@ FAULTS = [
     (
         "lines",
         "photos.csv",
-        "oscillator,1.0,1e-5",
+        "oscillator,1.0,0.00001",
         "oscillator,1.1,1e-5",
         ["record 3", "column scan", "same values"],
     ),

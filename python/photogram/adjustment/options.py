@@ -99,7 +99,7 @@ class AdjustOptions(Checked):
         super().__post_init__()
         loss_row(self.loss)
         check_datum(self.constraints)
-        if self.covariance != "verdict":
+        if not (isinstance(self.covariance, str) and self.covariance == "verdict"):
             truth_value("covariance", self.covariance)
         limit = self.tolerance.percent if isinstance(self.tolerance, AsPublished) else self.tolerance
         require(number("tolerance", limit) > 0, "tolerance", "positive", value=limit)

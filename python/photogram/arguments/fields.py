@@ -75,6 +75,9 @@ def check_members(kind: type, members: Mapping[str, Any]) -> None:
                 converted = check(name, members[name])
                 if hasattr(converted, "dtype") and not hasattr(members[name], "dtype"):
                     raise refused(name, members[name], "an array of numbers")
+        for each in fields(kind):
+            if each.type == "Names" and isinstance(members.get(each.name), str):
+                raise refused(each.name, members[each.name], "a list of names")
 
 
 @cache

@@ -372,7 +372,7 @@ class Block(Valued, Brief):
         points = changes.get("point_ids")
         if points is not None and len(points) != len(self.point_ids):
             changes = {"point_check_sd": None} | changes
-        own = copy.copy(self)
+        own = self.kept()
         vars(own).update(changes)
         check_block(own, changes.keys())
         return own

@@ -241,6 +241,14 @@ class SimulationOptions(Checked):
     motion: RollingShutter | LineScanner | None = None
     seed: int | np.random.Generator = option(0, 0, kind=int)
 
+    def __post_init__(self) -> None:
+        from photogram.arguments.objects import require
+
+        super().__post_init__()
+        for name in ("position_sd", "attitude_sd"):
+            value = getattr(self, name)
+            require(value <= LONGEST or value == math.inf, name, "range", low=0.0, high=LONGEST, value=value)
+
     @property
     def footprint(self) -> float:
         """Side of a frame on the ground, metres; infinite for a principal distance of zero."""

@@ -157,6 +157,8 @@ def corner_components(
     RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
         As in :func:`photogram.variance_components`.
     """
+    for basis in by:
+        one_of("by", basis, get_args(CornerBasis))
     start = result.restarted()
     if not any(each.knot_unknowns for each in start.cameras):
         start = start.replace(regularise=None)

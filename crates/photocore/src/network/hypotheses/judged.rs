@@ -84,7 +84,12 @@ impl Judged {
         }
         let least = eigen.eigenvalues.imin();
         let share = eigen.eigenvalues[least];
-        let mut direction = directions.column(least).into_owned();
+        let taken = squares - redundancy;
+        let hidden: Vec<usize> = (0..count).filter(|&k| eigen.eigenvalues[k] <= VISIBLE).collect();
+        let mut direction = match hidden.len() {
+            0 | 1 => directions.column(least).into_owned(),
+            _ => worst_hidden(&directions.select_columns(&hidden), &taken, plausible),
+        };
         if direction[direction.iamax()] < 0.0 {
             direction.neg_mut();
         }
@@ -94,7 +99,6 @@ impl Judged {
             let size = |own: &[f64]| (0..count).map(|k| (direction[k] / own[k]).powi(2)).sum::<f64>().sqrt();
             (plausible.len() == count).then(|| &direction / size(plausible))
         });
-        let taken = squares - redundancy;
         let ratio = |error: &DVector<f64>| (error.transpose() * &taken * error)[0].max(0.0).sqrt();
         let listed = |own: DVector<f64>| own.as_slice().to_vec();
         Self {
@@ -124,6 +128,31 @@ impl Judged {
         self.cofactors = cofactors.transpose().as_slice().to_vec();
         self
     }
+}
+
+/// Difference of two effects that rounding may cause.
+const ROUNDING: f64 = 1e-6;
+
+/// The worst of several undetected directions, which have no order of their own: the error of a single parameter, as far as it is undetected,
+/// that changes functions of the unknowns most in relation to plausible sizes. The last of equal ones: heights, if there are any.
+fn worst_hidden(span: &DMatrix<f64>, taken: &DMatrix<f64>, plausible: &[f64]) -> DVector<f64> {
+    let count = span.nrows();
+    let weights =
+        DVector::from_fn(count, |k, _| if plausible.len() == count { plausible[k].powi(-2) } else { 1.0 });
+    let weighted = DMatrix::from_diagonal(&weights) * span;
+    let inverse = span.tr_mul(&weighted).pseudo_inverse(f64::EPSILON).unwrap_or_default();
+    let effect = |direction: &DVector<f64>| {
+        (direction.transpose() * taken * direction)[0] / direction.map(|own| own * own).dot(&weights)
+    };
+    let mut worst = (f64::NEG_INFINITY, DVector::zeros(count));
+    for axis in 0..count {
+        let direction = span * (&inverse * weighted.row(axis).transpose());
+        let own = effect(&direction);
+        if own.is_finite() && own >= worst.0 * (1.0 - ROUNDING) {
+            worst = (own.max(worst.0), direction);
+        }
+    }
+    worst.1
 }
 
 /// lambda0 of a test of k degrees of freedom.
