@@ -298,7 +298,7 @@ def test_what_parts_cannot_do_is_refused(block):
         found.covariances()
     with pytest.raises(InputError, check=lambda error: error.code == "parts.memory"):
         Division(memory="much")
-    with pytest.raises(InputError, match="^parts"):
+    with pytest.raises(InputError, match=r"^parts"):
         Division(parts=0)
     with pytest.raises(InputError, match=r"less than 2\^63"):
         Division(memory="9" * 400 + "GB")

@@ -225,7 +225,7 @@ def test_a_datum_that_cannot_be_is_refused_before_anything_is_adjusted(block):
     assert not [each for each in told if each.phase == "iteration"]
     with raises(InputError, "error.absent"):
         adjust_in_parts(block, Division(parts=2), datum=InnerConstraints(["nowhere"]))
-    with pytest.raises(InputError, match="^datum"):
+    with pytest.raises(InputError, match=r"^datum"):
         adjust_in_parts(block, Division(parts=2), datum="outer")
     held = photogram.simulate(**SIZE).block
     with pytest.raises(AdjustmentError, check=lambda error: error.code == "parts.not-free"):
