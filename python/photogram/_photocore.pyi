@@ -1278,8 +1278,8 @@ class NetworkSnooping:
     Methods raise the errors of the trial.
     """
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         trial: NetworkTrial,
         consensus: tuple[Sequence[int], set[int]] | None,
         *,
@@ -1293,7 +1293,7 @@ class NetworkSnooping:
         exact: float,
         max_rows: int,
         is_supported: list[bool],
-    ) -> None:
+    ) -> NetworkSnooping:
         """Adjust and test all observations, or those of a consensus.
 
         Parameters
