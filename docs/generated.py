@@ -13,12 +13,14 @@ Lines of pages that are replaced:
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterable, Iterator
 from html import escape
 from typing import Any
 
 MARK = re.compile(r"^<!-- generated: (\w+) ?(.*?) ?-->$", re.MULTILINE)
 WIDTH = "500"  # Columns of the help, so that no line is wrapped
+CODE = 110  # Characters of a line of code on a page
 PANEL = re.compile(r"^╭─ (.*?) ─+╮\n(.*?)^╰", re.DOTALL | re.MULTILINE)
 VARIANT = re.compile(r"(\.one(\.\w+)?)?(\.cli)?$")
 FIELD = re.compile(r"\{(\w+)[^}]*\}")
@@ -111,9 +113,16 @@ def keys(_: str) -> str:
 
     sections: dict[str, list[str]] = {}
     for key in KEYS:
-        sections.setdefault(key.section, []).append(key.described())
+        sections.setdefault(key.section, []).extend(wrapped(key.described()))
     lines = [line for name, own in sections.items() for line in (f"[{name}]", *own)]
     return "\n".join(["```toml", *lines, "```"])
+
+
+def wrapped(line: str) -> list[str]:
+    """Return a line of TOML with its comment in several lines if it is wider than a page."""
+    start, mark, comment = line.partition("# ")
+    parts = textwrap.wrap(comment, CODE - len(start)) if len(line) > CODE else [comment]
+    return [start + mark + parts[0], *(" " * len(start) + mark + part for part in parts[1:])]
 
 
 def commands(_: str) -> str:
