@@ -15,7 +15,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,10 +24,12 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
-from photogram.results.result import Result
 from photogram.results.unknowns import AdjustedCamera
 from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 CORRELATED = 0.95  # The report lists larger correlations
 ASKED = 20  # Largest number of cameras with correlations to the poses of photos

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,11 +27,13 @@ from photogram.results.network_document import (
     size_section,
 )
 from photogram.results.network_tables import control
-from photogram.results.result import Result
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, about, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 @np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite

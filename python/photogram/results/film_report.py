@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,9 +14,11 @@ from photogram.network.observations import FILM, Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
 from photogram.results.network_trial import OBSERVATION, observations_of_core
-from photogram.results.result import Result
 from photogram.show.page import Drawing, Part, Section, about
 from photogram.show.quantity import Axis, Kind, Quantity, Table, members_of_each, of_each
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 STEPS = 9  # Positions of a pattern along a side of the format
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from photogram.results.network_tables import (
     test_value,
 )
 from photogram.results.observation_kinds import ObservedKind
-from photogram.results.result import Result
 from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown
 from photogram.show.quantity import Axis, Quantity, attribute, column, component, joined, long
 from photogram.statistics.reliability import TESTABLE
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 _EITHER = "standard deviation that was given, or is assumed: {}"
 
