@@ -265,8 +265,8 @@ impl Work {
         }
     }
 
-    /// Adds to the elements of `values` of each parameter.
-    fn add(active: &[Option<usize>], partials: &[(usize, f64)], mut add: impl FnMut(usize, f64)) {
+    /// Calls `add` with the place of each parameter among the active ones, and its partial.
+    fn each_active(active: &[Option<usize>], partials: &[(usize, f64)], mut add: impl FnMut(usize, f64)) {
         partials
             .iter()
             .for_each(|&(column, partial)| active[column].into_iter().for_each(|k| add(k, partial)));
@@ -321,27 +321,27 @@ impl Sums {
         for (constant, own, _, partials) in rows.rows() {
             self.add(constant, partials);
             let right = &mut work.right;
-            Work::add(&work.active, partials, |column, partial| {
+            Work::each_active(&work.active, partials, |column, partial| {
                 let right = &mut right[column * width..][..width];
                 right.iter_mut().zip(own).for_each(|(sum, value)| *sum += value * partial);
             });
         }
         let inverse = to.inverse(local, rows);
         work.solved.clear();
-        for right in work.right.chunks_exact(width.max(1)) {
-            let rows = inverse.chunks_exact(width.max(1));
+        for right in work.right.chunks_exact(width) {
+            let rows = inverse.chunks_exact(width);
             work.solved.extend(rows.map(|row| dot(row, right)));
         }
-        for (i, right) in work.columns.iter().zip(work.right.chunks_exact(width.max(1))) {
-            for (j, solved) in work.columns.iter().zip(work.solved.chunks_exact(width.max(1))) {
+        for (i, right) in work.columns.iter().zip(work.right.chunks_exact(width)) {
+            for (j, solved) in work.columns.iter().zip(work.solved.chunks_exact(width)) {
                 self.taken[(*i, *j)] += dot(right, solved);
             }
         }
         for (_, own, others, partials) in rows.rows() {
             work.left.clear();
-            work.left.extend(work.solved.chunks_exact(width.max(1)).map(|solved| -dot(own, solved)));
+            work.left.extend(work.solved.chunks_exact(width).map(|solved| -dot(own, solved)));
             let left = &mut work.left;
-            Work::add(&work.active, partials, |column, partial| left[column] += partial);
+            Work::each_active(&work.active, partials, |column, partial| left[column] += partial);
             self.reduce(others, work);
         }
     }
@@ -475,7 +475,7 @@ fn retained(extended: &Extended<'_>, count: usize) -> Sums {
         work.left.clear();
         work.left.resize(work.columns.len(), 0.0);
         let left = &mut work.left;
-        Work::add(&work.active, &partials, |column, partial| left[column] += partial);
+        Work::each_active(&work.active, &partials, |column, partial| left[column] += partial);
         coefficients.retain(|own| !extended.fixed[own.0]);
         sums.reduce(coefficients, &mut work);
     };

@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use super::super::NetworkError;
 use super::super::group_tests::Tests;
+use super::super::median::middle;
 use super::choosing::Choosing;
 use super::conditional::Chosen;
 use super::log::Remark;
 use super::state::{Snooping, TESTABLE};
 use super::tried::{Tried, unless_lost};
-use super::whole_photos::middle;
 use crate::adjustment::Status;
 
 /// Median of the absolute value of a standard normal variable, and of the length of a vector of two of them.

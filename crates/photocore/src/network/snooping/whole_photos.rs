@@ -1,6 +1,7 @@
 //! Exclusion of whole photos: photos of another exposure, or with exchanged names of many points.
 
 use super::super::NetworkError;
+use super::super::median::middle;
 use super::groups::Excluded;
 use super::log::{Consequence, Removal};
 use super::state::Snooping;
@@ -174,14 +175,5 @@ impl Snooping {
         }
         let left = self.median_of(photo);
         Ok(self.adjust(network, before)?.is_ok() && left < median / FAR)
-    }
-}
-
-/// Returns the median: the mean of both middle values of an even number; NaN without values.
-pub(super) fn middle(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    match values.len() {
-        0 => f64::NAN,
-        count => f64::midpoint(values[(count - 1) / 2], values[count / 2]),
     }
 }
