@@ -2,12 +2,12 @@
 
 import subprocess
 import sys
-import tracemalloc
 
 import numpy as np
 import pytest
 
 from message_codes import rejected
+from peak import peak_of
 from photogram import _photocore, formats
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
@@ -197,12 +197,7 @@ def test_memory_is_less_than_twice_the_file(tmp_path, monkeypatch):
     monkeypatch.setattr(delimited, "PIECE", 1 << 16, raising=False)
     path = written(tmp_path / "images.csv", lines(ROWS))
     read(path)
-    tracemalloc.start()
-    try:
-        table = read(path)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    table, peak = peak_of(lambda: read(path))
     assert table.count == ROWS
     assert peak < 2 * path.stat().st_size
 
@@ -220,12 +215,7 @@ def test_images_of_a_project_are_shared_by_table_and_block(tmp_path):
     (tmp_path / "photos.csv").write_text("photo,camera,x,y,z,omega,phi,kappa\n" + poses)
     (tmp_path / "project.toml").write_text("[project]\nformat = 1\n[sd]\nimages = 0.5\n")
     formats.read(tmp_path)
-    tracemalloc.start()
-    try:
-        block = formats.read(tmp_path).block
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    block, peak = peak_of(lambda: formats.read(tmp_path).block)
     assert np.ptp(block.image_sd) == 0
     own = sum(
         each.nbytes for each in (block.image_xy, block.image_sd, block.image_photos, block.image_points)
@@ -244,12 +234,7 @@ def test_a_project_has_no_dictionary_of_all_points(tmp_path):
     )
     (tmp_path / "project.toml").write_text("[project]\nformat = 1\n[sd]\nimages = 0.5\n")
     formats.read(tmp_path)
-    tracemalloc.start()
-    try:
-        block = formats.read(tmp_path).block
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    block, peak = peak_of(lambda: formats.read(tmp_path).block)
     assert (block.point_ids[7], block.point_ids[-1]) == ("point7", "new")
     assert np.flatnonzero(np.isfinite(block.point_sd[:, 0])).tolist() == [7, ROWS]
     # A dictionary of all names needs 60 bytes more for each.
