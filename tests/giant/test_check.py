@@ -196,6 +196,22 @@ def test_section_13_exchanged_point_names(block):
 
 
 @pytest.mark.giant("13", "1 blunder edit by intersection")
+def test_section_13_exchanged_point_names_on_a_photo_with_a_large_pattern():
+    # The station of the photo is the coarsest: its residuals are larger than those of the other photos.
+    size = {"strips": 2, "photos_per_strip": 6, "points_per_photo": 48, "side_overlap": 0.2}
+    block = simulate(
+        **size, control_spacing=4, control_sd=0.05, photo_to_ground=False, seed=1026, **GULF
+    ).block
+    rows = np.flatnonzero(block.image_photos == block.photo_ids.index("0104"))
+    names = {"P000161", "P000166"}
+    one, other = (row for row in rows if block.point_ids[block.image_points[row]] in names)
+    xy = block.image_xy.copy()
+    xy[[one, other]] = xy[[other, one]]
+    (exchanged,) = checked(block.replace(image_xy=xy)).grave
+    assert (exchanged.kind, exchanged.photos, set(exchanged.points)) == ("exchanged-points", ["0104"], names)
+
+
+@pytest.mark.giant("13", "1 blunder edit by intersection")
 def test_section_13_a_gross_plate_error_is_seen_by_intersection(block):
     row = image(block, "0305", least_rays=4)
     outcome = checked(changed(block, "image_xy", row, 1, 40.0))

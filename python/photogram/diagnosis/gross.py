@@ -310,10 +310,11 @@ class _Solver:
 def _exchanged(rays: Rays, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, int]]:
     """Find exchanged names among broken points; return findings, and the photo of each point."""
     block = rays.block
-    # Before the adjustment, residuals of good images have the size of their pattern.
-    usual = float(np.nanmedian(rays.intersect().sizes[rays.used])) / MEDIAN_SIZE
+    # Before the adjustment, residuals of good images have the size of the pattern of their photo.
+    sizes = rays.intersect().sizes
+    usual = np.fmax(_medians(block, sizes, rays.used), np.nanmedian(sizes[rays.used])) / MEDIAN_SIZE
     alone = kept_images(block, rays.used).replace(point_sd=np.inf)
-    alone = alone.replace(image_sd=np.maximum(alone.image_sd, usual))
+    alone = alone.replace(image_sd=np.maximum(alone.image_sd, usual[alone.image_photos, np.newaxis]))
     findings: list[Finding] = []
     found: dict[int, int] = {}
     for each in exchanged_names(alone, ~np.isin(alone.image_points, list(rows_of))):
