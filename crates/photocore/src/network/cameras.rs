@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use super::adjusted::AdjustedPhoto;
+use super::input::Network;
 use super::median::median;
 use super::model::Bundle;
 use super::problem::Assembled;
 use super::surroundings::Surroundings;
-use super::{AdjustedPhoto, Network};
 use crate::adjustment::{Adjustment, Problem};
 
 /// An adjusted camera.

@@ -2,11 +2,15 @@
 
 use std::mem::discriminant;
 
+use super::commons::CommonKind;
+use super::error::NetworkError;
+use super::input::{Image, Network};
 use super::mounts::AT_PHOTO;
+use super::mounts::{Mount, Trajectory};
 use super::observations::{Fault, Observation};
 use super::passages::Facts;
+use super::passages::Passage;
 use super::surroundings::{BlockOf, Surroundings};
-use super::{CommonKind, Image, Mount, Network, NetworkError, Passage, Trajectory};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {

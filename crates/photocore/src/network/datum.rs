@@ -5,13 +5,14 @@ use std::collections::{BTreeSet, HashMap};
 use nalgebra::{Matrix4, Vector6};
 
 use super::commons::Motion;
+use super::error::NetworkError;
+use super::input::Network;
 use super::median::median;
 use super::model::Bundle;
 use super::parts::{Joined, MOST_PARTS, MOTIONS, Part, Parts};
 use super::problem::Assembled;
 use super::state::InnerConstraints;
 use super::stations::{Placed, Station, Stations};
-use super::{Network, NetworkError};
 use crate::Threads;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{

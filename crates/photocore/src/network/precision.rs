@@ -1,11 +1,11 @@
 //! Values too large for double precision.
 
 use super::error::Coarse;
+use super::input::{Network, Start};
 use super::median::median;
 use super::model::Bundle;
 use super::selection::{Selected, TOGETHER};
 use super::stations::Station;
-use super::{Network, Start};
 use crate::geometry::PoseNumbers;
 use crate::parallel;
 

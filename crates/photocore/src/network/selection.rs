@@ -1,8 +1,9 @@
 //! Selection of the points that take part in the adjustment.
 
+use super::error::NetworkError;
+use super::input::Network;
 use super::state::State;
 use super::surroundings::Surroundings;
-use super::{Network, NetworkError};
 use crate::parallel;
 use crate::sorting::sort_by;
 

@@ -1,9 +1,9 @@
 //! Parameters of photos, shared cameras and shared parameters before the adjustment: values, observed values, standard deviations.
 
+use super::input::{Camera, Network, Photo};
 use super::median::median;
 use super::model::Bundle;
 use super::surroundings::Surroundings;
-use super::{Camera, Network, Photo};
 use crate::geometry::{ObjectSpace, Orientation, POSE, PoseNumbers, Vector3, nearest_turns};
 
 impl Network {

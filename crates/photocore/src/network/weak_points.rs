@@ -1,9 +1,10 @@
 //! Ill-conditioned points: on nearly parallel rays, or much nearer to a station than all others.
 
+use super::adjusted::AdjustedPoint;
+use super::input::Network;
 use super::median::median;
 use super::model::Bundle;
 use super::selection::TOGETHER;
-use super::{AdjustedPoint, Network};
 use crate::geometry::{self, Matrix3};
 use crate::parallel;
 

@@ -1,7 +1,7 @@
 //! Input and output of the screens.
 
 use crate::adjustment::{AdjustError, Adjustment};
-use crate::network::Options;
+use crate::network::input::Options;
 use crate::network::problem::Assembled;
 use crate::network::selection::{Dropped, LeftOut};
 

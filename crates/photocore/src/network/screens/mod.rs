@@ -8,7 +8,7 @@ mod ran_off;
 
 use self::leaving::{Leaves, Leaving};
 use self::near_station::NearStation;
-use super::Screens;
+use super::input::Screens;
 use super::selection::LeftOut;
 
 pub(super) use leaving::{Begin, Ended};

@@ -1,7 +1,7 @@
 //! Points that move to the position of a station during the adjustment.
 
 use super::leaving::{Ended, Leaves};
-use crate::network::Image;
+use crate::network::input::Image;
 use crate::network::median::median;
 use crate::network::model::Bundle;
 use crate::network::selection::{Dropped, Reason};

@@ -2,7 +2,7 @@
 
 use super::leaving::{Ended, FEW, Leaves};
 use crate::adjustment::{Method, Status};
-use crate::network::Image;
+use crate::network::input::Image;
 use crate::network::median::median;
 use crate::network::model::Bundle;
 use crate::network::selection::{Dropped, Reason};
