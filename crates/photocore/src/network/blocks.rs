@@ -2,8 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::commons::Common;
-use super::in_block::InBlock;
+use super::commons::{Common, InBlock};
 use super::input::{Network, Photo};
 use super::mounts::Trajectory;
 use crate::geometry::POSE;

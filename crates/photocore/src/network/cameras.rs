@@ -6,11 +6,11 @@ use nalgebra::DMatrix;
 
 use super::adjusted::AdjustedPhoto;
 use super::input::Network;
-use super::median::median;
 use super::model::Bundle;
 use super::problem::Assembled;
 use super::surroundings::Surroundings;
 use crate::adjustment::{Adjustment, Problem};
+use crate::sorting::median;
 
 /// An adjusted camera.
 #[derive(Debug, Clone, PartialEq)]

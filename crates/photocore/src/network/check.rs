@@ -5,11 +5,9 @@ use std::mem::discriminant;
 use super::commons::CommonKind;
 use super::error::NetworkError;
 use super::input::{Image, Network};
-use super::mounts::AT_PHOTO;
-use super::mounts::{Mount, Trajectory};
+use super::mounts::{AT_PHOTO, Mount, Trajectory};
 use super::observations::{Fault, Observation};
-use super::passages::Facts;
-use super::passages::Passage;
+use super::passages::{Passage, Requirements};
 use super::surroundings::{BlockOf, Surroundings};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
@@ -130,8 +128,8 @@ impl Network {
         touched.for_each(|point| given[point] = false);
         let cameras = self.cameras.iter().map(|own| &own.camera).collect();
         let photos = self.photos.iter().map(|own| own.camera).collect();
-        let facts = Facts { space: self.space, given, cameras, photos };
-        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&facts);
+        let required = Requirements { space: self.space, given, cameras, photos };
+        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&required);
         self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
     }
 

@@ -11,6 +11,24 @@ use crate::geometry::{
     Matrix3, ObjectSpace, Pose, Vector3, angle_axis_rotation, angle_axis_with_jacobian, local_vertical,
 };
 
+/// Position of consecutive parameters inside a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InBlock {
+    /// Index of the block.
+    pub block: usize,
+    /// First parameter inside the block.
+    pub first: usize,
+    /// Number of parameters of the block.
+    pub width: usize,
+}
+
+impl InBlock {
+    /// Returns the position of a whole block.
+    pub fn whole(block: usize, width: usize) -> Self {
+        Self { block, first: 0, width }
+    }
+}
+
 /// Effect of a similarity transformation of the network on a shared parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Moves {

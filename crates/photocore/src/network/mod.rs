@@ -17,12 +17,12 @@
 //! | trials without some observations | `trial`, `suspects` |
 //! | exclusion of points and photos | `screens` |
 //! | problem of least squares | `naming`, `datum`, `problem` |
-//! | values and equations at given parameters | `evaluated`, `composed`, `passing`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
+//! | values and equations at given parameters | `evaluated`, `diverging`, `composed`, `passing`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
 //! | unknowns and observations | `station_values`, `layout`, `bundle`, `model`, `camera_priors`, `blocks`, `stations` |
 //! | selection of the input | `check`, `neighbourhood`, `selection` |
 //! | input and errors | `error`, `surroundings`, `state`, `input` |
-//! | types of observations and parameters | `passages`, `observations`, `mounts`, `film`, `commons`, `in_block` |
-//! | numbers | `parts`, `median` |
+//! | types of observations and parameters | `passages`, `observations`, `mounts`, `film`, `commons` |
+//! | numbers | `parts` |
 //!
 //! Two photos over four control points:
 //!
@@ -69,18 +69,17 @@ pub mod commons;
 mod composed;
 mod covariance;
 mod datum;
+mod diverging;
 mod error;
 mod evaluated;
 pub mod film;
 mod group_tests;
 mod groups;
 pub mod hypotheses;
-mod in_block;
 mod in_lanes;
 mod input;
 mod intersection;
 mod layout;
-mod median;
 mod model;
 mod motions;
 pub mod mounts;
@@ -122,8 +121,6 @@ pub use groups::Groups;
 pub use input::{Camera, Image, Minimum, Network, Options, Photo, Point, Screens, Start, UnitVariance};
 #[doc(hidden)]
 pub use intersection::meet;
-#[doc(hidden)]
-pub use median::median;
 pub use mounts::{Mount, Trajectory};
 pub use node::{FormedNode, Node, NodePrediction};
 pub use node_datum::{AdjustedInParts, UnknownName};

@@ -7,8 +7,7 @@ use nalgebra::DMatrix;
 
 use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
-use super::commons::{CommonState, PlacedCommon};
-use super::in_block::InBlock;
+use super::commons::{CommonState, InBlock, PlacedCommon};
 use super::input::{Image, Minimum, Point, Screens};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};

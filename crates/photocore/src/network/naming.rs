@@ -2,8 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::error::NetworkError;
-use super::error::{Combination, PosePart};
+use super::error::{Combination, NetworkError, PosePart};
 use super::input::Network;
 use super::model::Owner;
 use super::problem::Assembled;

@@ -2,12 +2,12 @@
 
 use super::error::Coarse;
 use super::input::{Network, Start};
-use super::median::median;
 use super::model::Bundle;
 use super::selection::{Selected, TOGETHER};
 use super::stations::Station;
 use crate::geometry::PoseNumbers;
 use crate::parallel;
+use crate::sorting::median;
 
 /// Maximum coordinate for which its square, or the product of its partials, is finite.
 const LARGEST: f64 = 1e100;

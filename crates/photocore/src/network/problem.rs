@@ -4,7 +4,6 @@
 use super::error::NetworkError;
 use super::input::{Image, Network, Options, Point, Start};
 use super::layout::layout;
-use super::median::median;
 use super::model::Bundle;
 use super::observations::{Fault, TiedObservation};
 use super::selection::{Dropped, LeftOut, Selected, TOGETHER};
@@ -14,6 +13,7 @@ use super::surroundings::Surroundings;
 use crate::adjustment::{Method, Problem};
 use crate::geometry::{POSE, PoseNumbers};
 use crate::normals::{System, TieRows};
+use crate::sorting::median;
 use crate::{Threads, parallel};
 
 /// A problem, and the indices of its parts in the network.

@@ -7,6 +7,8 @@ use super::surroundings::Surroundings;
 use crate::parallel;
 use crate::sorting::sort_by;
 
+/// Minimum ratio of all objects to excluded ones, for which these count as few.
+pub(super) const FEW: usize = 10;
 /// Minimum number of points per thread.
 pub(super) const TOGETHER: usize = 1024;
 

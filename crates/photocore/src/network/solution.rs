@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::adjusted::{AdjustedCommon, AdjustedPhoto, AdjustedPoint};
-use super::adjusted::{adjusted_photos, adjusted_points, in_order};
+use super::adjusted::{
+    AdjustedCommon, AdjustedPhoto, AdjustedPoint, adjusted_photos, adjusted_points, in_order,
+};
 use super::cameras::AdjustedCamera;
 use super::error::NetworkError;
 use super::input::{Network, Options, UnitVariance};

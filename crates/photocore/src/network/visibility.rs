@@ -3,8 +3,7 @@
 use super::input::Image;
 use super::problem::Assembled;
 use super::selection::TOGETHER;
-use super::solution::Solution;
-use super::solution::Unseen;
+use super::solution::{Solution, Unseen};
 use super::stations::{Placed, Station};
 use crate::parallel;
 
