@@ -1,10 +1,15 @@
-"""What the files of a crate import of each other."""
+"""Imports among the files of a crate.
+
+`python tests/rust_files.py` lists imports that contradict the order of the files of the engine.
+"""
 
 import re
+import sys
 from pathlib import Path
 
 Module = tuple[str, ...]
 USE = re.compile(r"(?:^|\n)\s*(?:pub(?:\([^)]*\))?\s+)?use\s+([^;]+);")
+CRATE = Path(__file__).parents[1] / "crates" / "photocore" / "src"
 PATH = re.compile(r"\b(?:super|crate)(?:::\w+)+")
 
 
@@ -74,3 +79,27 @@ def _flat(tree: str) -> list[str]:
         else:
             parts[-1] += letter
     return [path for part in parts if part for path in _flat(head + part)]
+
+
+def order(folder: Path) -> list[str]:
+    """Return the files and folders of the table in a folder's `mod.rs`, from top to bottom."""
+    rows = re.findall(r"^//! \|[^|`]+\|([^|]+)\|$", (folder / "mod.rs").read_text(encoding="utf-8"), re.M)
+    return [name for row in rows for name in re.findall(r"`(\w+)`", row)]
+
+
+def upward(name: str, crate: Path = CRATE) -> list[str]:
+    """Return the imports of a folder of the crate that contradict the order of its table."""
+    place = {module: number for number, module in enumerate(order(crate / name))}
+    units = {path.stem for path in (crate / name).iterdir()} - {"mod"}
+    wrong = [f"{name}/{unit} must be once in the table of {name}/mod.rs" for unit in units ^ set(place)]
+    inside = [(file, other) for file, others in imports(crate).items() for other in others]
+    for file, other in inside:
+        if file[:1] == other[:1] == (name,) and file[1:2] != other[1:2] and len(file) > 1:
+            below = place.get(other[1], -1) if len(other) > 1 else -1
+            if place.get(file[1], -1) >= below:
+                wrong.append(f"{'/'.join(file)} must not import {'/'.join(other)}")
+    return sorted(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit("\n".join(upward("network")) or None)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import photogram
+from rust_files import CRATE, order, upward
 from rust_files import imports as rust_imports
 
 SOURCES = Path(photogram.__file__).parent
@@ -108,7 +109,6 @@ def test_arrows_point_down():
     assert seen == set(floor)
 
 
-CRATE = Path(__file__).parents[1] / "crates" / "photocore" / "src"
 KNOWS = {
     "network": {"adjustment", "normals", "geometry"},
     "adjustment": {"normals"},
@@ -146,9 +146,23 @@ def test_files_of_the_engine_name_each_other_in_no_circle(folder):
     assert list(TopologicalSorter(inside).static_order())
 
 
-def test_the_adjustment_of_a_network_stands_above_its_types():
-    inside = _inside("network")
-    order = list(TopologicalSorter(inside).static_order())
-    types, driver = order.index(("network",)), order.index(("network", "adjust"))
-    assert types < order.index(("network", "problem")) < driver
-    assert {("network", "screens"), ("network", "solution")} <= inside["network", "adjust"]
+def test_files_of_a_network_import_in_the_order_of_their_table():
+    table = order(CRATE / "network")
+    assert len(table) == len(set(table)) > 30
+    assert table.index("adjust") < table.index("problem") < table.index("input")
+    assert upward("network") == []
+
+
+def test_an_import_against_the_order_is_listed(tmp_path):
+    folder = tmp_path / "network"
+    folder.mkdir()
+    (folder / "mod.rs").write_text(
+        "//! | part | `upper`, `lower` |\nmod lower;\nmod upper;\n", encoding="utf-8"
+    )
+    (folder / "upper.rs").write_text("use super::lower::A;\n", encoding="utf-8")
+    (folder / "lower.rs").write_text("use super::upper::B;\n", encoding="utf-8")
+    (folder / "other.rs").write_text("", encoding="utf-8")
+    assert upward("network", tmp_path) == [
+        "network/lower must not import network/upper",
+        "network/other must be once in the table of network/mod.rs",
+    ]

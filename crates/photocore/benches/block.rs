@@ -14,13 +14,12 @@ use std::ops::ControlFlow;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
-use photocore::Threads;
-use photocore::adjustment;
 use photocore::geometry::{self, Bal, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Screens, Start, UnitVariance};
 use photocore::normals::{
     Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SolveOptions, System,
 };
+use photocore::{Threads, adjustment};
 
 /// Number of rows and columns of the dense product.
 const DENSE: usize = 1024;

@@ -15,20 +15,19 @@ pub mod network;
 pub mod normals;
 mod parallel;
 mod sorting;
-mod threads;
 
 /// Functions that other crates of this project use; they may change at any time.
 #[doc(hidden)]
 pub mod internal {
     pub use crate::adjustment::go_on;
     pub use crate::geometry::principal_axes;
-    pub use crate::network::{median, meet};
+    pub use crate::network::meet;
     pub use crate::parallel::map;
-    pub use crate::sorting::{order, sort_by};
+    pub use crate::sorting::{median, order, sort_by};
 }
 
 pub use nalgebra;
-pub use threads::{Stopped, Threads};
+pub use parallel::{Stopped, Threads};
 
 /// Compiles and runs the example in the README.
 #[cfg(doctest)]

@@ -1,4 +1,4 @@
-//! Sorting functions for code in which speed is irrelevant.
+//! Medians, and sorting functions for code in which speed is irrelevant.
 //!
 //! The sort of the standard library is compiled for every type of items and closure. These functions compile it once, for indices of items.
 
@@ -16,6 +16,22 @@ pub fn order(count: usize, compare: &dyn Fn(usize, usize) -> Ordering) -> Vec<us
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| compare(a, b));
     order
+}
+
+/// Returns the upper median of some numbers; None if the list is empty.
+#[inline]
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Returns the median: the mean of both middle values of an even number; NaN without values.
+pub(crate) fn middle(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    match values.len() {
+        0 => f64::NAN,
+        count => f64::midpoint(values[(count - 1) / 2], values[count / 2]),
+    }
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use thiserror::Error;
 
-use super::options::NEGLIGIBLE;
-use super::options::{Iteration, Status};
+use super::options::{Iteration, NEGLIGIBLE, Status};
 use super::statistics::{Counts, Observed, square, standardized};
 use crate::Stopped;
 use crate::normals::{

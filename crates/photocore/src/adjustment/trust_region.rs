@@ -8,8 +8,7 @@
 //! be the residuals, v the step and r_vv their second derivative along it. With (N + damping) a = A^T r_vv, v + a/2 is accurate to second
 //! order. Finite differences suffice: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
 
-use super::equations::GroupStep;
-use super::equations::ObservationEquations;
+use super::equations::{GroupStep, ObservationEquations};
 use super::options::{FIRST_DAMPING, Iteration, Status, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;

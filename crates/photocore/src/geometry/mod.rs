@@ -3,7 +3,6 @@
 //! * [`mod@pose`]: position and attitude of a photo; [`attitude`]: parametrizations of attitudes;
 //! * [`camera`]: camera models, one file per model;
 //! * [`orientation`]: a pose with its six unknowns; [`projection`]: the chain point, pose, camera;
-//! * [`collinearity`]: the central perspective of the historic programs;
 //! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix; [`angle_axis`]: rotation vectors;
 //! * [`space`]: coordinates of the object space; [`ellipsoid`]: longitude, latitude, height, and the local vertical frame;
 //! * [`mod@film`]: deformation and scanning of film; [`mod@correction`]: readings of comparators and scanners;
@@ -13,7 +12,7 @@
 //! * [`refraction`]: displacement of points by air and water; [`atmosphere`]: the standard atmosphere;
 //! * [`mod@nearest`]: nearest neighbours in a plane;
 //! * [`mod@trajectory`]: poses as functions of time;
-//! * [`cramer`]: solution of three linear equations.
+//! * [`axes`]: vectors and matrices, and the solution of three linear equations.
 //!
 //! Vectors and matrices in cartesian axes are `nalgebra` types. Three numbers of different units or meanings (coordinates of the object
 //! space, angles, standard deviations) are arrays. Angles are in radians, lengths in the unit of the object space, image coordinates in the
@@ -34,13 +33,10 @@
 pub mod angle_axis;
 pub mod atmosphere;
 pub mod attitude;
-mod axes;
+pub mod axes;
 pub mod camera;
-pub mod collinearity;
 pub mod correction;
-pub mod cramer;
 pub mod ellipsoid;
-mod error;
 pub mod film;
 pub mod lens;
 pub mod nearest;
@@ -60,8 +56,7 @@ pub use attitude::{AttitudeNumbers, RotationSense};
 pub use axes::principal_axes;
 pub use axes::{Matrix3, Vector3};
 pub use camera::{Bal, Brown, Camera, CameraModel, Image, Perspective, Unit};
-pub use ellipsoid::{Ellipsoid, local_vertical};
-pub use error::GeometryError;
+pub use ellipsoid::{Ellipsoid, GeometryError, local_vertical};
 pub use lens::{Displacement, Distortion, Undistorted};
 pub use nearest::nearest;
 pub use orientation::{Orientation, PoseNumbers};

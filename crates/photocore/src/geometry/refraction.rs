@@ -6,8 +6,7 @@
 
 use super::atmosphere::{Air, SCALE_HEIGHT};
 use super::axes::{Matrix3, Vector3};
-use super::ellipsoid::local_vertical;
-use super::error::GeometryError;
+use super::ellipsoid::{GeometryError, local_vertical};
 use super::orientation::Orientation;
 use super::space::{Lift, ObjectSpace, Point};
 

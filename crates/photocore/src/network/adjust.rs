@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use super::error::NetworkError;
+use super::input::{Network, Options};
 use super::problem::{Assembled, Reached};
 use super::screens::{Begin, Ended, Screening};
-use super::{
-    Converged, InnerConstraints, Joint, Network, NetworkDatum, NetworkError, Options, Solution, State,
-};
+use super::solution::{Joint, Solution};
+use super::state::{InnerConstraints, NetworkDatum, State};
+use super::trial::Converged;
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
 use crate::sorting::sort_by;

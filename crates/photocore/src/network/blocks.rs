@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::commons::Common;
-use super::in_block::InBlock;
-use super::{Network, Photo, Trajectory};
+use super::commons::{Common, InBlock};
+use super::input::{Network, Photo};
+use super::mounts::Trajectory;
 use crate::geometry::POSE;
 
 /// Retained blocks, except points: photos (pose, own camera, own film parameters), then shared cameras, then shared parameters. The pose of

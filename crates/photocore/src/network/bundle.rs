@@ -6,12 +6,13 @@ use std::sync::OnceLock;
 use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
+use super::error::NetworkError;
+use super::input::{Camera, Image, Network, Photo, Point, Screens};
 use super::model::{Bundle, GivenDatum};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::passages::Passages;
 use super::selection::{Selected, TOGETHER};
-use super::{Camera, Image, Network, NetworkError, Photo, Point, Screens};
 use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
 use crate::parallel;
 

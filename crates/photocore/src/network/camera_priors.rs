@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
 
-use super::Camera;
+use super::input::Camera;
 use crate::adjustment::Term;
 
 /// Observation of the weighted parameters of a camera.

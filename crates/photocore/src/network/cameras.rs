@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::median::median;
+use super::adjusted::AdjustedPhoto;
+use super::input::Network;
 use super::model::Bundle;
 use super::problem::Assembled;
 use super::surroundings::Surroundings;
-use super::{AdjustedPhoto, Network};
 use crate::adjustment::{Adjustment, Problem};
+use crate::sorting::median;
 
 /// An adjusted camera.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,11 +2,13 @@
 
 use std::mem::discriminant;
 
-use super::mounts::AT_PHOTO;
+use super::commons::CommonKind;
+use super::error::NetworkError;
+use super::input::{Image, Network};
+use super::mounts::{AT_PHOTO, Mount, Trajectory};
 use super::observations::{Fault, Observation};
-use super::passages::Facts;
+use super::passages::{Passage, Requirements};
 use super::surroundings::{BlockOf, Surroundings};
-use super::{CommonKind, Image, Mount, Network, NetworkError, Passage, Trajectory};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
@@ -126,8 +128,8 @@ impl Network {
         touched.for_each(|point| given[point] = false);
         let cameras = self.cameras.iter().map(|own| &own.camera).collect();
         let photos = self.photos.iter().map(|own| own.camera).collect();
-        let facts = Facts { space: self.space, given, cameras, photos };
-        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&facts);
+        let required = Requirements { space: self.space, given, cameras, photos };
+        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&required);
         self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
     }
 

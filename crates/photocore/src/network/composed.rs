@@ -5,8 +5,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, Matrix6, Matrix6xX};
 use smallvec::{SmallVec, smallvec};
 
-use super::commons::CommonState;
-use super::in_block::InBlock;
+use super::commons::{CommonState, InBlock};
 use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Bent, Mounted, Station, Stations};

@@ -5,11 +5,13 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, Matrix6, Matrix6xX};
 
+use super::error::NetworkError;
+use super::input::{Network, Options};
 use super::model::Owner;
 use super::problem::Assembled;
+use super::solution::Solution;
 use super::state::{InnerConstraints, NetworkDatum, State};
 use super::suspects::Suspects;
-use super::{Network, NetworkError, Options, Solution};
 use crate::Threads;
 use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};
 use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};

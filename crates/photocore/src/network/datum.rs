@@ -5,20 +5,20 @@ use std::collections::{BTreeSet, HashMap};
 use nalgebra::{Matrix4, Vector6};
 
 use super::commons::Motion;
-use super::median::median;
+use super::error::NetworkError;
+use super::input::Network;
 use super::model::Bundle;
 use super::parts::{Joined, MOST_PARTS, MOTIONS, Part, Parts};
 use super::problem::Assembled;
 use super::state::InnerConstraints;
 use super::stations::{Placed, Station, Stations};
-use super::{Network, NetworkError};
 use crate::Threads;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, Pose, PoseNumbers, Vector3,
     angle_axis::rotation_angle_axis, angle_axis_rotation, local_vertical,
 };
-use crate::sorting::sort_by;
+use crate::sorting::{median, sort_by};
 
 /// Index of the scale, the last of the [`MOTIONS`].
 const SCALE: usize = 6;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::NetworkError;
+use super::error::NetworkError;
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
 use crate::adjustment::{Few, GroupTest, Leverages, Terms};

@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use super::NetworkError;
 use super::covariance::Covariances;
+use super::error::NetworkError;
 use super::model::Owner;
 use crate::Threads;
 use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};

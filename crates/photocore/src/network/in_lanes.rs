@@ -2,7 +2,7 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::Image;
+use super::input::Image;
 use crate::geometry::{self, CameraModel, Orientation, POSE, Pose, Vector3};
 use crate::normals::GroupRows;
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::NetworkError;
+use super::error::NetworkError;
 use super::model::Bundle;
 use super::surroundings::{BlockOf, Surroundings};
 use crate::normals::Layout;

@@ -7,15 +7,14 @@ use nalgebra::DMatrix;
 
 use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
-use super::commons::{CommonState, PlacedCommon};
-use super::in_block::InBlock;
+use super::commons::{CommonState, InBlock, PlacedCommon};
+use super::input::{Image, Minimum, Point, Screens};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Parts;
 use super::passages::Passages;
 use super::selection::PointImages;
 use super::stations::{Bent, Placed, Refracted, Station, Stations};
-use super::{Image, Minimum, Point, Screens};
 use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,
     Vector3, Vertical,

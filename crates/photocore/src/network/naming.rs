@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use super::error::{Combination, PosePart};
+use super::error::{Combination, NetworkError, PosePart};
+use super::input::Network;
 use super::model::Owner;
 use super::problem::Assembled;
-use super::{Network, NetworkError};
 use crate::Threads;
 use crate::adjustment::{AdjustError, Linearized};
 use crate::geometry::{PoseNumbers, Vector3};

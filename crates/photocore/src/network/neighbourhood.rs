@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::Network;
+use super::input::Network;
 use super::selection::{PointImages, TOGETHER};
 use crate::geometry::Vector3;
 use crate::parallel;

@@ -4,10 +4,12 @@
 //! elimination order is its own, with all their images. Additional observations are assigned likewise. See
 //! [`crate::adjustment::Linearized::of_part`] for the algorithm.
 
+use super::error::NetworkError;
+use super::input::{Image, Network, Options, Point};
 use super::problem::Assembled;
-use super::solution::{observations, of_photo, sums_of_squares};
+use super::selection::Dropped;
+use super::solution::{Solution, SumsOfSquares, observations, of_photo, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
-use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
 use crate::Threads;
 use crate::adjustment::{Adjustment, Counts, DatumOfPart, Linearized, Model, PartError, PartOptions, Watch};
 use crate::normals::{Contribution, Operations, ReducedRights, packed};

@@ -1,7 +1,7 @@
 //! Chord steps of a network that is adjusted in parts: a second step with the existing factors of its nodes
 //! ([`crate::adjustment::Linearized::reduce_chord`]).
 
-use super::NetworkError;
+use super::error::NetworkError;
 use super::node::{FormedNode, Node};
 use crate::Threads;
 use crate::adjustment::{Model, Watch};

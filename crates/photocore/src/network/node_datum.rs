@@ -3,12 +3,14 @@
 //! The whole network is transformed and yields B and T ([`crate::adjustment::DatumColumns`]). Its nodes reduce B from children to parents.
 //! Then W = Q B and the cofactors of outer parameters are passed from parents to children, and each node transforms its own cofactors.
 
+use super::error::NetworkError;
+use super::input::{Network, Options};
 use super::model::Owner;
 use super::node::{FormedNode, Node};
 use super::problem::Assembled;
 use super::selection::Selected;
+use super::state::InnerConstraints;
 use super::surroundings::Surroundings;
-use super::{InnerConstraints, Network, NetworkError, Options};
 use crate::Threads;
 use crate::adjustment::{Adjusted, DatumColumns, Watch, moved_with_columns};
 use crate::sorting::order;

@@ -4,11 +4,10 @@ use std::ops::Range;
 
 use smallvec::{SmallVec, smallvec};
 
-use super::Image;
-use super::commons::CommonState;
+use super::commons::{CommonState, InBlock};
 use super::film::{FilmOf, Read};
-use super::in_block::InBlock;
 use super::in_lanes::{FEWEST, Sight, write_in_lanes};
+use super::input::Image;
 use super::model::Bundle;
 use super::mounts::Composed;
 use super::passages::Own;

@@ -1,13 +1,13 @@
 //! Values too large for double precision.
 
 use super::error::Coarse;
-use super::median::median;
+use super::input::{Network, Start};
 use super::model::Bundle;
 use super::selection::{Selected, TOGETHER};
 use super::stations::Station;
-use super::{Network, Start};
 use crate::geometry::PoseNumbers;
 use crate::parallel;
+use crate::sorting::median;
 
 /// Maximum coordinate for which its square, or the product of its partials, is finite.
 const LARGEST: f64 = 1e100;

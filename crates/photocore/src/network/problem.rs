@@ -1,18 +1,19 @@
 //! Least-squares problem of a network. Points are local blocks of three. Retained blocks are photos with their own cameras, shared cameras,
 //! shared parameters, and points with additional observations.
 
+use super::error::NetworkError;
+use super::input::{Image, Network, Options, Point, Start};
 use super::layout::layout;
-use super::median::median;
 use super::model::Bundle;
 use super::observations::{Fault, TiedObservation};
 use super::selection::{Dropped, LeftOut, Selected, TOGETHER};
 use super::state::State;
 use super::stations::{Placed, Station};
 use super::surroundings::Surroundings;
-use super::{Image, Network, NetworkError, Options, Point, Start};
 use crate::adjustment::{Method, Problem};
 use crate::geometry::{POSE, PoseNumbers};
 use crate::normals::{System, TieRows};
+use crate::sorting::median;
 use crate::{Threads, parallel};
 
 /// A problem, and the indices of its parts in the network.

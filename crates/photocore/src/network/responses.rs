@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::NetworkError;
 use super::covariance::{Covariances, Of};
+use super::error::NetworkError;
 use super::model::{Bundle, Owner};
 use super::predictions::OnPoint;
 use super::suspects::{Home, Suspects};

@@ -1,11 +1,14 @@
 //! Selection of the points that take part in the adjustment.
 
+use super::error::NetworkError;
+use super::input::Network;
 use super::state::State;
 use super::surroundings::Surroundings;
-use super::{Network, NetworkError};
 use crate::parallel;
 use crate::sorting::sort_by;
 
+/// Minimum ratio of all objects to excluded ones, for which these count as few.
+pub(super) const FEW: usize = 10;
 /// Minimum number of points per thread.
 pub(super) const TOGETHER: usize = 1024;
 

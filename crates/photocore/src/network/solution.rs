@@ -5,13 +5,19 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::adjusted::{adjusted_photos, adjusted_points, in_order};
-use super::model::{Bundle, Owner};
-use super::problem::Assembled;
-use super::{
-    AdjustedCamera, AdjustedCommon, AdjustedObservation, AdjustedPhoto, AdjustedPoint, Converged, Dropped,
-    KindSums, Network, NetworkError, Options, State, UnitVariance, WeakPoint,
+use super::adjusted::{
+    AdjustedCommon, AdjustedPhoto, AdjustedPoint, adjusted_photos, adjusted_points, in_order,
 };
+use super::cameras::AdjustedCamera;
+use super::error::NetworkError;
+use super::input::{Network, Options, UnitVariance};
+use super::model::{Bundle, Owner};
+use super::observations::{AdjustedObservation, KindSums};
+use super::problem::Assembled;
+use super::selection::Dropped;
+use super::state::State;
+use super::trial::Converged;
+use super::weak_points::WeakPoint;
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
 

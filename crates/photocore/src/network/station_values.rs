@@ -1,10 +1,10 @@
 //! Parameters of photos, shared cameras and shared parameters before the adjustment: values, observed values, standard deviations.
 
-use super::median::median;
+use super::input::{Camera, Network, Photo};
 use super::model::Bundle;
 use super::surroundings::Surroundings;
-use super::{Camera, Network, Photo};
 use crate::geometry::{ObjectSpace, Orientation, POSE, PoseNumbers, Vector3, nearest_turns};
+use crate::sorting::median;
 
 impl Network {
     /// Returns the projection centre for six pose parameters.

@@ -1,8 +1,8 @@
 //! Photos and points at given parameter values, and the equations of images.
 
-use super::Image;
 use super::commons::CommonState;
 use super::film::FilmAt;
+use super::input::Image;
 use super::mounts::Composed;
 use crate::geometry::camera::{LensDirection, each_camera};
 use crate::geometry::{

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::{Network, Trajectory};
+use super::input::Network;
+use super::mounts::Trajectory;
 
 /// Owner of a parameter block that several nodes share: indices into the network of the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

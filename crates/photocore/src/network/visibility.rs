@@ -1,10 +1,10 @@
 //! Physically impossible images: points behind the camera, or outside the invertible area of its lens model.
 
+use super::input::Image;
 use super::problem::Assembled;
 use super::selection::TOGETHER;
-use super::solution::Unseen;
+use super::solution::{Solution, Unseen};
 use super::stations::{Placed, Station};
-use super::{Image, Solution};
 use crate::parallel;
 
 impl Solution {

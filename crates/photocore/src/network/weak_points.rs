@@ -1,11 +1,12 @@
 //! Ill-conditioned points: on nearly parallel rays, or much nearer to a station than all others.
 
-use super::median::median;
+use super::adjusted::AdjustedPoint;
+use super::input::Network;
 use super::model::Bundle;
 use super::selection::TOGETHER;
-use super::{AdjustedPoint, Network};
 use crate::geometry::{self, Matrix3};
 use crate::parallel;
+use crate::sorting::median;
 
 /// Ratio of largest to smallest standard deviation of a point above which its rays count as nearly parallel.
 const RATIO: f64 = 1e4;

@@ -2,8 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::system::System;
-use super::system::vectors;
+use super::system::{System, vectors};
 use super::workspace::Workspace;
 
 /// Size of a number in bytes.

@@ -1,7 +1,6 @@
 //! Elimination order of the retained blocks.
 
-use super::dissection::minimum_degree;
-use super::dissection::nested_dissection;
+use super::dissection::{minimum_degree, nested_dissection};
 use super::graph::{Graph, NOWHERE};
 use super::layout::Layout;
 use crate::sorting::sort_by;

@@ -2,8 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3xX, RowDVector};
 
-use super::fit::Placed;
-use super::fit::{by_points, fit};
+use super::fit::{Placed, by_points, fit};
 use super::form::{Partials, RADIUS};
 use super::{FeatureError, Form};
 use photocore::geometry::{Matrix3, Vector3};

@@ -10,8 +10,7 @@ use crate::relative_orientation::{Candidate, relative_orientation};
 use crate::sampling::Samples;
 use crate::similarity::{Similarity, Station, closed_form};
 use photocore::geometry::{Matrix3, Pose, Vector3};
-use photocore::internal::median;
-use photocore::internal::sort_by;
+use photocore::internal::{median, sort_by};
 
 /// Minimum number of common points of a pair: five, and three for a check.
 pub(super) const COMMON: usize = 8;

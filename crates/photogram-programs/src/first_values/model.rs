@@ -6,8 +6,9 @@ use super::{FirstValues, FirstValuesError, KnownPoint, Search, Sighting, Source}
 use crate::similarity::Similarity;
 use photocore::adjustment::{Loss, Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::{Matrix3, Perspective, Pose, Ray, Vector3, rotation_angles};
+use photocore::internal::median;
 use photocore::network::{
-    Camera, Image, Network, NetworkError, Options, Photo, Point, Solution, Start, median, meet,
+    Camera, Image, Network, NetworkError, Options, Photo, Point, Solution, Start, meet,
 };
 
 /// Minimum intersection angle of the rays of a point, radians.

@@ -1,8 +1,7 @@
 //! Brown's terms as functions of ideal coordinates, as in AICON.
 
 use super::brown::BrownTerms;
-use super::inverse::Matrix2;
-use super::inverse::{RadialLimit, from_radial, times};
+use super::inverse::{Matrix2, RadialLimit, from_radial, times};
 use super::model::{CameraModel, Image, Unit, parameters};
 use super::perspective::Perspective;
 use super::radial_tangential::Bent;

@@ -4,7 +4,6 @@
 
 pub mod backward;
 pub(super) mod inverse;
-mod knots;
 mod model;
 mod projections;
 mod radial_tangential;
@@ -15,9 +14,8 @@ use super::axes::Vector3;
 
 pub use brown::{BrownCorrection, BrownTerms};
 pub use inverse::{Matrix2, RadialLimit};
-pub use knots::{Patch, Window};
 pub use measured::Measured;
-pub use model::{CameraModel, Image, LensDirection, ModelFacts, Unit};
+pub use model::{CameraModel, Image, LensDirection, ModelFacts, Patch, Unit, Window};
 pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
 
 macro_rules! cameras {

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use super::inverse::{Matrix2, inverted, times};
-use super::knots::{NODES, Patch, Window};
-use super::model::{CameraModel, Image, Unit, parameters};
+use super::model::{CameraModel, Image, NODES, Patch, Unit, Window, parameters};
 use super::projections::{RayProjection, Stereographic};
 use crate::geometry::Vector3;
 

@@ -7,7 +7,6 @@
 //! The table is C0, A0. The coefficients are c_k, in its axes, and rotation vectors r_k, in photo axes; alternatives: [`Axes`],
 //! [`Rotations`]. A frame photo has one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
 
-mod axes;
 mod functions;
 mod rotations;
 mod table;
@@ -16,10 +15,9 @@ use std::ops::Range;
 
 use self::functions::ALWAYS;
 
-pub use axes::Axes;
 pub use functions::{Active, BasisModel};
 pub use rotations::Rotations;
-pub use table::{Attitudes, Interpolation, Positions};
+pub use table::{Attitudes, Axes, Interpolation, Positions};
 
 use self::rotations::Corrected;
 use super::{Matrix3, Pose, Vector3};

@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Matrix6xX, Vector6};
 use smallvec::{SmallVec, smallvec};
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Pose, Steps, Vector3};
-use crate::network::in_block::InBlock;
+use crate::network::commons::InBlock;
 use crate::normals::GroupRows;
 
 /// Parameters of retained blocks with proportional partials of the pose: coefficients of a trajectory.

@@ -10,8 +10,7 @@ use std::ops::Deref;
 
 use nalgebra::{Matrix3xX, Matrix6};
 
-use super::commons::{Common, CommonKind, CommonState};
-use super::in_block::InBlock;
+use super::commons::{Common, CommonKind, CommonState, InBlock};
 use crate::geometry::{self, ObjectSpace, Orientation, POSE, Vector3};
 
 pub use chain::Chain;

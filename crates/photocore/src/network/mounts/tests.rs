@@ -11,8 +11,7 @@ use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, PoseNumbers, RotationSense, Vector3, rotation,
 };
-use crate::network::commons::{Common, CommonKind, PlacedCommon};
-use crate::network::in_block::InBlock;
+use crate::network::commons::{Common, CommonKind, InBlock, PlacedCommon};
 
 /// Returns the mounts of one mounted photo among `photos`.
 pub fn mounted(mount: Mount, photos: usize) -> Mounts {

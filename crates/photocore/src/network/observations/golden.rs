@@ -9,8 +9,7 @@ use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::tied::TiedModel;
 use super::{Named, Observation, TiedObservation};
 use crate::geometry::{Camera, Matrix3, ObjectSpace, Orientation, Perspective, Point, Vector3};
-use crate::network::commons::{Common, CommonKind, CommonState, PlacedCommon};
-use crate::network::in_block::InBlock;
+use crate::network::commons::{Common, CommonKind, CommonState, InBlock, PlacedCommon};
 use crate::network::mounts::tests::mounted;
 use crate::network::mounts::{AT_PHOTO, Grounds, OnFrame};
 

@@ -4,7 +4,6 @@
 //! minus computed values and the partials by positions and rotations. [`Rows`] converts these to the parameter columns.
 
 mod adjusted;
-mod fault;
 mod model;
 mod precision;
 mod rows;
@@ -16,10 +15,9 @@ use self::model::{deviation, in_own_axes, nine, own_axes, rotates, rows_of, thre
 use super::commons::{Common, CommonKind};
 
 pub use adjusted::{AdjustedObservation, KindSums};
-pub use fault::Fault;
 pub use model::{Named, ObservationModel, Quantity, Touches};
 pub(super) use photos::misalignment;
-pub use precision::Precision;
+pub use precision::{Fault, Precision};
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
 pub use rows::{Rows, Sites};
 pub(super) use tied::{TiedModel, TiedObservation};
@@ -124,8 +122,7 @@ macro_rules! kinds {
 }
 
 kinds! {
-    points::{Control, Distance, Difference};
-    equal_height::EqualHeight;
+    points::{Control, Distance, Difference, EqualHeight};
     on_figure::{OnLevel, OnPlane, OnPlumbLine, OnLine};
     photos::{Range, Position, Attitude, Relative};
     unknowns::{Base, Prior};

@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, SMatrix, SVector};
 
-use super::fault::Fault;
-use super::precision::Precision;
+use super::precision::{Fault, Precision};
 use super::rows::{Rows, Sites};
 use crate::geometry::Matrix3;
 use crate::network::commons::CommonKind;

@@ -3,8 +3,7 @@
 use nalgebra::{DMatrix, Matrix3xX, SMatrix};
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Point, Pose, Vector3, local_vertical};
-use crate::network::commons::CommonState;
-use crate::network::in_block::InBlock;
+use crate::network::commons::{CommonState, InBlock};
 use crate::network::mounts::{Composed, Moving};
 
 /// Points, photos and shared parameters of an observation at given values, by their index in [`super::Touches`]. Cartesian positions are

@@ -12,9 +12,8 @@ use crate::geometry::film::Pattern;
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, Pose, PoseNumbers, RotationSense, Vector3, rotation,
 };
-use crate::network::commons::{CommonState, PlacedCommon};
+use crate::network::commons::{CommonState, InBlock, PlacedCommon};
 use crate::network::film::{FilmOf, Readings};
-use crate::network::in_block::InBlock;
 use crate::network::mounts::tests::mounted;
 use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
 

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use super::super::NetworkError;
 use super::super::group_tests::Tests;
-use super::super::median::middle;
 use super::choosing::Choosing;
 use super::conditional::Chosen;
 use super::log::Remark;
 use super::state::{Snooping, TESTABLE};
 use super::tried::{Tried, unless_lost};
 use crate::adjustment::Status;
+use crate::sorting::middle;
 
 /// Median of the absolute value of a standard normal variable, and of the length of a vector of two of them.
 const MEDIAN: f64 = 0.674_489_750_196_081_7;

@@ -1,12 +1,12 @@
 //! Exclusion of whole photos: photos of another exposure, or with exchanged names of many points.
 
 use super::super::NetworkError;
-use super::super::median::middle;
 use super::groups::Excluded;
 use super::log::{Consequence, Removal};
 use super::state::Snooping;
 use super::tried::Tried;
 use crate::adjustment::log_chi_square;
+use crate::sorting::middle;
 
 /// Median test value of a bad photo, in medians of all photos (in standard deviations, at least one).
 const FAR: f64 = 5.0;

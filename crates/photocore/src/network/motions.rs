@@ -1,12 +1,17 @@
-//! Effect of similarity transformations of the network on trajectories.
+//! Effect of similarity transformations of the network on shared parameters and trajectories.
 //!
-//! A transformation displaces C(t) and rotates A(t). The coefficients follow by least squares over the times of images and records, as far
-//! as their basis functions allow. The remainder distinguishes the transformation from datum defects ([`crate::adjustment::Motions`]).
+//! A transformation displaces the position C(t) of a trajectory and rotates its attitude A(t). The coefficients follow by least squares over
+//! the times of images and records, as far as their basis functions allow. The remainder distinguishes the transformation from datum
+//! defects ([`crate::adjustment::Motions`]).
 
-use super::commons::CommonState;
+use std::collections::BTreeMap;
+
+use super::commons::{CommonState, Motion, PlacedCommon};
 use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Trajectory};
+use super::observations::Observation;
 use super::parts::Parts;
+use super::stations::Placed;
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::trajectory::{Active, Flight};
 use crate::geometry::{Matrix3, Pose, Vector3};
@@ -274,4 +279,79 @@ impl Bundle {
 /// Returns the values of the coefficients of a trajectory.
 fn coefficients(own: &Trajectory, commons: &[CommonState]) -> Changes {
     [&own.position, &own.rotation].map(|all| all.iter().map(|&common| commons[common].vector()).collect())
+}
+
+/// Antenna positions and times of observed positions with the same shift and drift.
+type Antennas = BTreeMap<[Option<usize>; 2], Vec<(Vector3, f64)>>;
+
+impl Bundle {
+    /// Writes the transformed shared parameters into all parameters. Nonabsorbing ones are computed by `each`; shifts and drifts absorb the
+    /// mean displacement of their antennas.
+    pub(super) fn move_commons(
+        &self,
+        placed: &Placed,
+        motion: &Motion<'_>,
+        each: impl Fn(&PlacedCommon, &CommonState) -> Vec<f64>,
+        unknowns: &mut [f64],
+    ) {
+        let all = self.commons.iter().zip(&placed.commons).enumerate();
+        for (number, (common, state)) in all.filter(|(_, (common, _))| !common.moves_against()) {
+            if let Some(own) = self.of_common(number) {
+                unknowns[own].copy_from_slice(&each(common, state));
+            }
+        }
+        for (pair, antennas) in self.antennas(placed) {
+            let displaced = antennas.iter().map(|&(place, time)| ((motion.displacement)(&place), time));
+            for (common, moved) in pair.into_iter().zip(line(displaced, pair.map(|own| own.is_some()))) {
+                let Some((common, range)) = common.and_then(|own| Some((own, self.of_common(own)?))) else {
+                    continue;
+                };
+                let own = placed.commons[common].attitude().tr_mul(&moved);
+                let values = &mut unknowns[range];
+                values.iter_mut().zip(own.iter()).for_each(|(value, moved)| *value -= moved);
+            }
+        }
+    }
+
+    /// Returns the antennas of each pair of shift and drift that no other pair shares.
+    fn antennas(&self, placed: &Placed) -> Antennas {
+        let mut all = Antennas::new();
+        for tied in &self.observations {
+            let Observation::Position(own) = &tied.observation else { continue };
+            if own.shift.is_some() || own.drift.is_some() {
+                let pose = placed.photos[own.photo].orientation.pose();
+                let arm = match own.lever_arm.common() {
+                    Some(common) => placed.commons[common].vector(),
+                    None => own.known_lever_arm(),
+                };
+                let antenna = pose.position + pose.attitude * arm;
+                all.entry([own.shift, own.drift]).or_default().push((antenna, own.time));
+            }
+        }
+        let of = |common: Option<usize>, k: usize| {
+            common.map_or(1, |common| all.keys().filter(|pair| pair[k] == Some(common)).count())
+        };
+        let alone: Vec<_> =
+            all.keys().filter(|pair| of(pair[0], 0) == 1 && of(pair[1], 1) == 1).copied().collect();
+        all.retain(|pair, _| alone.contains(pair));
+        all
+    }
+}
+
+/// Returns the least-squares line a + b t through vectors at times t; only a or only b if the other is not requested.
+fn line(of: impl Iterator<Item = (Vector3, f64)>, asked: [bool; 2]) -> [Vector3; 2] {
+    let (mut n, mut t, mut tt) = (0.0, 0.0, 0.0);
+    let (mut sum, mut along) = (Vector3::zeros(), Vector3::zeros());
+    for (vector, time) in of {
+        (n, t, tt) = (n + 1.0, t + time, tt + time * time);
+        (sum, along) = (sum + vector, along + time * vector);
+    }
+    match asked {
+        [true, true] if n * tt - t * t > 1e-12 * n * tt => {
+            let b = (n * along - t * sum) / (n * tt - t * t);
+            [(sum - t * b) / n, b]
+        }
+        [false, true] if tt > 0.0 => [Vector3::zeros(), along / tt],
+        _ => [sum / n, Vector3::zeros()],
+    }
 }

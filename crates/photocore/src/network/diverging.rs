@@ -1,11 +1,10 @@
-//! Points that move to the position of a station during the adjustment.
+//! Points that a step moves out of the network or to a station.
 
-use super::leaving::{Ended, Leaves};
-use crate::network::Image;
-use crate::network::median::median;
-use crate::network::model::Bundle;
-use crate::network::selection::{Dropped, Reason};
-use crate::network::stations::{Station, Stations};
+use super::input::Image;
+use super::model::Bundle;
+use super::selection::FEW;
+use super::stations::{Station, Stations};
+use crate::sorting::median;
 
 /// Ratio of a point's share of the station's information to the mean of the others, above which it is at the station. The point is 10,000
 /// times nearer, and rounding leaves eight digits for the others.
@@ -14,24 +13,17 @@ const NEAR: f64 = 1e8;
 const ON_ITS_WAY: f64 = 1e4;
 /// Distance of point and station in other photos, in standard deviations, below which their images are equal (before and after a step).
 const SAME_PLACE: f64 = 3.0;
-
-/// Returns the points for which an adjustment has stopped: they ran into a station or out of the network.
-pub(super) fn look(ended: &Ended<'_>) -> Leaves {
-    let Ok(adjusted) = ended.adjusted else { return Leaves::default() };
-    if adjusted.collapsed.is_empty() {
-        return Leaves::default();
-    }
-    let squares = ended.assembled.nearest_stations(&adjusted.unknowns);
-    let middle = median(squares.clone()).unwrap_or(f64::INFINITY);
-    let dropped = |&local: &usize| Dropped {
-        point: ended.assembled.points[local],
-        reason: if squares[local] > middle { Reason::RanOff } else { Reason::RanIntoStation },
-    };
-    Leaves { points: adjusted.collapsed.iter().map(dropped).collect(), photos: vec![] }
-}
+/// Ratio of own to median station distance above which a point may be diverging.
+const FAR: f64 = 100.0;
+/// Distance of its images from the images of infinity, in standard deviations, below which the point may be at infinity.
+const AT_INFINITY: f64 = 1.0;
+/// Minimum relative growth of its distance in a step.
+const GROWS: f64 = 0.003;
+/// Multiple of the distance of a point that represents infinity.
+const INFINITE: f64 = 1e6;
 
 /// A point much nearer to a station than the others.
-struct NearStation {
+struct NearPoint {
     point: usize,
     photo: usize,
     /// Ratio of its share of the station's information to the mean of the others.
@@ -74,7 +66,7 @@ impl Bundle {
     ///
     /// The image of a point rotates by 1 / distance per displacement of point or station. Its share of the station's information, which the
     /// elimination of the point removes again, is the square of this.
-    fn near_stations(&self, stations: &Stations) -> Vec<NearStation> {
+    fn near_stations(&self, stations: &Stations) -> Vec<NearPoint> {
         let share = |point: usize, image: &Image| {
             let centre = stations.photos[image.photo].orientation.centre();
             (stations.points[point].position() - centre).norm_squared().recip()
@@ -90,7 +82,7 @@ impl Bundle {
         let near_station = |point: usize, image: &Image| {
             let photo = image.photo;
             let share = shares[photo].ratio(share(point, image), self.images_on[photo])?;
-            Some(NearStation { point, photo, share })
+            Some(NearPoint { point, photo, share })
         };
         let of_point =
             |point| self.images_of(point).iter().filter_map(move |image| near_station(point, image));
@@ -98,7 +90,7 @@ impl Bundle {
     }
 
     /// Returns true if, before and after the step, all other images of a point agree with the image of the station.
-    fn is_same_place(&self, near: &NearStation, before: &Stations, after: &Stations) -> bool {
+    fn is_same_place(&self, near: &NearPoint, before: &Stations, after: &Stations) -> bool {
         let is_same = |image: &Image| {
             let images = [before, after].map(|stations| {
                 let station = stations.photos[near.photo].orientation.centre();
@@ -115,5 +107,49 @@ impl Bundle {
             self.images_of(near.point).iter().filter(|image| image.photo != near.photo).peekable();
         let free = self.points[near.point].held() == [false; 3];
         free && elsewhere.peek().is_some() && elsewhere.all(is_same)
+    }
+
+    /// Returns free points that diverging or parallel rays move out of the network, if these are few.
+    ///
+    /// Steps are changes of coordinates, so that a point at infinity is only a limit: the image residuals decrease with the reciprocal
+    /// distance.
+    pub fn lead_nowhere(&self, before: &[f64], after: &Stations) -> Vec<usize> {
+        let squares: Vec<f64> = (0..self.locals).map(|point| self.nearest(point, after)).collect();
+        let Some(middle) = median(squares.clone()) else { return vec![] };
+        let is_far =
+            |&point: &usize| squares[point] > FAR * FAR * middle && self.is_at_infinity(point, after);
+        let mut out: Vec<usize> = (0..self.locals).filter(is_far).collect();
+        if out.is_empty() {
+            return out;
+        }
+        let before = self.evaluated(before);
+        let grown = (1.0 + GROWS) * (1.0 + GROWS);
+        out.retain(|&point| squares[point] > grown * self.nearest(point, &before));
+        if FEW * out.len() <= self.locals { out } else { vec![] }
+    }
+
+    /// Returns the squared distance of a point from the nearest station that observes it.
+    fn nearest(&self, point: usize, stations: &Stations) -> f64 {
+        let place = stations.points[point].position();
+        let square =
+            |image: &Image| (place - stations.photos[image.photo].orientation.centre()).norm_squared();
+        self.images_of(point).iter().map(square).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns true if a free point may as well be at infinity, on the ray of its first image.
+    fn is_at_infinity(&self, point: usize, stations: &Stations) -> bool {
+        let images = self.images_of(point);
+        let Some(first) = images.first().filter(|_| self.points[point].held() == [false; 3]) else {
+            return false;
+        };
+        let place = stations.points[point].position();
+        let station = stations.photos[first.photo].orientation.centre();
+        let places = [place, station + INFINITE * (place - station)];
+        images.iter().all(|image| {
+            let Station { orientation, camera } = &stations.photos[image.photo];
+            let [here, there] = places.map(|place| camera.image(&orientation.pose().sight(&place)));
+            let sd = stations.sd_in_camera(image);
+            (0..2).all(|k| (here[k] - there[k]).abs() < AT_INFINITY * sd[k])
+        })
     }
 }

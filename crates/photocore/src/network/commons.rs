@@ -4,9 +4,6 @@
 //! Each is a small pose, a position p and a rotation R. A line of the table of [`CommonKind`] lists its free components among the six.
 //! Parameters are relative to the given pose: offsets o, and a rotation vector r with R = R_0 Exp(r) about the given axes.
 
-mod adjusted;
-mod motions;
-
 use nalgebra::DMatrix;
 
 use crate::geometry::angle_axis::rotation_angle_axis;
@@ -14,8 +11,23 @@ use crate::geometry::{
     Matrix3, ObjectSpace, Pose, Vector3, angle_axis_rotation, angle_axis_with_jacobian, local_vertical,
 };
 
-pub use adjusted::AdjustedCommon;
-pub(super) use motions::Motion;
+/// Position of consecutive parameters inside a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InBlock {
+    /// Index of the block.
+    pub block: usize,
+    /// First parameter inside the block.
+    pub first: usize,
+    /// Number of parameters of the block.
+    pub width: usize,
+}
+
+impl InBlock {
+    /// Returns the position of a whole block.
+    pub fn whole(block: usize, width: usize) -> Self {
+        Self { block, first: 0, width }
+    }
+}
 
 /// Effect of a similarity transformation of the network on a shared parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -218,6 +230,16 @@ pub(super) struct PlacedCommon {
     pub uses: usize,
 }
 
+/// A similarity transformation: displacement of a position, rotation vector and scale factor.
+pub(super) struct Motion<'a> {
+    /// Displacement of a position.
+    pub displacement: &'a dyn Fn(&Vector3) -> Vector3,
+    /// Rotation vector.
+    pub turn: Vector3,
+    /// Scale factor.
+    pub scale: f64,
+}
+
 impl PlacedCommon {
     /// Converts a shared parameter. Rows of `vertical` are the local axes at the centre of the photos, X, Y, Z in rectangular space.
     pub fn new(common: &Common, space: ObjectSpace, origin: [f64; 3], vertical: &Matrix3) -> Self {
@@ -283,6 +305,75 @@ impl PlacedCommon {
         };
         let six = [offset.x, offset.y, offset.z, turn.x, turn.y, turn.z];
         self.kind.components().map(|component| six[component]).collect()
+    }
+
+    /// Returns true if the transformation changes a component.
+    pub fn moves(&self) -> bool {
+        self.kind.moves() != Moves::Stays
+    }
+
+    /// Returns true if the parameter absorbs the displacement of the network.
+    pub fn moves_against(&self) -> bool {
+        self.kind.moves() == Moves::Against
+    }
+
+    /// Returns the change of the parameters under a small transformation with a scale near 1; zero for static and absorbing parameters and
+    /// coefficients of trajectories.
+    pub(super) fn change(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
+        let growth = motion.scale - 1.0;
+        let (offset, turn) = match self.kind.moves() {
+            Moves::Stays | Moves::Against | Moves::Follows => (Vector3::zeros(), Vector3::zeros()),
+            Moves::Scales => (growth * state.vector(), Vector3::zeros()),
+            Moves::Shrinks => (Vector3::new(-growth * state.vector().x, 0.0, 0.0), Vector3::zeros()),
+            Moves::Along => {
+                let (own, turn) = (
+                    state.attitude.tr_mul(&(motion.displacement)(&state.place())),
+                    state.attitude.tr_mul(&motion.turn),
+                );
+                let turn = self.to_components(state, &turn);
+                // R^T (p - p_0): the own axes rotate with the parameters.
+                (own - (state.turns * turn).cross(&state.offset), turn)
+            }
+        };
+        let six = [offset.x, offset.y, offset.z, turn.x, turn.y, turn.z];
+        self.kind.components().map(|component| six[component]).collect()
+    }
+
+    /// Returns the components of r for a rotation about the own axes; the third component of an axis is zero.
+    fn to_components(&self, state: &CommonState, turn: &Vector3) -> Vector3 {
+        if !self.kind.rotates() {
+            Vector3::zeros()
+        } else if self.kind.is_axis() {
+            let part = state.turns.fixed_view::<2, 2>(0, 0).into_owned();
+            let found = part.try_inverse().unwrap_or_default() * turn.xy();
+            Vector3::new(found.x, found.y, 0.0)
+        } else {
+            state.turns.try_inverse().unwrap_or_else(Matrix3::zeros) * turn
+        }
+    }
+
+    /// Returns the parameters after a finite transformation; unchanged for static and absorbing ones and coefficients of trajectories.
+    pub(super) fn moved(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
+        match self.kind.moves() {
+            Moves::Stays | Moves::Against | Moves::Follows => self.unknowns(&state.offset, &state.attitude),
+            Moves::Scales => {
+                self.unknowns(&(motion.scale * state.vector() - self.given.position), &state.attitude)
+            }
+            Moves::Shrinks => {
+                let [m, k, _] = state.vector().into();
+                let now = Vector3::new(m / motion.scale, k, 0.0);
+                self.unknowns(&(now - self.given.position), &state.attitude)
+            }
+            Moves::Along => {
+                let place = state.place();
+                let place = place + (motion.displacement)(&place);
+                let turn = if self.kind.rotates() { motion.turn } else { Vector3::zeros() };
+                let unknowns = self.unknowns(&Vector3::zeros(), &turned(&state.attitude, &turn));
+                // Offsets refer to the axes that the parameters represent.
+                let axes = self.at(&unknowns);
+                self.unknowns(&axes.own(&place), &axes.attitude)
+            }
+        }
     }
 }
 

@@ -1,9 +1,6 @@
 //! Corrections applied to an image after projection: board deformation, spline knots, film. Each depends on shared parameters.
-//!
-//! Each type is a file with an implementation of [`PassageModel`], and a line of `kinds!` below.
 
-use std::ops::Deref;
-
+use nalgebra::Matrix3x2;
 use smallvec::SmallVec;
 
 use super::commons::{CommonKind, CommonState};
@@ -11,27 +8,8 @@ use super::film::{FilmAt, FilmOf};
 use crate::geometry::camera::Window;
 use crate::geometry::{Camera, ObjectSpace, Vector3};
 
-/// A correction of image positions.
-pub trait PassageModel {
-    /// Returns its shared parameters, with their types.
-    fn unknowns(&self) -> Vec<(usize, CommonKind)>;
-
-    /// Returns the photo if it applies to all images of one photo.
-    fn photo(&self) -> Option<usize> {
-        None
-    }
-
-    /// Returns its shared parameters on which every corrected image depends.
-    fn everywhere(&self) -> Vec<usize> {
-        vec![]
-    }
-
-    /// Returns true if it fits a network: its points, photos and cameras exist and have valid types.
-    fn is_of(&self, network: &Facts<'_>) -> bool;
-}
-
 /// Properties of a network that corrections require.
-pub struct Facts<'a> {
+pub(super) struct Requirements<'a> {
     /// Coordinate system of its points.
     pub space: ObjectSpace,
     /// Whether each point is fixed and has images only.
@@ -42,50 +20,138 @@ pub struct Facts<'a> {
     pub photos: Vec<usize>,
 }
 
-macro_rules! kinds {
-    ($($module:ident::$name:ident;)*) => {
-        $(mod $module;
-        pub use $module::$name;)*
-
-        /// A correction of any type.
-        #[derive(Debug, Clone, PartialEq)]
-        pub enum Passage {
-            $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
-        }
-
-        $(impl From<$name> for Passage {
-            fn from(passage: $name) -> Self {
-                Self::$name(passage)
-            }
-        })*
-
-        impl Passage {
-            /// Returns the correction of a named type from shared parameters, points, photos or cameras, and numbers. None for an unknown
-            /// name or wrong counts.
-            pub fn from_numbers(kind: &str, commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
-                match kind {
-                    $($name::NAME => $name::from_numbers(commons, of, numbers).map(Self::from),)*
-                    _ => None,
-                }
-            }
-        }
-
-        impl Deref for Passage {
-            type Target = dyn PassageModel;
-
-            fn deref(&self) -> &Self::Target {
-                match self {
-                    $(Self::$name(own) => own,)*
-                }
-            }
-        }
-    };
+/// A correction of image positions.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Passage {
+    /// Points of a bent board.
+    Figure(Figure),
+    /// Lens with free knots of its spline.
+    Knots(Knots),
+    /// Scanned film or measured plate.
+    Scan(Scan),
 }
 
-kinds! {
-    figure::Figure;
-    knots::Knots;
-    scan::Scan;
+impl Passage {
+    /// Returns the correction of a named type from shared parameters, points, photos or cameras, and numbers. None for an unknown
+    /// name or wrong counts.
+    pub fn from_numbers(kind: &str, commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
+        match kind {
+            "figure" => Figure::from_numbers(commons, of, numbers).map(Self::Figure),
+            "knots" => Knots::from_numbers(commons, of, numbers).map(Self::Knots),
+            "scan" => Scan::from_numbers(commons, of, numbers).map(Self::Scan),
+            _ => None,
+        }
+    }
+
+    /// Returns its shared parameters, with their types.
+    pub fn unknowns(&self) -> Vec<(usize, CommonKind)> {
+        match self {
+            Self::Figure(figure) => vec![(figure.common, CommonKind::Bend)],
+            Self::Knots(knots) => knots.commons.iter().map(|&common| (common, CommonKind::Knot)).collect(),
+            Self::Scan(scan) => scan.unknowns(),
+        }
+    }
+
+    /// Returns the photo if it applies to all images of one photo.
+    pub fn photo(&self) -> Option<usize> {
+        if let Self::Scan(scan) = self { Some(scan.photo) } else { None }
+    }
+
+    /// Returns its shared parameters on which every corrected image depends: those of a film, except the weights of a pattern of several
+    /// cells.
+    pub fn everywhere(&self) -> Vec<usize> {
+        let Self::Scan(Scan { film, .. }) = self else { return vec![] };
+        let all = self.unknowns().into_iter().map(|(own, _)| own);
+        all.filter(|own| !(film.has_cells() && film.weights.contains(own))).collect()
+    }
+
+    /// Returns true if it fits a network: its points, photos and cameras exist and have valid types.
+    pub(super) fn is_of(&self, network: &Requirements<'_>) -> bool {
+        match self {
+            // Points with additional observations would also make these depend on w.
+            Self::Figure(Figure { points, shifts, .. }) => {
+                network.space == ObjectSpace::Rectangular
+                    && points.len() == shifts.len()
+                    && points.iter().all(|&point| network.given.get(point) == Some(&true))
+                    && shifts.iter().flatten().all(|value| value.is_finite())
+            }
+            Self::Knots(Knots { camera, commons }) => network.cameras.get(*camera).is_some_and(|&camera| {
+                matches!(camera, Camera::SplinedStereographic(_))
+                    && camera.knots().is_some_and(|own| own.len() == commons.len())
+            }),
+            // The partials of lenses with knots require images in the camera.
+            Self::Scan(Scan { photo, film }) => {
+                let camera = network.photos.get(*photo).map(|&camera| network.cameras[camera]);
+                camera.is_some_and(|own| own.knots().is_none()) && film.is_sound()
+            }
+        }
+    }
+}
+
+/// Points at their given positions plus `w_1 e_1 + w_2 e_2`: w is a shared parameter, and each point has a given e. For a bent chessboard,
+/// w is the deflection of its centre along x and y (mrcal: two parabolas).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Shared parameter w.
+    pub common: usize,
+    /// Points with fixed coordinates, in rectangular space.
+    pub points: Vec<usize>,
+    /// e_1 and e_2 of each point, as columns.
+    pub shifts: Vec<Matrix3x2<f64>>,
+}
+
+impl Figure {
+    /// Indices: w, points; numbers: e_1 and e_2 of each point.
+    fn from_numbers(commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
+        let (&[common], (shifts, [])) = (commons, numbers.as_chunks::<6>()) else { return None };
+        let shifts: Vec<_> = shifts.iter().map(|own| Matrix3x2::from_column_slice(own)).collect();
+        (shifts.len() == of.len()).then(|| Self { common, points: of.to_vec(), shifts })
+    }
+
+    /// Returns the displacement of its k-th point.
+    pub(super) fn shift(&self, k: usize, w: &Vector3) -> Vector3 {
+        self.shifts[k] * w.xy()
+    }
+}
+
+/// Knots of a camera with a spline ([`crate::geometry::camera::SplinedStereographic`]), each a shared parameter: an image depends only on
+/// neighbouring knots.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Knots {
+    /// Camera.
+    pub camera: usize,
+    /// Knots, row by row.
+    pub commons: Vec<usize>,
+}
+
+impl Knots {
+    /// Indices: knots, camera.
+    fn from_numbers(commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
+        let (&[camera], []) = (of, numbers) else { return None };
+        Some(Self { camera, commons: commons.to_vec() })
+    }
+}
+
+/// Images of this photo are scanner readings: camera image -> film -> scanner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// Photo.
+    pub photo: usize,
+    /// Film of the photo.
+    pub film: FilmOf,
+}
+
+impl Scan {
+    /// See [`FilmOf::from_numbers`].
+    fn from_numbers(commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
+        let &[photo] = of else { return None };
+        Some(Self { photo, film: FilmOf::from_numbers(commons, numbers)? })
+    }
+
+    fn unknowns(&self) -> Vec<(usize, CommonKind)> {
+        let film = self.film.commons(0);
+        film.into_iter().chain(self.film.weights.iter().map(|&own| (own, CommonKind::Pattern))).collect()
+    }
 }
 
 /// Distinct shared parameters of an image.
