@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 from photogram.arguments.fields import Checked, option
 from photogram.lazy_dataclasses import dataclass
@@ -82,12 +82,12 @@ class AdjustOptions(Checked):
     """
 
     datum: DatumName | InnerConstraints | MinimumConstraints | None = None
-    unit_variance: UnitVariance = option("constrained", words=get_args(UnitVariance))
+    unit_variance: UnitVariance = "constrained"
     loss: Loss | None = None
     covariance: bool | Literal["verdict"] = True
     tolerance: float | AsPublished = 1e-5
     max_iterations: int | None = option(None, 1)
-    ordering: Ordering = option("auto", words=get_args(Ordering))
+    ordering: Ordering = "auto"
     max_bias_ratio: float | None = option(None, 0.0)
 
     def __post_init__(self) -> None:
