@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypedDict
+from typing import TYPE_CHECKING, Literal
 
 from photogram.arguments.fields import Checked, option
 from photogram.lazy_dataclasses import dataclass
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.network.datum import InnerConstraints, MinimumConstraints
 
-__all__ = ["AdjustKeywords", "AdjustOptions", "AsPublished", "DatumName", "Ordering", "UnitVariance"]
+__all__ = ["AdjustOptions", "AsPublished", "DatumName", "Ordering", "UnitVariance"]
 
 DatumName = Literal["control", "minimum", "inner"]
 UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
@@ -114,16 +114,3 @@ class AdjustOptions(Checked):
         if self.datum == "minimum":
             return MinimumConstraints()
         return None if self.datum == "control" else self.datum
-
-
-class AdjustKeywords(TypedDict, total=False):
-    """Fields of `AdjustOptions` as keywords of functions, for type checkers and editors."""
-
-    datum: DatumName | InnerConstraints | MinimumConstraints | None
-    unit_variance: UnitVariance
-    loss: Loss | None
-    covariance: bool | Literal["verdict"]
-    tolerance: float | AsPublished
-    max_iterations: int | None
-    ordering: Ordering
-    max_bias_ratio: float | None
