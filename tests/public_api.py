@@ -1,11 +1,13 @@
-"""The public API as a list: `python tests/public_api.py` writes tests/public_api.txt, which a test compares.
+"""The public API as a list, and the keywords of functions with options, which tests compare.
 
+`python tests/public_api.py` writes tests/public_api.txt and the files `keywords.pyi` of the package.
 A line for each function, class, method, property and field that users reach by the names that `__all__` has,
 with arguments and defaults. A release whose list has lost or changed a line says so in the changelog.
 """
 
 from __future__ import annotations
 
+import ast
 import functools
 import inspect
 import re
@@ -14,7 +16,17 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+import photogram
+
 LIST = Path(__file__).with_name("public_api.txt")
+KEYWORDS = {
+    "adjustment": {
+        "AdjustKeywords(TypedDict": "photogram.adjustment.options.AdjustOptions",
+        "SnoopKeywords(AdjustKeywords": "photogram.results.snooping_options.SnoopOptions",
+    },
+    "network": {"SimulationKeywords(TypedDict": "photogram.network.simulation_options.SimulationOptions"},
+}
+"""Types of keywords that the fields of a class define, for checkers of types and editors, by folder."""
 
 
 def arguments(what: object) -> str:
@@ -78,5 +90,39 @@ def lines() -> list[str]:
     return found
 
 
+def keywords() -> Iterator[tuple[Path, str]]:
+    """Return the files with types of keywords, and their contents."""
+    for folder, classes in KEYWORDS.items():
+        imports, bodies = {"typing": {"TypedDict"}}, []
+        for head, source in classes.items():
+            module, _, name = source.rpartition(".")
+            kind = getattr(import_module(module), name)
+            tree = ast.parse(inspect.getsource(import_module(module)))
+            homes = {
+                alias.name: node.module
+                for node in ast.walk(tree)
+                if isinstance(node, ast.ImportFrom)
+                for alias in node.names
+            }
+            body = [f'    """Fields of `{name}` as keywords of functions."""\n']
+            for field in kind.__dataclass_fields__.values():
+                body.append(f"    {field.name}: {field.type}".replace("'", '"'))
+                for part in re.findall(r"[A-Za-z]\w*", re.sub(r'"\w+"', "", field.type)):
+                    if part in homes or hasattr(import_module(module), part):
+                        imports.setdefault(homes.get(part, module), set()).add(part)
+            bodies.append(f"class {head}, total=False):\n" + "\n".join(body) + "\n")
+        groups = [[], ["import numpy as np"] if "np." in "".join(bodies) else [], []]
+        for home, parts in sorted(imports.items()):
+            line = f"from {home} import {', '.join(sorted(parts))}"
+            groups[2 if home.startswith("photogram") else 0].append(line)
+        head = "\n\n".join("\n".join(lines) for lines in groups if lines)
+        yield (
+            Path(photogram.__file__).parent / folder / "keywords.pyi",
+            "\n\n".join([head, "\n".join(bodies)]),
+        )
+
+
 if __name__ == "__main__":
+    for path, text in keywords():
+        path.write_text(text, encoding="utf-8")
     LIST.write_text("\n".join(lines()) + "\n", encoding="utf-8")

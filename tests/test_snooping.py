@@ -320,7 +320,15 @@ def test_the_log_in_every_form():
 
 @pytest.mark.parametrize(
     "options",
-    [{"level": 0.0}, {"fdr": 2.0}, {"unit_weight": "perhaps"}, {"max_rounds": 0}, {"robust": 3}],
+    [
+        {"level": 0.0},
+        {"fdr": 2.0},
+        {"unit_weight": "perhaps"},
+        {"max_rounds": 0},
+        {"robust": 3},
+        {"parts": 1},
+        {"loss": "huber"},
+    ],
 )
 def test_options_that_cannot_be(options):
     with pytest.raises(photogram.InputError):

@@ -92,7 +92,7 @@ def test_plan_takes_an_example_or_projects(run):
 
 
 def test_adjust_snoops_at_a_level(run, tmp_path):
-    refused = run("adjust", "--example", "--snoop", "--level", "0.6", "--out", str(tmp_path / "out"))
+    refused = run("adjust", "--example", "--snoop", "--level", "1.5", "--out", str(tmp_path / "out"))
     assert refused.exit_code == 2
     taken = run(
         *("adjust", "--example", "--snoop", "--level", "0.001", "--unit-weight", "unknown", "--no-html"),

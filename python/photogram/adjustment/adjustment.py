@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Unpack, get_args
+from typing import TYPE_CHECKING, Unpack, get_args
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.first_features import started
-from photogram.adjustment.options import AdjustKeywords, AdjustOptions, AsPublished, Ordering
+from photogram.adjustment.options import AdjustOptions, AsPublished, Ordering
 from photogram.adjustment.remarks import (
     behind,
     check_cameras,
@@ -47,6 +47,9 @@ from photogram.results.datum import ResultDatum, datum_messages, datum_of, refus
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result, dropped_points
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.adjustment.keywords import AdjustKeywords
 
 AS_PUBLISHED = 4  # Default number of iterations of the 1987 program
 OF_CAMERAS = 200  # Maximum iterations with free camera parameters

@@ -19,6 +19,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.components import VarianceComponents
 from photogram.results.group_sums import Grouping, GroupsArgument, Probing, grouped, observables
 from photogram.results.network import AdjustedNetwork
+from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Part, Remarks, Section
@@ -99,12 +100,12 @@ class Cleaned(Brief, Documented):
 def clean(
     network: object,
     groups: GroupsArgument = "kind",
+    options: SnoopOptions | None = None,
     *,
     held: Sequence[str] = (),
-    level: float = 0.05,
     probing: Probing | None = None,
     threads: int | None = None,
-    **options: Any,
+    **changes: Any,
 ) -> Cleaned:
     """Remove gross errors and estimate weights in alternation.
 
@@ -119,12 +120,10 @@ def clean(
         The block or collection.
     groups, held, probing
         As in :func:`photogram.variance_components`.
-    level
-        Significance level of the tests in snooping and of components.
     threads
         As in :func:`photogram.adjust`.
-    options
-        Other options of :func:`photogram.snoop`.
+    options, changes
+        As in :func:`photogram.snoop`; `level` is also the significance level of components.
 
     Raises
     ------
@@ -133,9 +132,10 @@ def clean(
     """
     grouping = grouped(observables(network), groups)
     names = grouping.groups.names
+    level = changes.get("level", (options or SnoopOptions()).level)
     settings = Settings(level=level, equality=False, probing=probing or Probing())
     factors = np.ones(grouping.count)
-    snooped = snoop(network, level=level, threads=threads, **options)
+    snooped = snoop(network, options, threads=threads, **changes)
     test = snooped.result.global_test
     if test is None or not (test.rejected_high or test.rejected_low):
         return Cleaned(snooped, None, names, factors, 0, settled=True)
@@ -146,7 +146,7 @@ def clean(
         found = of_grouping(left, own, settings, held=held, threads=threads)
         changed = _changed(found, names, factors)
         before = _out(snooped)
-        snooped = snoop(scaled(network, grouping, changed), level=level, threads=threads, **options)
+        snooped = snoop(scaled(network, grouping, changed), options, threads=threads, **changes)
         stands = bool((np.abs(changed / factors - 1) <= STANDS).all())
         factors, settled = changed, stands and before == _out(snooped)
     # Components of the remaining network, with the equality test, are estimated for the report.

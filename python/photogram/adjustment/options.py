@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Literal
 
 from photogram.arguments.fields import Checked, option
 from photogram.lazy_dataclasses import dataclass
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.network.datum import InnerConstraints, MinimumConstraints
 
-__all__ = ["AdjustKeywords", "AdjustOptions", "AsPublished", "DatumName", "Ordering", "UnitVariance"]
+__all__ = ["AdjustOptions", "AsPublished", "DatumName", "Ordering", "UnitVariance"]
 
 DatumName = Literal["control", "minimum", "inner"]
 UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
@@ -82,12 +82,12 @@ class AdjustOptions(Checked):
     """
 
     datum: DatumName | InnerConstraints | MinimumConstraints | None = None
-    unit_variance: UnitVariance = option("constrained", words=get_args(UnitVariance))
+    unit_variance: UnitVariance = "constrained"
     loss: Loss | None = None
     covariance: bool | Literal["verdict"] = True
     tolerance: float | AsPublished = 1e-5
     max_iterations: int | None = option(None, 1)
-    ordering: Ordering = option("auto", words=get_args(Ordering))
+    ordering: Ordering = "auto"
     max_bias_ratio: float | None = option(None, 0.0)
 
     def __post_init__(self) -> None:
@@ -114,16 +114,3 @@ class AdjustOptions(Checked):
         if self.datum == "minimum":
             return MinimumConstraints()
         return None if self.datum == "control" else self.datum
-
-
-class AdjustKeywords(TypedDict, total=False):
-    """Fields of `AdjustOptions` as keywords of functions, for type checkers and editors."""
-
-    datum: DatumName | InnerConstraints | MinimumConstraints | None
-    unit_variance: UnitVariance
-    loss: Loss | None
-    covariance: bool | Literal["verdict"]
-    tolerance: float | AsPublished
-    max_iterations: int | None
-    ordering: Ordering
-    max_bias_ratio: float | None

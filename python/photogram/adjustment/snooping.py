@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -16,22 +15,22 @@ from photogram.adjustment.adjustment import (
     Progress,
     adjust,
     adjusted_from,
-    at_least,
     core_options,
     core_threads,
     with_datum,
 )
 from photogram.adjustment.first_values import FirstValues, first_values
-from photogram.adjustment.options import AdjustOptions, UnitVariance
+from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
-from photogram.arguments.arrays import argument_error, number, one_of, truth_value
-from photogram.arguments.objects import kind_error
+from photogram.arguments.fields import options_of
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import fields, replace
 from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
-from photogram.network.datum import InnerConstraints, MinimumConstraints
+from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
 from photogram.results.axes import point_axes
@@ -54,28 +53,25 @@ from photogram.results.network_trial import (
     network_trial,
 )
 from photogram.results.result import Result
-from photogram.results.snooping_log import Aside, Outcome, Settings, snooped
+from photogram.results.snooping_log import Aside, Outcome, snooped
+from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped, recorded
-from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram.adjustment.keywords import SnoopKeywords
 
 MOST_PHOTOS = 0.2  # Maximum part of photos without a consistent pose; beyond it the consensus is wrong
 
 
 def snoop(
     block: Any,
+    options: SnoopOptions | None = None,
     *,
-    level: float = LEVEL,
-    fdr: float | None = None,
-    unit_weight: str = "known",
-    robust: bool | None = None,
-    parts: bool = True,
-    max_rounds: int = 20,
-    unit_variance: UnitVariance = "constrained",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
-    **options: Any,
+    **changes: Unpack[SnoopKeywords],
 ) -> Snooped:
     """Remove gross errors from a block or collection by iterative data snooping.
 
@@ -88,30 +84,16 @@ def snoop(
     ----------
     block
         The block, or a :class:`photogram.collection.Collection`.
-    level
-        Probability of removing any correct observation from a network without gross errors (Bonferroni). The
-        number of tests is the initial one in all rounds.
-    fdr
-        False discovery rate instead of `level`: the critical value depends on the number of removed groups.
-    unit_weight
-        `known`: the given standard deviations are correct, and tests are chi-square. `unknown`: they are
-        correct up to a common factor, and tests are F. With `known`, the median of all test values may show
-        that standard deviations are too small. If the factor exceeds 2, it is applied for the tests.
-    robust
-        Whether to start from a robust adjustment (Huber's, then Cauchy's loss), whose outliers are then
-        tested. None: only if many observations disagree or the plain adjustment does not converge.
-    parts
-        Whether a part of a control point (height, plan) or of a weighted station can be removed. If False,
-        the whole is removed.
-    max_rounds
-        Maximum number of rounds.
-    unit_variance, threads
-        As in :func:`photogram.adjust`; collections require `constrained`.
+    options
+        The options of data snooping; None: the defaults.
+    threads
+        As in :func:`photogram.adjust`.
     progress
         Called with the progress of the adjustments before and after snooping.
-    options
-        For a block, `datum` and `max_iterations` of :func:`photogram.adjust`; tests do not depend on the
-        datum. For a collection, further options of :func:`photogram.collection.adjust`.
+    **changes
+        Fields of :class:`photogram.results.SnoopOptions` with other values. For a block, also `datum`,
+        `unit_variance`, `max_iterations`, `tolerance` and `ordering` of :func:`photogram.adjust`; tests do
+        not depend on the datum. For a collection, also options of :func:`photogram.collection.adjust`.
 
     Returns
     -------
@@ -126,58 +108,34 @@ def snoop(
     KeyboardInterrupt
         If interrupted by Ctrl-C.
     """
-    truth_value("parts", parts)
-    one_of("unit_weight", unit_weight, ("known", "unknown"))
-    if robust is not None:
-        truth_value("robust", robust)
-    family = number("level", level) if fdr is None else number("fdr", fdr)
-    if not 0 < family < 1:
-        raise argument_error("level" if fdr is None else "fdr", "range", low=0, high=1, value=family)
-    at_least("max_rounds", max_rounds, 1)
+    others: dict[str, Any] = {**changes}
+    names = others.keys() & {each.name for each in fields(SnoopOptions)}
+    chosen = options_of(SnoopOptions, options, {name: others.pop(name) for name in names})
     if not isinstance(block, Block) and not hasattr(block, "_snoop"):
         raise kind_error("block", "a Block or a Collection", block)
     snoop_network = partial(_snoop_block, block) if isinstance(block, Block) else block._snoop
-    return snoop_network(
-        Settings(
-            level=family,
-            fdr=fdr is not None,
-            known=unit_weight == "known",
-            robust=robust,
-            max_rounds=max_rounds,
-        ),
-        parts=parts,
-        unit_variance=unit_variance,
-        threads=threads,
-        progress=progress,
-        **options,
-    )
+    return snoop_network(chosen, threads=threads, progress=progress, **others)
 
 
 def _snoop_block(
     network: Block,
-    settings: Settings,
+    options: SnoopOptions,
     *,
-    parts: bool,
-    unit_variance: UnitVariance,
     threads: int | None,
     progress: Callable[[Progress], None] | None,
-    datum: InnerConstraints | MinimumConstraints | None = None,
-    max_iterations: int | None = None,
+    **changes: Any,
 ) -> Snooped:
+    for name in ("loss", "covariance", "max_bias_ratio"):
+        require(name not in changes, "snoop", "not-applicable", name=name, other="data snooping")
     block = checked(network)
     check_cameras(block)
-    chosen = AdjustOptions(datum=datum, unit_variance=unit_variance, max_iterations=max_iterations)
+    chosen = AdjustOptions(**changes)
     core, inner = with_datum(block, core_options(chosen, block), chosen.constraints)
+    datum = chosen.constraints
 
-    def adjusted(given: Block, **options: Any) -> Result:
-        return adjust(
-            given,
-            **{"datum": None if inner else datum, **options},
-            unit_variance=unit_variance,
-            max_iterations=max_iterations,
-            threads=threads,
-            progress=progress,
-        )
+    def adjusted(given: Block, **changes: Any) -> Result:
+        without = replace(chosen, datum=None) if inner else chosen
+        return adjust(given, without, threads=threads, progress=progress, **changes)
 
     def afresh() -> Aside | None:
         found = started_by_consensus(block)
@@ -194,20 +152,20 @@ def _snoop_block(
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
         parts = trial, tests, facts, block, point_axes(block), standing.sum_and_freedom, MAX_BIAS_RATIO
-        found = hypotheses(*parts, known=settings.known)
+        found = hypotheses(*parts, known=options.is_known)
         return found.common_errors() if found.common_is_harmful else []
 
     try:
-        trial = block_trial(block, None, core, threads, parts=parts)
+        trial = block_trial(block, None, core, threads, parts=options.parts)
         # Errors of fixed values resemble common errors.
-        outcome = snooped(trial, settings, afresh, None if has_held else common)
+        outcome = snooped(trial, options, afresh, None if has_held else common)
     except (LostSupportError, _photocore.BlockError):
         # This adjustment names undetermined unknowns, or continues without some points.
-        covariance = unit_variance == "redundancy"
+        covariance = chosen.unit_variance == "redundancy"
         first = adjusted(block, covariance=covariance)
-        if not first.converged and settings.robust is not False:
+        if not first.converged and options.robust is not False:
             first = adjusted(block, covariance=covariance, loss="huber")
-        trial, outcome = _snooped_from(first, settings, threads, parts=parts)
+        trial, outcome = _snooped_from(first, options, threads)
     cleaned = _without(block, trial, outcome.out)
     result = adjusted_from(cleaned, core, threads=threads, progress=progress)
     exchanged = _exchanged(block, trial, outcome, result)
@@ -220,7 +178,7 @@ def _snoop_block(
         result,
         trial,
         outcome,
-        settings,
+        options,
         held=lambda: held_tested(adjusted(block)) if has_held else [],
         exchanged=exchanged,
     )
@@ -230,7 +188,7 @@ def finished(
     result: AdjustedNetwork,
     trial: NetworkTrial,
     outcome: Outcome,
-    settings: Settings,
+    options: SnoopOptions,
     *,
     held: Callable[[], list[Tested]],
     exchanged: Iterable[Exchange],
@@ -246,10 +204,10 @@ def finished(
         with suppress(AdjustmentError):
             said += held_remark(held(), largest)
     found = Snooped(
-        result=dataclasses.replace(result, messages=[*map(Message, said), *result.messages]),
+        result=replace(result, messages=[*map(Message, said), *result.messages]),
         outcome=outcome,
         suspects=trial.suspects,
-        settings=settings,
+        options=options,
         exchanged=tuple(exchanged),
     )
     return recorded(found)
@@ -280,12 +238,10 @@ def used_images(trial: NetworkTrial, out: Out, count: int) -> Bools:
     return used
 
 
-def _snooped_from(
-    first: Result, settings: Settings, threads: int | None, *, parts: bool
-) -> tuple[NetworkTrial, Outcome]:
+def _snooped_from(first: Result, options: SnoopOptions, threads: int | None) -> tuple[NetworkTrial, Outcome]:
     """Snoop from an adjusted state; retry without a robust start if it fails."""
-    for attempt in (settings, dataclasses.replace(settings, robust=False)):
-        trial = block_trial(first.block, first.state, first.options, threads, parts=parts)
+    for attempt in (options, replace(options, robust=False)):
+        trial = block_trial(first.block, first.state, first.options, threads, parts=options.parts)
         try:
             return trial, snooped(trial, attempt)
         except (LostSupportError, _photocore.BlockError) as error:
@@ -308,7 +264,7 @@ def block_trial(
 def core_trial(
     block: Block, state: _photocore.BlockState | None, options: CoreOptions, threads: int | None
 ) -> _photocore.NetworkTrial:
-    options = dataclasses.replace(options, covariance=True, loss=None)
+    options = replace(options, covariance=True, loss=None)
     return block_network(block, options).trial(state, threads=core_threads(threads))
 
 

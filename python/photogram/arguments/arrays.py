@@ -12,7 +12,7 @@ import math
 import random
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, TypeVar
@@ -284,6 +284,37 @@ def argument_error(name: str, code: str, /, **fields: object) -> InputError:
     if "value" in fields and not isinstance(fields["value"], Phrase):
         texts["value"] = value_field(fields["value"])
     return InputError(phrase("error.at", what=name, message=phrase(f"error.{code}", **texts)))
+
+
+def finite(name: str, value: object) -> float:
+    """Return a finite number."""
+    checked = number(name, value)
+    if not math.isfinite(checked):
+        raise argument_error(name, "finite", value=checked)
+    return checked
+
+
+def array_of(
+    shape: tuple[int, ...], rule: str = "", kind: Callable[[Any], Any] | None = None
+) -> Callable[[str, Any], Any]:
+    """Return the check of a field with numbers of a shape that are `finite` or `positive`.
+
+    The check returns an array, or the numbers converted by `kind`.
+    """
+
+    def check(name: str, value: Any) -> Any:
+        values = shaped(name, value, shape)
+        valid = np.isfinite(values) & (values > 0 if rule == "positive" else True)
+        if rule and not valid.all():
+            raise argument_error(name, rule, value=values.tolist())
+        return values if kind is None else kind(values.tolist())
+
+    return check
+
+
+def object_name(name: str, value: object) -> str:
+    """Return the name of an object."""
+    return names(name, [value])[0]
 
 
 def probability(name: str, value: float) -> float:

@@ -11,14 +11,14 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from photogram.lazy_dataclasses import field, fields, replace
 
 Options = TypeVar("Options")
 Check = Callable[[str, Any], Any]
 """Function of name and value; returns the converted value or raises an error."""
-_SEQUENCE = re.compile(r"(?:list|tuple|Sequence)\[(.+?)(?:, \.\.\.)?\]")
+_SEQUENCE = re.compile(r"(?:list|tuple|Sequence)\[(\w+)(?:, \.\.\.)?\]")
 _TUPLE = re.compile(r"tuple\[((?:int|float|str|, )+)(, \.\.\.)?\]")
 
 
@@ -28,7 +28,6 @@ def option(
     high: float = math.inf,
     *,
     is_open: bool = False,
-    words: Sequence[str] = (),
     kind: type | None = None,
 ) -> Any:
     """Return a field with its limits.
@@ -39,13 +38,10 @@ def option(
         Default value.
     low, high
         Smallest and largest value; excluded if `is_open`.
-    words
-        Allowed words.
     kind
         Type on the command line; None: the type of the field.
     """
-    limits = {"low": low, "high": high, "open": is_open, "words": words, "kind": kind}
-    return field(default=default, metadata=limits)
+    return field(default=default, metadata={"low": low, "high": high, "open": is_open, "kind": kind})
 
 
 class Checked:
@@ -55,12 +51,15 @@ class Checked:
         check_fields(self)
 
 
-def check_fields(made: Any) -> None:
-    """Convert fields of an object by their types; reject wrong types and values beyond their limits."""
+def check_fields(made: Any, title: str = "") -> None:
+    """Check and convert the fields of an object; errors name the field and the title.
+
+    The check of a field is `check` in its metadata, or follows from its type and limits.
+    """
     kind: Any = type(made)
-    for name, check in _checks(kind):
+    for name, check in checks_of(kind).items():
         value = getattr(made, name)
-        converted = check(name, value)
+        converted = check(f"{name} of {title}" if title else name, value)
         if converted is not value:
             object.__setattr__(made, name, converted)
 
@@ -70,7 +69,7 @@ def check_members(kind: type, members: Mapping[str, Any]) -> None:
     if hasattr(kind, "__dataclass_fields__"):
         from photogram.arguments.arrays import refused
 
-        for name, check in _checks(kind):
+        for name, check in checks_of(kind).items():
             if name in members:
                 converted = check(name, members[name])
                 if hasattr(converted, "dtype") and not hasattr(members[name], "dtype"):
@@ -81,20 +80,24 @@ def check_members(kind: type, members: Mapping[str, Any]) -> None:
 
 
 @cache
-def _checks(kind: Any) -> list[tuple[str, Check]]:
-    """Return the checks of fields with a type that can be checked, by name."""
-    found = []
+def checks_of(kind: Any) -> dict[str, Check]:
+    """Return the checks of fields with a check, or with a type that can be checked, by name."""
+    checks: dict[str, Check] = {}
     for each in fields(kind):
         of, _, alternative = str(each.type).partition(" | ")
-        check = _check_of(of, vars(sys.modules[kind.__module__])) if alternative in ("", "None") else None
-        if check is not None or each.metadata.get("words"):
-            found.append((each.name, _limited(check, each.metadata, of, optional=alternative == "None")))
-    return found
+        optional = alternative == "None"
+        check = each.metadata.get("check")
+        if check is None and (optional or not alternative):
+            check = _check_of(of, vars(sys.modules[kind.__module__]), optional=optional)
+        if check is not None and each.init:
+            checks[each.name] = _limited(check, each.metadata, of, optional=optional)
+    return checks
 
 
-def _check_of(of: str, names: Mapping[str, Any]) -> Check | None:
+def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | None:
     """Return the check of a type; None if values of the type are not checked."""
     from photogram.arguments import arrays
+    from photogram.arguments.objects import require_kind
 
     simple: dict[str, Check] = {
         "int": arrays.whole_number,
@@ -105,8 +108,16 @@ def _check_of(of: str, names: Mapping[str, Any]) -> Check | None:
         "Indices": arrays.whole_numbers,
         "Bools": arrays.truth_values,
     }
-    if of.startswith("Literal["):
-        return partial(_word, get_args(eval(of, {"Literal": Literal})))
+    kind: Any = eval(of, {"Literal": Literal}) if of.startswith("Literal[") else names.get(of)
+    if get_origin(kind) is Literal:
+        return partial(_word, get_args(kind))
+    if _is_own_class(kind):
+
+        def instance(name: str, value: Any) -> Any:
+            require_kind(name, value, kind, optional=optional)
+            return value
+
+        return instance
     if (match := _TUPLE.fullmatch(of)) is None:
         match = _SEQUENCE.fullmatch(of)
         return simple.get(of) if match is None else partial(_sequence, names.get(match[1]))
@@ -143,19 +154,25 @@ def _word(words: Sequence[str], name: str, value: Any) -> Any:
     return value
 
 
+def _is_own_class(kind: Any) -> bool:
+    """Return whether a type is a class of the package, and not a protocol."""
+    is_class = isinstance(kind, type) and kind.__module__.startswith("photogram.")
+    return is_class and not getattr(kind, "_is_protocol", False)
+
+
 def _sequence(kind: Any, name: str, value: Any) -> Any:
-    from photogram.arguments.arrays import elements, refused
+    from photogram.arguments.arrays import elements
+    from photogram.arguments.objects import kind_error
 
     found = elements(name, value)
-    is_class = isinstance(kind, type) and kind is not Any and not getattr(kind, "_is_protocol", False)
-    for row, each in enumerate(found if is_class else ()):
+    for row, each in enumerate(found if _is_own_class(kind) else ()):
         if not isinstance(each, kind):
-            raise refused(f"{name}[{row}]", each, f"a {kind.__name__}")
+            raise kind_error(f"{name}[{row}]", kind.__name__, each)
     return value if isinstance(value, Sequence) else found
 
 
-def _limited(check: Check | None, limits: Mapping[str, Any], of: str, *, optional: bool) -> Check:
-    """Return a check with limits and words of a field."""
+def _limited(check: Check, limits: Mapping[str, Any], of: str, *, optional: bool) -> Check:
+    """Return a check with the limits of a field."""
     from photogram.arguments.objects import require
 
     low, high = limits.get("low", -math.inf), limits.get("high", math.inf)
@@ -165,11 +182,8 @@ def _limited(check: Check | None, limits: Mapping[str, Any], of: str, *, optiona
     def limited(name: str, value: Any) -> Any:
         if value is None and optional:
             return None
-        if limits.get("words"):
-            _word(limits["words"], name, value)
-        if check is not None:
-            value = check(name, value)
-        if check is not None and (low, high) != (-math.inf, math.inf):
+        value = check(name, value)
+        if (low, high) != (-math.inf, math.inf):
             inside = low < value < high if limits["open"] else low <= value <= high
             require(inside, name, code, low=low, high=high, value=value)
         return value

@@ -23,6 +23,7 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, Result
     from photogram.formats import Project
+    from photogram.results.snooping_options import SnoopOptions
     from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
     from photogram.show.forms import TitledLines
@@ -40,6 +41,7 @@ def adjust(
     documents: Documents,
     added: Additions,
     choices: Choices,
+    snoop: bool = False,
     snooping: Snooping,
     keep_all: bool = False,
     statement: bool = False,
@@ -63,7 +65,7 @@ def adjust(
     documents.place(target)  # rejected before any input is read
     if not statement:
         wanted.check_alone()
-    if snooping.snoop:
+    if snoop:
         check_alone(job, "--snoop", DIVIDING)
     if ordering != "auto":
         check_alone(job, "--ordering", DIVIDING)
@@ -96,7 +98,7 @@ def adjust(
         how: dict[str, Any] = {"choices": choices, "threads": threads, "division": parts}
         return adjusted_block(job, project, start, ordering=ordering, **how)
 
-    if snooping.snoop:
+    if snoop:
         removed = _snooped(job, project, block, started, adjusted, choices, threads, snooping)
         result = cast("Result", removed.result)
     else:
@@ -190,7 +192,7 @@ def _snooped(
     run: Callable[[FirstValues], Result],
     choices: Choices,
     threads: int | None,
-    snooping: Snooping,
+    snooping: SnoopOptions,
 ) -> Snooped:
     """Remove gross errors of a block without images excluded by initial values."""
     from photogram import Result, adjust, snoop
@@ -206,12 +208,12 @@ def _snooped(
     with adjustment_status(job, "adjusting and testing") as progress, errors_explained(block):
         found = snoop(
             block,
+            snooping,
             datum=project.options.constraints,
             robust=None if project.options.loss is None else True,
             unit_variance=project.options.unit_variance,
             max_iterations=project.options.max_iterations,
             threads=threads,
-            **snooping.options,
             progress=progress,
         )
         result = cast("Result", found.result).with_max_bias_ratio(project.options.max_bias_ratio)

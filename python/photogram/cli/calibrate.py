@@ -27,6 +27,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
+    from photogram.results.snooping_options import SnoopOptions
     from photogram.show.page import Document
     from photogram.targets import Board, Calibrated, Calibration, ViewPlan
 
@@ -146,6 +147,7 @@ def calibrate(
     documents: OfPrograms,
     seen: CalibrationInput,
     loss: LossName = "none",
+    snoop: bool = False,
     snooping: Snooping,
     outliers: PriorName | None = None,
     to: list[str] | None = None,
@@ -182,7 +184,7 @@ def calibrate(
     uncertainty.asked()
     found = uncertainty.told(
         job,
-        _adjusted(job, calibration, how, threads, snooping, max_bias_ratio),
+        _adjusted(job, calibration, how, threads, snooping if snoop else None, max_bias_ratio),
         lambda other: seen.read(other).adjust(**how, threads=threads),
     )
     weights = _weights(job, found, components or [], threads)
@@ -206,15 +208,15 @@ def _adjusted(
     calibration: Calibration,
     how: dict[str, Any],
     threads: int | None,
-    snooping: Snooping,
+    snooping: SnoopOptions | None,
     max_bias_ratio: float | None,
 ) -> Calibrated:
     """Adjust a calibration, without gross errors on request."""
-    if snooping.snoop:
+    if snooping is not None:
         check_alone(job, "--snoop", ("--loss", "--outliers"))
     with adjustment_status(job) as progress:
-        if snooping.snoop:
-            found = calibration.snoop(**snooping.options, threads=threads, progress=progress)
+        if snooping is not None:
+            found = calibration.snoop(snooping, threads=threads, progress=progress)
         else:
             found = calibration.adjust(**how, threads=threads, progress=progress)
     return replace(found, result=found.result.with_max_bias_ratio(max_bias_ratio))

@@ -12,8 +12,9 @@ from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, MaxBi
 from photogram.cli.console import print_sections, print_summary
 from photogram.cli.documents import TEXT, Documents
 from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
-from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, UnitWeight, check_alone
+from photogram.cli.options import OrderingName, Quiet, Threads, check_alone
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.results.snooping_options import SnoopOptions, UnitWeight
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust
@@ -57,7 +58,8 @@ def collection(
     components: list[Basis] | None = None,
     ordering: OrderingName = "auto",
     threads: Threads = None,
-    snooping: Annotated[Snooping, Without("unit_weight")],
+    snoop: bool = False,
+    snooping: Annotated[SnoopOptions, Without("robust", "parts", "max_rounds", "unit_weight")],
     unit_weight: UnitWeight = "unknown",
     strict: bool = False,
     quiet: Quiet = False,
@@ -78,11 +80,11 @@ def collection(
     documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
     documents.check_plots(job, out)
     photos = photos.replace(image_sd=fit.sd)
-    if snooping.snoop:
+    if snoop:
         check_alone(job, "--snoop", ("--loss", "--scale"))
     # The value of --sd is not verified, so the default differs from blocks.
     snooping = replace(snooping, unit_weight=unit_weight)
-    result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
+    result = _adjusted(job, photos, fit, snooping if snoop else None, components, ordering, threads)
     result = result.with_max_bias_ratio(fit.max_bias_ratio)
     result = result.estimated(job, photos, components, threads)
     written = documents.plots_of(result.result, out)
@@ -111,7 +113,7 @@ def _adjusted(
     job: Job,
     photos: Collection,
     fit: CollectionFit,
-    snooping: Snooping,
+    snooping: SnoopOptions | None,
     components: list[Basis] | None,
     ordering: OrderingName,
     threads: int | None,
@@ -126,11 +128,11 @@ def _adjusted(
             "ordering": ordering,
             "progress": progress,
         }
-        if not snooping.snoop:
+        if snooping is None:
             return AdjustmentOutcome(
                 adjust(photos, loss=fit.robust, covariance=fit.covariance, threads=threads, **options)
             )
-        log, made = snooped(photos, components, threads, options | snooping.options)
+        log, made = snooped(photos, components, threads, snooping, options)
         if not isinstance(log.result, AdjustedCollection):
             raise TypeError("a collection gives the result of a collection")
         return AdjustmentOutcome(log.result, log, made)

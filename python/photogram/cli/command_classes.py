@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from copy import copy
@@ -17,6 +18,8 @@ from typer.core import TyperCommand, TyperGroup
 from typer.models import OptionInfo
 
 from photogram.words import phrase
+
+UNLIMITED = 1e9  # Limits of numbers that the help does not show
 
 
 @cache
@@ -57,18 +60,24 @@ def declared(parameter: Parameter, owner: str) -> Parameter:
 
 
 def option_of(field: Field[Any], kind: type) -> Parameter:
-    """Return the option of a field of a class of options; the help shows limits of whole numbers."""
+    """Return the option of a field of a class of options; the help shows its limits."""
     hint: Any = field.metadata.get("kind")
     if hint is None:
         hint = eval(str(field.type), vars(sys.modules[kind.__module__]))
     elif field.default is None:
         hint |= None
+    low, high = (field.metadata.get(name, math.inf) for name in ("low", "high"))
     if hint is int:
-        limits = (("min", field.metadata.get("low")), ("max", field.metadata.get("high")))
+        limits = (("min", low), ("max", high))
         closed: dict[str, Any] = {name: limit for name, limit in limits if isinstance(limit, int)}
         hint = Annotated[int, typer.Option(**closed)] if closed else int
     parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hint)
-    return declared(parameter, kind.__name__)
+    parameter = declared(parameter, kind.__name__)
+    if hint in (float, float | None) and max(-low, high) < UNLIMITED:
+        sign = "<" if field.metadata["open"] else "<="
+        _, info = get_args(parameter.annotation)
+        info.metavar = f"{info.metavar or '<float>'} [{low:g}{sign}x{sign}{high:g}]"
+    return parameter
 
 
 class _Params:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.cleaning import Cleaned
     from photogram.results.components import VarianceComponents
     from photogram.results.network import AdjustedNetwork
+    from photogram.results.snooping_options import SnoopOptions
     from photogram.results.snooping_result import Snooped
     from photogram.show.page import Document
     from photogram.statistics.verdict import Verdict
@@ -46,17 +47,21 @@ def _groups(bases: list[Basis]) -> list[str]:
 
 
 def snooped(
-    network: object, bases: list[Basis] | None, threads: int | None, options: Mapping[str, Any]
+    network: object,
+    bases: list[Basis] | None,
+    threads: int | None,
+    how: SnoopOptions,
+    options: Mapping[str, Any],
 ) -> tuple[Snooped, Cleaned | None]:
     """Remove gross errors; estimate weights alternately if components are requested."""
     if bases:
         from photogram.adjustment.cleaning import clean
 
-        made = clean(network, _groups(bases), threads=threads, **options)
+        made = clean(network, _groups(bases), how, threads=threads, **options)
         return made.snooped, made
     from photogram.adjustment.snooping import snoop
 
-    return snoop(network, threads=threads, **options), None
+    return snoop(network, how, threads=threads, **options), None
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.options import UnitVariance
     from photogram.giant import Limits, Project
     from photogram.giant.common import Common
+    from photogram.results.snooping_options import SnoopOptions
 
 RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 
@@ -74,6 +75,7 @@ def giant(
     listing: OutputFile = None,
     how: GiantOptions,
     threads: Threads = None,
+    snoop: bool = False,
     snooping: Snooping,
     limits: str | None = None,
     strict: bool = False,
@@ -95,11 +97,11 @@ def giant(
     documents.announce(job, out, *RESULTS, *([COMPONENTS] if how.components else []))
     documents.check_plots(job, out)
     project, block, allowed = _project_and_block(job, directory, limits, how)
-    if snooping.snoop:
+    if snoop:
         check_alone(job, "--snoop", ("--as-published",))
         if project.common.intersection_only:
             raise misuse("--snoop", "intersection-only")
-    found = _adjusted_project(job, project, block, how, threads, snooping)
+    found = _adjusted_project(job, project, block, how, threads, snooping if snoop else None)
     written = _result_files(project, block, found, out, how.as_published)
     found = found.estimated(job, block, how.components, threads)
     written |= found.files(out) | documents.plots_of(found.result, out)
@@ -189,7 +191,12 @@ def _refracted(block: Block, common: Common, how: GiantOptions) -> Block:
 
 
 def _adjusted_project(
-    job: Job, project: Project, block: Block, how: GiantOptions, threads: int | None, snooping: Snooping
+    job: Job,
+    project: Project,
+    block: Block,
+    how: GiantOptions,
+    threads: int | None,
+    snooping: SnoopOptions | None,
 ) -> AdjustmentOutcome[Result]:
     """Adjust or snoop the block as in COMMON, with requested components."""
     from photogram.diagnosis.after_adjustment import errors_explained
@@ -199,7 +206,7 @@ def _adjusted_project(
         with adjustment_status(job) as progress, errors_explained(block):
             found = (
                 _snooped(project, block, how, threads, snooping, progress)
-                if snooping.snoop
+                if snooping is not None
                 else _adjusted(project, block, how, threads, progress)
             )
     except AdjustmentError:
@@ -217,15 +224,15 @@ def _snooped(
     block: Block,
     how: GiantOptions,
     threads: int | None,
-    snooping: Snooping,
+    snooping: SnoopOptions,
     progress: Callable[[Progress], None] | None,
 ) -> AdjustmentOutcome[Result]:
     """Remove gross errors, and estimate variance components if requested."""
     from photogram import Result
     from photogram.diagnosis.after_adjustment import diagnosed
 
-    options = snooping.options | {"unit_variance": how.basis(project.common), "progress": progress}
-    log, made = snooped(block, how.components, threads, options)
+    options = {"unit_variance": how.basis(project.common), "progress": progress}
+    log, made = snooped(block, how.components, threads, snooping, options)
     if not isinstance(log.result, Result):
         raise TypeError("a block gives the result of a block")
     return AdjustmentOutcome(diagnosed(log.result), log, made)

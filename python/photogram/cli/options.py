@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from photogram.cli.command_classes import misuse
-from photogram.cli.job import Job
-from photogram.lazy_dataclasses import dataclass
+from photogram.cli.job import Job, Without
+from photogram.results.snooping_options import SnoopOptions
 
 PictureFormat = Literal["png", "pdf", "svg"]
-UnitWeight = Literal["known", "unknown"]
 OrderingName = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 AirModel = Literal["giant", "standard", "none"]
 WaterModel = Literal["giant", "snell", "none"]
@@ -23,19 +22,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q")]
 Threads = Annotated[int | None, typer.Option(min=1)]
 
 
-@dataclass(frozen=True)
-class Snooping:
-    """Options for the removal of gross errors."""
-
-    snoop: bool = False
-    level: Annotated[float, typer.Option(min=1e-09, max=0.5)] = 0.05
-    fdr: Annotated[float | None, typer.Option(min=1e-09, max=0.5)] = None
-    unit_weight: UnitWeight = "known"
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Arguments of :func:`photogram.snoop`."""
-        return {"level": self.level, "fdr": self.fdr, "unit_weight": self.unit_weight}
+Snooping = Annotated[SnoopOptions, Without("robust", "parts", "max_rounds")]
 
 
 def check_alone(job: Job, option: str, others: Collection[str]) -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from photogram.diagnosis import Diagnosis
     from photogram.network.core_arrays import CoreOptions
     from photogram.results.group_sums import Grouping, Observables
-    from photogram.results.snooping_log import Settings
+    from photogram.results.snooping_options import SnoopOptions
 
 __all__ = ["Collection"]
 
@@ -204,10 +204,10 @@ class Collection(Valued, Brief):
 
         return adjusted(self, options, **more)
 
-    def _snoop(self, settings: Settings, **options: Any) -> Snooped:
+    def _snoop(self, options: SnoopOptions, **changes: Any) -> Snooped:
         from photogram.collection.snooping import snoop_collection
 
-        return snoop_collection(self, settings, **options)
+        return snoop_collection(self, options, **changes)
 
     def _check(self, threads: int | None) -> Diagnosis:
         from photogram.collection.snooping import check

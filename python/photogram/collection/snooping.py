@@ -39,7 +39,8 @@ from photogram.results.network_trial import (
     NetworkTrial,
     Out,
 )
-from photogram.results.snooping_log import Aside, Outcome, Settings, snooped
+from photogram.results.snooping_log import Aside, Outcome, snooped
+from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped
 from photogram.words import phrase
 
@@ -54,22 +55,21 @@ BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
 
 def snoop_collection(
     collection: Collection,
-    settings: Settings,
+    options: SnoopOptions,
     *,
-    parts: bool,
-    unit_variance: str,
     threads: int | None,
     progress: Callable[[Progress], None] | None,
-    **options: Any,
+    unit_variance: str = "constrained",
+    **changes: Any,
 ) -> Snooped:
     """Remove gross errors from a collection; see :func:`photogram.snoop`."""
     one_of("unit_variance", unit_variance, ("constrained",))
 
     def tried(covariance: bool) -> tuple[AdjustedCollection, NetworkTrial, Outcome]:
-        first = adjust(collection, covariance=covariance, threads=threads, progress=progress, **options)
+        first = adjust(collection, covariance=covariance, threads=threads, progress=progress, **changes)
         own = dataclasses.replace(first.options, covariance=True, loss=None)
         core = collection_network(collection, own).trial(first.state, threads=core_threads(threads))
-        trial = collection_trial(collection, core, parts=parts)
+        trial = collection_trial(collection, core, parts=options.parts)
 
         def afresh() -> Aside | None:
             found = started_robustly(collection, first.options, threads=threads)
@@ -82,7 +82,7 @@ def snoop_collection(
             groups = np.flatnonzero((kinds == IMAGE) & np.isin(subjects, images))
             return Aside(tuple(groups.tolist()), {}, BY_LOSSES)
 
-        return first, trial, snooped(trial, settings, afresh)
+        return first, trial, snooped(trial, options, afresh)
 
     try:
         first, trial, outcome = tried(False)
@@ -93,7 +93,7 @@ def snoop_collection(
         except (LostSupportError, _photocore.CollectionError) as error:
             raise AdjustmentError(phrase("collection.no-trial", error=error.args[0])) from error
     cleaned = _without(first, trial, outcome.out)
-    result = adjust(cleaned, threads=threads, progress=progress, **options)
+    result = adjust(cleaned, threads=threads, progress=progress, **changes)
     placed = as_block(collection.replace(photo_parameters=result.photo_parameters))
     used = used_images(trial, outcome.out, len(collection.image_xy))
     # Constants of a camera are not fixed parameters in this sense.
@@ -104,8 +104,8 @@ def snoop_collection(
         result,
         trial,
         outcome,
-        settings,
-        held=lambda: collection_held(adjust(collection, **options)) if any_held else [],
+        options,
+        held=lambda: collection_held(adjust(collection, **changes)) if any_held else [],
         exchanged=exchanged_names(placed, used, max(result.variance_of_unit_weight or 1.0, 1.0)),
     )
 

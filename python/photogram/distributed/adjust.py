@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import orjson
@@ -22,7 +22,7 @@ from photogram.adjustment.adjustment import (
     with_datum,
 )
 from photogram.adjustment.first_features import started
-from photogram.adjustment.options import AdjustKeywords, AdjustOptions
+from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
 from photogram.arguments.fields import options_of
 from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
@@ -51,6 +51,9 @@ from photogram.network.films import Scan
 from photogram.results.block_files import STANDS
 from photogram.results.result import Result
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.adjustment.keywords import AdjustKeywords
 
 __all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
 

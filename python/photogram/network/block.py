@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from photogram.arguments.arrays import text, truth_value
-from photogram.arguments.declared import check_with, instance
+from photogram.arguments.arrays import text
 from photogram.arguments.equality import Valued
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import (
@@ -165,11 +164,11 @@ class Block(Valued, Brief):
     photo_position_sd: Array = field(default=FREE, metadata=array("photos", 3, "sd"))
     photo_attitude_sd: Array = field(default=FREE, metadata=array("photos", 3, "sd"))
     point_sd: Array = field(default=FREE, metadata=array("points", 3, "sd"))
-    spheroid: Spheroid | None = field(default=None, metadata=check_with(instance(Spheroid, None)))
-    photo_to_ground: bool = field(default=False, metadata=check_with(truth_value))
-    title: str = field(default="", metadata=check_with(text))
-    linear_unit: str = field(default="m", metadata=check_with(text))
-    refraction: Refraction | None = field(default=None, metadata=check_with(instance(Refraction, None)))
+    spheroid: Spheroid | None = None
+    photo_to_ground: bool = False
+    title: str = field(default="", metadata={"check": text})
+    linear_unit: str = field(default="m", metadata={"check": text})
+    refraction: Refraction | None = None
     photo_positions_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, "not-infinite"))
     photo_attitudes_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, "angle"))
     observations: Records = field(default=NO_RECORDS)
@@ -178,7 +177,7 @@ class Block(Valued, Brief):
     mounts: Sequence[Mount] = ()
     timed: Sequence[Timed] = ()
     passages: Sequence[Passage] = ()
-    frame: Frame = field(default_factory=Frame, metadata=check_with(instance(Frame)))
+    frame: Frame = field(default_factory=Frame)
     point_check_sd: OptionalArray = field(default=NONE, metadata=array("points", 3, "check-sd"))
     rejected_points = frozenset[str]()
     """Points whose image observations were all rejected; copied with the block, but not a field."""

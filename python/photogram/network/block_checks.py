@@ -16,6 +16,7 @@ from photogram.arguments.arrays import (
     repeated_pairs,
     shaped,
 )
+from photogram.arguments.fields import checks_of
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import fields
@@ -101,9 +102,10 @@ def check_block(block: Block, changed: Collection[str]) -> None:
 def _check_field(block: Block, declared: Any, counts: Mapping[str, int]) -> None:
     name, rules = declared.name, declared.metadata
     value = getattr(block, name)
-    if "check" in rules:
-        block._set(name, rules["check"](name, value))
     if "rule" not in rules:
+        kind: Any = type(block)
+        if (check := checks_of(kind).get(name)) is not None:
+            block._set(name, check(name, value))
         return
     rows, rule = rules["rows"], rules["rule"]
     if rule == "cameras":

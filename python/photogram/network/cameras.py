@@ -20,8 +20,8 @@ from photogram.arguments.arrays import (
     shaped,
     text,
 )
-from photogram.arguments.declared import check_fields, check_with, choice, optional
 from photogram.arguments.equality import Valued
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import NONE, Floats, Indices, OptionalArray
 from photogram.errors import InputError
@@ -105,13 +105,13 @@ class Camera(Valued, Brief):
         If knots have another shape or do not belong to the model.
     """
 
-    model: str = field(metadata=check_with(_model))
+    model: str = field(metadata={"check": _model})
     parameters: Mapping[str, float]
     sd: Mapping[str, float] | float = 0.0
-    name: str = field(default="", metadata=check_with(text))
-    unit: ImageUnit | None = field(default=None, metadata=check_with(optional(choice(ImageUnit))))
+    name: str = field(default="", metadata={"check": text})
+    unit: ImageUnit | None = None
     covariance: tuple[Sequence[str], ArrayLike] | None = None
-    weights: Weights = field(default="corrected", metadata=check_with(choice(Weights)))
+    weights: Weights = "corrected"
     knots: OptionalArray = field(default=NONE)
     knot_sd: OptionalArray = field(default=NONE)
 

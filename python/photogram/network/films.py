@@ -13,8 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, one_of, shaped
-from photogram.arguments.declared import check_fields, check_with, instance, numbers, object_name
+from photogram.arguments.arrays import argument_error, array_of, object_name, one_of, shaped
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -99,11 +99,13 @@ class Readings:
         (hx, hy) mm, half ranges of the scanner polynomials.
     """
 
-    pitch: float = field(default=1.0, metadata=check_with(numbers((), "positive")))
-    origin: tuple[float, float] = field(default=(0.0, 0.0), metadata=check_with(numbers((2,), "finite")))
+    pitch: float = field(default=1.0, metadata={"check": array_of((), "positive", float)})
+    origin: tuple[float, float] = field(
+        default=(0.0, 0.0), metadata={"check": array_of((2,), "finite", tuple)}
+    )
     down: bool = False
     half_range: tuple[float, float] = field(
-        default=(1.0, 1.0), metadata=check_with(numbers((2,), "positive"))
+        default=(1.0, 1.0), metadata={"check": array_of((2,), "positive", tuple)}
     )
 
     def __post_init__(self) -> None:
@@ -240,10 +242,10 @@ class Film:
         Whether the film was scanned from the emulsion side (mirrored).
     """
 
-    placement: FilmPlacement = field(metadata=check_with(instance(FilmPlacement)))
-    size: FilmSize = field(metadata=check_with(instance(FilmSize)))
-    scanner: Scanner = field(metadata=check_with(instance(Scanner)))
-    readings: Readings = field(metadata=check_with(instance(Readings)))
+    placement: FilmPlacement
+    size: FilmSize
+    scanner: Scanner
+    readings: Readings
     bend: FilmBend | None = None
     projective: bool = False
     roll: Roll | None = None
@@ -290,8 +292,8 @@ class Scan(Passage):
 
     KIND = "scan"
 
-    photo: str = field(metadata=check_with(object_name))
-    film: Film = field(metadata=check_with(instance(Film)))
+    photo: str = field(metadata={"check": object_name})
+    film: Film
 
     def __post_init__(self) -> None:
         check_fields(self, "a scan")

@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, number, numbers, shaped
-from photogram.arguments.declared import (
-    array,
-    check_fields,
-    check_with,
-    choice,
-    finite,
-    instance,
-    object_name,
-    optional,
-)
+from photogram.arguments.arrays import argument_error, array_of, finite, number, numbers, object_name, shaped
 from photogram.arguments.equality import Valued
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -66,7 +57,7 @@ class Shutter:
 
     readout: Readout | float
     edges: tuple[float, float]
-    direction: Direction = field(default="down", metadata=check_with(choice(Direction)))
+    direction: Direction = "down"
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -148,7 +139,7 @@ class LineSensor(Valued):
     s0: float
     x0: float = 0.0
     y0: float = 0.0
-    lens: Lens | None = field(default=None, metadata=check_with(instance(Lens, None)))
+    lens: Lens | None = None
     bends: ArrayLike | None = None
 
     def __post_init__(self) -> None:
@@ -259,18 +250,18 @@ class Timed:
     """
 
     photo: str
-    trajectory: Trajectory | None = field(default=None, metadata=check_with(instance(Trajectory, None)))
-    time: float | None = field(default=None, metadata=check_with(optional(finite)))
-    shutter: Shutter | None = field(default=None, metadata=check_with(instance(Shutter, None)))
-    lines: Lines | None = field(default=None, metadata=check_with(instance(Lines, None)))
-    line_sensor: LineSensor | None = field(default=None, metadata=check_with(instance(LineSensor, None)))
-    sensor: Sensor | None = field(default=None, metadata=check_with(instance(Sensor, None)))
-    offset: Clock | None = field(default=None, metadata=check_with(instance(Clock, None)))
-    rate: Readout | None = field(default=None, metadata=check_with(instance(Readout, None)))
-    velocity: ArrayLike = field(default=0.0, metadata=check_with(array((3,))))
-    rotation_rate: ArrayLike = field(default=0.0, metadata=check_with(array((3,))))
-    sd_velocity: ArrayLike = field(default=np.inf, metadata=check_with(array((3,))))
-    sd_rate: ArrayLike = field(default=np.inf, metadata=check_with(array((3,))))
+    trajectory: Trajectory | None = None
+    time: float | None = field(default=None, metadata={"check": finite})
+    shutter: Shutter | None = None
+    lines: Lines | None = None
+    line_sensor: LineSensor | None = None
+    sensor: Sensor | None = None
+    offset: Clock | None = None
+    rate: Readout | None = None
+    velocity: ArrayLike = field(default=0.0, metadata={"check": array_of((3,))})
+    rotation_rate: ArrayLike = field(default=0.0, metadata={"check": array_of((3,))})
+    sd_velocity: ArrayLike = field(default=np.inf, metadata={"check": array_of((3,))})
+    sd_rate: ArrayLike = field(default=np.inf, metadata={"check": array_of((3,))})
 
     def __post_init__(self) -> None:
         vars(self)["photo"] = object_name("photo of a trajectory", self.photo)

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, names
-from photogram.arguments.declared import array, check_fields, check_with, instance
+from photogram.arguments.arrays import argument_error, array_of, names
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import instances, kind_error
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.unknowns import Numbers, Unknown
 
 PassageRow = tuple[str, list[int], list[int], Floats]
@@ -69,14 +69,14 @@ class Figure(Passage):
 
     KIND = "figure"
 
-    bend: Bend = field(metadata=check_with(instance(Bend)))
+    bend: Bend
     points: Sequence[str]
     shifts: ArrayLike
 
     def __post_init__(self) -> None:
         check_fields(self, "a figure")
         points = tuple(names("points of a figure", self.points))
-        shifts = array((len(points), 2, 3), "finite")(f"shifts of the {self.title}", self.shifts)
+        shifts = array_of((len(points), 2, 3), "finite")(f"shifts of the {self.title}", self.shifts)
         vars(self).update(points=points, shifts=shifts)
 
     @property

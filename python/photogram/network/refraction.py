@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import require
@@ -52,10 +52,6 @@ class Refraction:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for name, choices in (("air", get_args(Air)), ("water", get_args(Water))):
-            value = getattr(self, name)
-            good = value is None or value in choices
-            require(good, name, "choice", names=[*choices, "None"], value=value)
         require(math.isfinite(self.water_level), "water_level", "finite", value=self.water_level)
         good = 1 <= self.refractive_index < math.inf
         require(good, "refractive_index", "least", low=1, value=self.refractive_index)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.arguments.declared import check_fields, check_with, instance, object_name
+from photogram.arguments.arrays import object_name
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import instances
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -34,9 +35,9 @@ class Mount:
         Pose of the sensor in the frame, one object for all its photos.
     """
 
-    photo: str = field(metadata=check_with(object_name))
-    frame: str = field(metadata=check_with(object_name))
-    sensor: Sensor = field(metadata=check_with(instance(Sensor)))
+    photo: str = field(metadata={"check": object_name})
+    frame: str = field(metadata={"check": object_name})
+    sensor: Sensor
 
     def __post_init__(self) -> None:
         check_fields(self, "a mount")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from photogram.network.simulated_motion import rolled
 from photogram.network.simulation_options import LONGEST, LineScanner, RollingShutter, SimulationOptions
 from photogram.network.tables import checked_cameras
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.network.keywords import SimulationKeywords
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -78,7 +81,7 @@ class Simulation:
     blunders: Blunders
 
 
-def simulate(options: SimulationOptions | None = None, **changes: Any) -> Simulation:
+def simulate(options: SimulationOptions | None = None, **changes: Unpack[SimulationKeywords]) -> Simulation:
     """Simulate a block of vertical photographs.
 
     Parameters

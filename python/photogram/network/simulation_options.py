@@ -221,7 +221,7 @@ class SimulationOptions(Checked):
     points_per_photo: float = option(100.0, 4.0, LONGEST)
     crab: float = option(0.03, 0.0, math.pi / 4)
     tilt: float = option(0.01, 0.0, 0.1)
-    control: ControlPattern = option("perimeter", words=get_args(ControlPattern))
+    control: ControlPattern = "perimeter"
     control_spacing: int = option(4, 1)
     control_sd: float = option(0.05, 0.0, LONGEST)
     check_points: int = option(20, 0)

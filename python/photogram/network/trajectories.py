@@ -17,14 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import (
-    argument_error,
-    number,
-    numbers,
-    shaped,
-    whole_number,
-)
-from photogram.arguments.declared import check_fields, check_with, choice, instance, object_name
+from photogram.arguments.arrays import argument_error, number, numbers, object_name, shaped, whole_number
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -150,10 +144,8 @@ class Table:
     attitude_times: Floats
     attitudes: Floats
     velocities: Floats | None = None
-    interpolation: Interpolation = field(default="linear", metadata=check_with(choice(Interpolation)))
-    attitude_interpolation: Interpolation = field(
-        default="linear", metadata=check_with(choice(Literal["linear", "lagrange"]))
-    )
+    interpolation: Interpolation = "linear"
+    attitude_interpolation: Literal["linear", "lagrange"] = "linear"
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -408,12 +400,12 @@ class Trajectory:
     """
 
     name: str
-    table: Table = field(metadata=check_with(instance(Table)))
+    table: Table
     position: Basis | None = None
     rotation: Basis | None = None
     body: tuple[ArrayLike, ArrayLike] | None = None
-    position_axes: PositionAxes = field(default="table", metadata=check_with(choice(PositionAxes)))
-    angles: Angles = field(default="vector", metadata=check_with(choice(Angles)))
+    position_axes: PositionAxes = "table"
+    angles: Angles = "vector"
     coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, names, number, shaped
-from photogram.arguments.declared import check_fields, check_with, finite, optional
+from photogram.arguments.arrays import argument_error, finite, names, number, shaped
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import require
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
@@ -230,7 +230,7 @@ class Drift(Numbers):
 
     KIND = "drift"
 
-    epoch: float | None = field(default=None, metadata=check_with(optional(finite)))
+    epoch: float | None = field(default=None, metadata={"check": finite})
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -10,3 +10,4 @@ from .patterns import DrawnPattern as DrawnPattern
 from .patterns import drawn_patterns as drawn_patterns
 from .picture_data import plot_distortion as plot_distortion
 from .picture_data import plot_lens_field as plot_lens_field
+from .snooping_options import SnoopOptions as SnoopOptions

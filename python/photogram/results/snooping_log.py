@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.network_trial import KINDS, LostSupportError, Out, Standing, Tests
-from photogram.statistics.distributions import LEVEL
+from photogram.results.snooping_options import SnoopOptions
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -23,15 +23,6 @@ ODDS = 20.0  # Largest likelihood ratio of alternatives
 KEPT = {
     code: Phrase(f"snooping.{code}") for code in ("needed", "photo-undetermined", "disputed")
 }  # Reasons for not removing a group although its test rejects
-
-
-@dataclass(frozen=True)
-class Settings:
-    level: float = LEVEL  # Joint level of all tests, or the false discovery rate
-    fdr: bool = False  # Whether `level` is the false discovery rate
-    known: bool = True  # Whether the unit weight is known: chi-square decides, otherwise F
-    robust: bool | None = None  # Whether to start robustly; None if many observations are wrong
-    max_rounds: int = 20
 
 
 @dataclass(frozen=True)
@@ -135,7 +126,7 @@ class Outcome:
 
 def snooped(
     trial: NetworkTrial,
-    settings: Settings,
+    options: SnoopOptions,
     afresh: Callable[[], Aside | None] | None = None,
     common: Callable[[Tests, Standing], Sequence[Phrase]] | None = None,
 ) -> Outcome:
@@ -145,8 +136,8 @@ def snooped(
     ----------
     trial
         The network.
-    settings
-        Settings of data snooping.
+    options
+        Options of data snooping.
     afresh
         Restarts the trial from a consensus of its observations if its adjustment diverges. Returns the
         observations that the consensus rejects; None without consensus.
@@ -156,11 +147,11 @@ def snooped(
     """
     begin = partial(
         _photocore.NetworkSnooping,
-        level=settings.level,
-        is_rate=settings.fdr,
-        known=settings.known,
-        robust=settings.robust,
-        max_rounds=settings.max_rounds,
+        level=options.level if options.fdr is None else options.fdr,
+        is_rate=options.fdr is not None,
+        known=options.is_known,
+        robust=options.robust,
+        max_rounds=options.max_rounds,
         control=trial.control,
         rough=trial.rough,
         exact=trial.exact,
@@ -171,7 +162,7 @@ def snooped(
     try:
         core = trial.asked(begin, trial.core, None)
     except LostSupportError:
-        aside = None if settings.robust is False or afresh is None else afresh()
+        aside = None if options.robust is False or afresh is None else afresh()
         if aside is None:
             raise
         core = trial.asked(begin, trial.core, (aside.images, set(aside.photos)))
@@ -186,7 +177,7 @@ def snooped(
         trial.asked(core.run, trial.core)
     log = core.finish()
     names = _Names(trial.suspects, aside)
-    remarks = [names.remark(*remark, rounds=settings.max_rounds) for remark in log["remarks"]]
+    remarks = [names.remark(*remark, rounds=options.max_rounds) for remark in log["remarks"]]
     if errors:
         remarks.append(phrase("snooping.common", errors=list(errors)))
     return Outcome(

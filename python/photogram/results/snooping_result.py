@@ -13,7 +13,8 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import Standing
-from photogram.results.snooping_log import Outcome, Removal, Rival, Settings, disputes
+from photogram.results.snooping_log import Outcome, Removal, Rival, disputes
+from photogram.results.snooping_options import SnoopOptions
 from photogram.show.methods import Brief, Documented, Rows, few
 from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section, about
 from photogram.show.quantity import Quantity, Table, members, members_of_each, of_each, records
@@ -41,8 +42,8 @@ class Snooped(Brief, Documented):
         The log with its data.
     suspects
         The groups of observations that were tested.
-    settings
-        The settings of data snooping.
+    options
+        The options of data snooping.
     exchanged
         Names of points that are exchanged, among the excluded images.
     """
@@ -50,7 +51,7 @@ class Snooped(Brief, Documented):
     result: AdjustedNetwork
     outcome: Outcome
     suspects: NamedSuspects
-    settings: Settings
+    options: SnoopOptions
     exchanged: tuple[Exchange, ...] = ()
 
     def brief(self) -> tuple[str, Rows]:
@@ -98,11 +99,15 @@ class Snooped(Brief, Documented):
 
     def members(self) -> dict[str, Any]:
         """Return the member `snooping` of JSON documents: settings, rounds and the log."""
-        outcome, settings = self.outcome, self.settings
+        outcome, options = self.outcome, self.options
         return {
-            "family_level" if not settings.fdr else "false_discovery_rate": settings.level,
-            "unit_weight": "known" if settings.known else "unknown",
-            "distribution": "chi2" if settings.known else "F",
+            **(
+                {"family_level": options.level}
+                if options.fdr is None
+                else {"false_discovery_rate": options.fdr}
+            ),
+            "unit_weight": options.unit_weight,
+            "distribution": "chi2" if options.is_known else "F",
             **members(outcome, "tests", robust_factors="factors"),
             "remarks": [*map(str, outcome.remarks)],
             "before": _standing(outcome.before),
@@ -141,16 +146,18 @@ class Snooped(Brief, Documented):
         return replace(network, highlights=highlights, sections=[section, *network.sections])
 
     def _facts(self) -> list[Fact]:
-        outcome, settings = self.outcome, self.settings
+        outcome, options = self.outcome, self.options
         returned = sum(entry.returned is not None for entry in self.log)
         suspect = sum(bool(entry.kept) for entry in self.log)
-        level = "False discovery rate" if settings.fdr else "Family level"
+        name, level = (
+            ("Family level", options.level) if options.fdr is None else ("False discovery rate", options.fdr)
+        )
         tests = f"over {outcome.tests} tests, kept in all rounds"
         biased = f"holds after removal of {len(self.removed)} groups: it is biased low by little"
         taken_out = f"returned {returned}, suspect but kept {suspect}"
         return [
-            Fact("Unit weight", "known: chi-square tests" if settings.known else "unknown: F tests"),
-            Fact(level, f"{settings.level:g}", note=tests),
+            Fact("Unit weight", "known: chi-square tests" if options.is_known else "unknown: F tests"),
+            Fact(name, f"{level:g}", note=tests),
             Fact("Unit variance before", _said(outcome.before)),
             Fact("Unit variance after", _said(outcome.standing), note=biased if self.removed else ""),
             Fact("Rounds", f"{len(outcome.rounds)}"),

@@ -17,6 +17,7 @@ from photogram.errors import InputError, RankError
 from photogram.messages import Message
 from photogram.network.cameras import images_of
 from photogram.results.result import Result
+from photogram.results.snooping_options import SnoopOptions
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.findings import judged
 from photogram.targets.housing import transformed
@@ -148,13 +149,13 @@ class Calibration(Start):
         before = free if start.regularise else None
         return judged(Calibrated(calibration=start, result=result, unregularised=before))
 
-    def snoop(self, **options: Any) -> Calibrated:
+    def snoop(self, options: SnoopOptions | None = None, **changes: Any) -> Calibrated:
         """Remove gross errors one by one by data snooping, and adjust the rest.
 
         Parameters
         ----------
-        options
-            Options of :func:`photogram.snoop`.
+        options, changes
+            As in :func:`photogram.snoop`.
 
         Raises
         ------
@@ -166,7 +167,7 @@ class Calibration(Start):
         if self.regularise is not None and not _has_knots(self):
             raise InputError(phrase("targets.priors"))
         start = self.adjust().calibration if self.sync == "offset" else self
-        snooped = snoop(weighted_block(start), **options)
+        snooped = snoop(weighted_block(start), options, **changes)
         result = snooped.result
         assert isinstance(result, Result)
         rest = start.with_images_of(result.block)

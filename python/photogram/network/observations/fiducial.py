@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, shaped
-from photogram.arguments.declared import check_fields, check_with, instance, object_name
+from photogram.arguments.arrays import names, object_name, shaped
+from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
@@ -48,9 +48,9 @@ class Fiducial(Observation):
     VALUES = (("reading", (2,)),)
     COMPONENTS = ("x", "y")
 
-    photo: str = field(metadata=check_with(object_name))
-    mark: Mark = field(metadata=check_with(instance(Mark)))
-    film: Film = field(metadata=check_with(instance(Film)))
+    photo: str = field(metadata={"check": object_name})
+    mark: Mark
+    film: Film
     reading: ArrayLike
     sd: ArrayLike | None = None
     covariance: ArrayLike | None = None
