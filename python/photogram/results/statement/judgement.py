@@ -311,9 +311,7 @@ def _asprs_remarks(found: Statement, own: Asprs) -> Iterator[Sentence]:
     for name, good in own.control_good_enough.items():
         rmse = own.control_rmse[name]
         if not good and math.isfinite(rmse):
-            # The limit is half a class; without vertical class, the full horizontal one.
-            limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
-            yield f"asprs.control.{name}", {"sd": rmse, "limit": texts.size(limit)}
+            yield f"asprs.control.{name}", {"sd": rmse, "limit": texts.size(own.control_limits[name])}
     for each in own.remarks[:NAMED]:
         fields = {"component": texts(f"component.{each.component}"), **members(each, "value", "limit")}
         if each.point is None:
