@@ -51,7 +51,7 @@ def network_findings(
     lost = None if summary is None else summary.downweighted
     test = _robust_test(result) if result.loss else result.global_test
     rejected = test is not None and (test.rejected_high or test.rejected_low)
-    assumed = [] if summary is None else summary.hypotheses.assumptions
+    assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
     return Findings(
         status=result.status,

@@ -325,8 +325,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         AdjustmentError
             If the adjustment has not converged or has no redundancy.
         """
-        found = self._hypotheses()
-        return found.tests(found.every).frame()
+        return self._hypotheses().tests().frame()
 
     def external_reliability(self) -> pd.DataFrame:
         """Return effects of undetected errors as a data frame, a row for each hypothesis.
@@ -340,8 +339,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         AdjustmentError
             As in :meth:`hypotheses`.
         """
-        found = self._hypotheses()
-        return found.external_reliability(found.every).frame()
+        return self._hypotheses().external_reliability().frame()
 
     def with_max_bias_ratio(self, ratio: float | None) -> Self:
         """Return the result with a verdict that permits larger or smaller effects of undetected errors.

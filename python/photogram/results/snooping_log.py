@@ -244,7 +244,9 @@ class _Names:
             "consequences": [self._consequence(*each) for each in entry["consequences"]],
             "kept": KEPT[entry["kept"]] if entry["kept"] else "",
         }
-        fields = {name: tuple(own) if isinstance(own, list) else own for name, own in entry.items()}
+        fields: dict[str, Any] = {
+            name: tuple(own) if isinstance(own, list) else own for name, own in entry.items()
+        }
         return Removal(**fields)
 
     def _consequence(self, code: str, values: list[float]) -> Phrase | str:
