@@ -349,7 +349,7 @@ def _weights(found: Statement) -> Iterator[Sentence]:
     if components is not None:
         parts = [
             f"{texts.kind(each.name)} x {texts.number(each.factor_of_sd, 2)}"
-            f" ({texts.number(each.interval[0] ** 0.5, 2)} – {texts.number(each.interval[1] ** 0.5, 2)})"
+            f" ({' – '.join(texts.number(end, 2) for end in each.interval_of_sd)})"
             for each in components.components
             if not each.held
         ]
