@@ -14,7 +14,6 @@ from message_codes import nested_codes
 from photogram import InputError
 from photogram.results.statement import standards
 from photogram.results.statement.lengths import (
-    Limit,
     angle_to_diagonal,
     at_reference,
     length_test,
@@ -228,7 +227,7 @@ def of_bar(bar, **changed):
         "covariance": np.diag([row["sd_measured_mm"] ** 2 for row in rows]),
         "sd": np.array([row["sd_calibrated_mm"] for row in rows]),
         "lines": [row["line"] for row in rows],
-        "limit": Limit(limit["A_mm"], limit["K"], limit["B_mm"]),
+        "limit": (limit["A_mm"], limit["K"], limit["B_mm"]),
     }
     measured, calibrated = (
         np.array([row[f"{name}_mm"] for row in rows]) for name in ("measured", "calibrated")

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.unadjusted import Given
 from photogram.results.hypothesis_facts import NO_FACTS, Facts
 from photogram.results.network_trial import NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
@@ -99,12 +98,9 @@ class Hypotheses:
     drawn: Indices  # (d,) points whose changes effects contain
     limit: float  # Standard deviations from which on an undetected error of a point counts
     suspects: NamedSuspects
-    cameras: Sequence[str]  # names
     points: int  # number of adjusted points
-    point_ids: Sequence[str]
-    axes: Sequence[str]
-    units: Mapping[str, str]  # Units of the errors of types without a length
-    length: str  # Unit of all others
+    axes: Sequence[Axis]  # of the points
+    times: str  # Unit of errors of times
     single_odds: float  # Largest log odds of an error of a single observation, images among them
     excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
 
@@ -128,8 +124,9 @@ class Hypotheses:
         if group < 0:
             fields: dict[str, Any] = {"set": max(index, 0) + 1, "parameters": self.sets[row]["parameters"]}
             if index >= 0 and code in OF_CAMERAS:
+                cameras = getattr(self.suspects.given, "camera_names", ())
                 other = phrase("hypothesis.camera", number=index + 1)
-                fields["camera"] = self.cameras[index] if index < len(self.cameras) else other
+                fields["camera"] = cameras[index] if index < len(cameras) else other
             return Phrase(f"hypothesis.{code}", fields)
         named, component = self.suspects.name(group), int(self.component[row])
         if component < 0:
@@ -142,7 +139,13 @@ class Hypotheses:
         """Return the unit of an error, behind a blank."""
         if self.code[row] == "observation":
             return f" {self.suspects.unit(int(self.suspects.row_starts[self.group[row]]))}".rstrip()
-        return self.units.get(str(self.code[row]), self.length)
+        units = {
+            **dict.fromkeys(("camera-f", "camera-point"), self.suspects.given.image_unit),
+            **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
+            **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
+            **dict.fromkeys(("time-offset", "readout-time"), self.times),
+        }
+        return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()
 
     @property
     def harmful(self) -> list[int]:
@@ -269,7 +272,8 @@ class Hypotheses:
         rows = np.arange(len(self.code)) if rows is None else rows
         none = Effect(False, np.empty((0, 3)), 0, 0, math.nan, None, math.nan)
         effects = [self.effects.get(row, none) for row in rows.tolist()]
-        at = [each.at and f"{self.axes[each.at[1]]} of {self.point_ids[each.at[0]]}" for each in effects]
+        ids = self.suspects.given.point_ids
+        at = [each.at and f"{self.axes[each.at[1]].name} of {ids[each.at[0]]}" for each in effects]
         columns = [
             *self._names(rows),
             column("redundancy", self.redundancy[rows], "Redundancy", decimals=4),
@@ -313,7 +317,6 @@ def hypotheses(
     trial: NetworkTrial,
     tests: Tests,
     facts: Facts,
-    given: Given,
     axes: Sequence[Axis],
     standing: tuple[float, float],
     limit: float,
@@ -384,17 +387,9 @@ def hypotheses(
         drawn=drawn,
         limit=limit,
         suspects=suspects,
-        cameras=getattr(given, "camera_names", ()),
         points=len(adjusted),
-        point_ids=given.point_ids,
-        axes=[axis.name for axis in axes],
-        units={
-            **dict.fromkeys(("camera-f", "camera-point"), f" {given.image_unit}"),
-            **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
-            **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
-            **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
-        },
-        length=f" {unit_written(axes[2].small)}",
+        axes=axes,
+        times="s" if timed else "exposures",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         single_odds=float(np.nanmax(odds[sets:], initial=of_images)),
     )

@@ -301,7 +301,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
         axes = self._terms().point_axes
         standing = found.standing.sum_and_freedom if self.KNOWN else self.sum_and_freedom
-        parts = found.trial, found.tests, facts, self.given, axes, standing, self.max_bias_ratio
+        parts = found.trial, found.tests, facts, axes, standing, self.max_bias_ratio
         return hypotheses(*parts, known=self.KNOWN)
 
     def _hypothesis_facts(self) -> dict[str, Any]:

@@ -306,7 +306,7 @@ class Rows(network_trial.BlockSuspects):
             return unknown.KIND, unknown.name, unknown.components[component]
         images = ("column", "row") if block.image_unit == "px" else ("x", "y")
         axes: dict[str, Sequence[str]] = {"image": images, "attitude": network_trial.ANGLES}
-        photos, points = self.touched(group)
+        points, photos = self.touched(group)
         of = [*(block.photo_ids[row] for row in photos), *(block.point_ids[row] for row in points)]
         return kind, *of, axes.get(kind, ("x", "y", "z"))[component]
 

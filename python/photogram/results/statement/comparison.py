@@ -317,18 +317,15 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
         factors = np.array([np.degrees(1.0) if axis.angle else 1.0 for axis in axes])
         x, y, z = ((axis.name, "deg" if axis.angle else axis.unit) for axis in axes)
         system = System("", (x, y, z), lambda positions: positions * factors)
-    observed = {each.point: each for each in block.observations.of_type(Control)}
     kinds = result.point_kinds.copy()
     positions, sd = block.point_positions.copy(), block.point_sd.copy()
-    for name, each in observed.items():
-        row = block.point_ids.index(name)
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    for each in block.observations.of_type(Control):
+        row = places[each.point]
         kinds[row], positions[row] = "control", np.asarray(each.position, dtype=float)
         sd[row] = np.sqrt(np.diag(each.precision))
-    survey = dict(zip(found.names, found.survey_sd, strict=True))
+    sd[[places[name] for name in found.names]] = found.survey_sd
     rows = in_order(block, np.flatnonzero(kinds != "pass"))
-    for row in rows.tolist():
-        if block.point_ids[row] in survey:
-            sd[row] = survey[block.point_ids[row]]
     return Survey(
         names=tuple(block.point_ids[row] for row in rows.tolist()),
         kinds=tuple(str(kinds[row]) for row in rows.tolist()),

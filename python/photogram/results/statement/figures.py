@@ -57,14 +57,11 @@ class Prediction:
     sum_of_squares_without_correlations: float  # Sum of d^2 / C_ii
 
     @property
-    def rejected_high(self) -> bool:
-        """Whether differences are larger than predicted."""
-        return self.rank > 0 and not self.p_high_f >= LEVEL / 2
-
-    @property
-    def rejected_low(self) -> bool:
-        """Whether differences are smaller than predicted."""
-        return self.rank > 0 and self.p_low < LEVEL / 2
+    def rejected(self) -> str | None:
+        """Whether differences are larger (`high`) or smaller (`low`) than predicted; None if they agree."""
+        if not self.rank > 0:
+            return None
+        return "high" if not self.p_high_f >= LEVEL / 2 else "low" if self.p_low < LEVEL / 2 else None
 
 
 @dataclass(frozen=True)

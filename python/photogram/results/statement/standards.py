@@ -225,7 +225,7 @@ class Lengths:
     lines: Sequence[str]
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
-    limit: length_tests.Limit | None
+    limit: tuple[float, float, float] | None  # A, K and B; B may be infinite
     test: length_tests.LengthTest
     expansion: float | None
 
@@ -349,7 +349,6 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
     turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
     if turned and asked.expansion is not None:
         measured = length_tests.at_reference(measured, temperatures, asked.expansion)
-    limit = None if asked.limit is None else length_tests.Limit(*asked.limit)
     extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
     ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
     lines = [str(each["line"]) for each in asked.lengths]
@@ -360,13 +359,13 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         covariance=covariance,
         sd=np.array([each["sd"] for each in asked.lengths], dtype=float),
         lines=lines,
-        limit=limit,
+        limit=asked.limit,
         diagonal=float(np.linalg.norm(extent)),
         off_diagonal=length_tests.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
-    return Lengths(lines, ends, calibrated, limit, test, asked.expansion if turned else None)
+    return Lengths(lines, ends, calibrated, asked.limit, test, asked.expansion if turned else None)
 
 
 def iso_measures(
