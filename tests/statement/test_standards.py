@@ -14,14 +14,13 @@ from message_codes import nested_codes
 from photogram import InputError
 from photogram.results.statement import standards
 from photogram.results.statement.lengths import (
-    Limit,
     angle_to_diagonal,
     at_reference,
     length_test,
     measured_lengths,
 )
 from photogram.results.statement.request import Asked
-from photogram.results.statement.standards import accuracy, nssda, three_d, verdict
+from photogram.results.statement.standards import accuracy, nssda, verdict
 from photogram.show.cells import written
 from photogram.statistics import effective_freedom
 
@@ -42,7 +41,8 @@ def figures():
         freedom = effective_freedom(joint[np.ix_(rows, rows)])
         own = root_mean_square(d[:, components]), root_mean_square(sd[:, components])
         found.append(accuracy(*own, freedom, 30))
-    return (*found, three_d(*found, effective_freedom(joint)))
+    both = (math.hypot(*(getattr(each, name) for each in found)) for name in ("found", "survey"))
+    return (*found, accuracy(*both, effective_freedom(joint), 30))
 
 
 def test_figures_of_the_asprs_are_those_of_the_golden_statement(figures):
@@ -54,9 +54,6 @@ def test_figures_of_the_asprs_are_those_of_the_golden_statement(figures):
         assert figure.rmse == pytest.approx(expected[f"rmse_{axis}"], rel=1e-6)
         assert figure.product == pytest.approx(expected["without_survey"][axis], rel=1e-6)
         assert figure.upper == pytest.approx(verdicts[f"upper_{axis}"], rel=1e-6)
-        limit = verdicts[f"class_{axis}_m"]
-        good = verdicts["survey_good_enough"][axis]
-        assert standards.survey_good_enough(figure.survey, limit) is good
     assert verdict(horizontal, 0.05) == verdicts["horizontal"]
     assert verdict(vertical, 0.05) == verdicts["vertical"]
     assert space.rmse == pytest.approx(expected["rmse_3d"], rel=1e-6)
@@ -153,10 +150,9 @@ def test_page_and_document_have_one_verdict_for_each_class(result, count):
 
 def test_control_is_to_be_twice_as_accurate_as_the_class():
     # In height the horizontal class holds, unless heights are a product.
-    assert standards.control_good_enough(0.025, 0.05, 0.05) == (True, True)
-    assert standards.control_good_enough(0.026, 0.051, 0.05) == (False, False)
-    assert standards.control_good_enough(0.01, 0.05, 0.05, 0.10) == (True, True)
-    assert standards.control_good_enough(0.01, 0.051, 0.05, 0.10) == (True, False)
+    assert standards.control_limits({"h": 0.05}) == {"h": 0.025, "v": 0.05}
+    assert standards.control_limits({"h": 0.05, "v": 0.20}) == {"h": 0.025, "v": 0.10}
+    assert standards.control_limits({"v": 0.20}) == {}
 
 
 def test_means_and_differences_beyond_the_class_are_remarks():
@@ -231,7 +227,7 @@ def of_bar(bar, **changed):
         "covariance": np.diag([row["sd_measured_mm"] ** 2 for row in rows]),
         "sd": np.array([row["sd_calibrated_mm"] for row in rows]),
         "lines": [row["line"] for row in rows],
-        "limit": Limit(limit["A_mm"], limit["K"], limit["B_mm"]),
+        "limit": (limit["A_mm"], limit["K"], limit["B_mm"]),
     }
     measured, calibrated = (
         np.array([row[f"{name}_mm"] for row in rows]) for name in ("measured", "calibrated")
@@ -307,25 +303,17 @@ def test_a_bar_without_expansion_or_at_the_reference_keeps_its_length(temperatur
     assert at_reference(np.array([2.0]), np.array([20.0]), expansion)[0] == 2.0
 
 
-def test_figures_have_the_numbers_of_the_measures_of_iso_19157():
-    values = {"bias": [0.01, -0.02, 0.03], "rmse": 0.04, "rmse_plan": 0.05, "ce90": None, "le95": 0.08}
-    found = standards.measures(
-        values, standards.ABSOLUTE, unit="m", date="2026-01-31", scope="30 check points"
-    )
-    assert [(each["measure_id"], each["value"]) for each in found] == [
-        (128, [0.01, -0.02, 0.03]),
-        (39, 0.04),
-        (47, 0.05),
-        (36, 0.08),
-    ]
+def test_figures_have_the_numbers_of_the_measures_of_iso_19157(result):
+    statement = result.statement(standards=["iso-19157"], date="2026-01-31", budgets=())
+    found = json.loads(statement.to_json())["iso_19157"]
+    assert [each["measure_id"] for each in found] == [128, 39, 47, 44, 45, 35, 36, 50]
+    assert found[1]["value"] == pytest.approx(statement.of_all.parts["all"].rmse)
+    assert {each["date"] for each in found} == {"2026-01-31"}
     assert set(found[0]) == {
         "element", "measure", "measure_id", "value", "unit", "evaluation", "date", "scope",
     }  # fmt: skip
     assert found[0]["element"] == standards.ABSOLUTE
     assert {each["evaluation"] for each in found} == {"direct external"}
-    assert json.loads(json.dumps(found)) == found
-    numbers = {key: number for key, (number, _) in standards.MEASURES.items()}
-    assert (numbers["le90"], numbers["ce90"], numbers["ce95"], numbers["ellipse"]) == (35, 44, 45, 50)
 
 
 @pytest.mark.parametrize(

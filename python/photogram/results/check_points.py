@@ -55,18 +55,16 @@ def check_points(result: Result) -> CheckPoints:
     block = result.block
     rows = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
     differences = result.point_differences[rows]
-    given, assumed = _given(block, rows, differences)
-    untested = "" if result.converged else "the adjustment has not converged"
-    if not result.photo_given_sd.any():
-        untested = "all photos are fixed, and no standard deviation has their errors"
-    if result.datum.is_chosen:
-        untested = "the datum of the network is chosen, and theirs is another"
-    if not len(rows):
-        untested = "there are none"
-    elif not np.isfinite(result.point_cofactors[rows]).all():
-        untested = untested or "covariances were not computed"
+    obstacles = {
+        "there are none": not len(rows),
+        "the datum of the network is chosen, and theirs is another": result.datum.is_chosen,
+        "all photos are fixed, and no standard deviation has their errors": not result.photo_given_sd.any(),
+        "the adjustment has not converged": not result.converged,
+        "covariances were not computed": not np.isfinite(result.point_cofactors[rows]).all(),
+    }
+    untested = next((reason for reason, holds in obstacles.items() if holds), "")
     names, sd = tuple(block.point_ids[row] for row in rows.tolist()), result.point_sd[rows]
-    found = CheckPoints(rows, names, differences, sd, given, assumed, untested)
+    found = CheckPoints(rows, names, differences, sd, *_given(block, rows, differences), untested)
     return found if untested else replace(found, agreement=_agreement(result, found))
 
 

@@ -64,19 +64,17 @@ class VarianceComponents(Judged, Documented, Brief):
 
     def plot(self) -> Plot:
         """Plot factors of standard deviations with 95 percent intervals; circles are fixed components."""
-        marks: list[Mark] = []
+        marks, values = list[Mark](), [1.0]
         for place, each in enumerate(self.components):
             at = np.array([[each.factor_of_sd, place]])
+            values.append(each.factor_of_sd)
             if each.held:
                 marks.append(Markers(at, "o", 6.0, FAINT, "none"))
                 continue
-            colour = MARKED if each.worth_changing else INK
-            ends = np.column_stack([np.sqrt(each.interval), [place, place]])
-            marks += [Line(ends, colour), Markers(at, "o", 6.0, colour)]
-        values = [each.factor_of_sd for each in self.components]
-        intervals = [np.sqrt(each.interval) for each in self.components if not each.held]
-        known = np.concatenate([values, *intervals, [1.0]])
-        known = known[np.isfinite(known) & (known > 0)]
+            colour, ends = MARKED if each.worth_changing else INK, each.interval_of_sd
+            marks += [Line(np.column_stack([ends, [place, place]]), colour), Markers(at, "o", 6.0, colour)]
+            values += ends
+        known = np.array([value for value in values if math.isfinite(value) and value > 0])
         up = (len(self.components) - 0.5, -0.5)
         limits = np.column_stack([(known.min() / MARGIN, known.max() * MARGIN), up])
         given = Line(np.column_stack([[1.0, 1.0], up]), FAINT, 0.8)
@@ -103,19 +101,13 @@ class VarianceComponents(Judged, Documented, Brief):
         test uses the given weights.
         """
         estimated = [
-            GroupFactor(
-                group=each.name,
-                factor=each.factor_of_sd,
-                interval=(math.sqrt(each.interval[0]), math.sqrt(each.interval[1])),
-                significant=each.worth_changing,
-            )
+            GroupFactor(each.name, each.factor_of_sd, each.interval_of_sd, each.worth_changing)
             for each in self.components
             if not each.held
         ]
-        given = self.first._findings()
         return replace(
             self.result._findings(),
-            global_test=given.global_test,
+            global_test=self.first._findings().global_test,
             components=estimated,
             if_usable=statement(self)[:1],
             if_withheld=(),
@@ -196,11 +188,10 @@ def statement(found: VarianceComponents) -> list[Phrase]:
         return [phrase("variance.not-converged")]
     messages = []
     for each in found.worth_changing:
-        factor, ends = each.factor_of_sd, [math.sqrt(end) for end in each.interval]
+        code, factor, (low, high) = "variance.small", each.factor_of_sd, each.interval_of_sd
         if factor < 1:
-            factor, ends = 1 / factor, [1 / end for end in reversed(ends)]
-        code = f"variance.{'small' if each.factor > 1 else 'large'}"
-        messages.append(phrase(code, group=each.name, factor=factor, low=ends[0], high=ends[1]))
+            code, factor, low, high = "variance.large", 1 / factor, 1 / high, 1 / low
+        messages.append(phrase(code, group=each.name, factor=factor, low=low, high=high))
     messages = messages or [phrase("variance.unchanged")]
     if estimate.equality is not None:
         ratio, freedom, probability = estimate.equality
@@ -225,15 +216,11 @@ class Bin:
     @classmethod
     def of(cls, each: GroupSum, value: float, factor: float) -> Self:
         """Return the bin of a group with the weights of the function."""
-        found, interval = math.nan, (math.nan, math.nan)
-        if each.test is not None:
-            found = factor * each.squares / each.redundancy
-            limits = [
-                _photocore.chi_square_quantile(OUTSIDE, each.freedom, upper=upper) / each.freedom
-                for upper in (True, False)
-            ]
-            interval = (found / limits[0], found / limits[1])
-        return cls(value, each.count, each.redundancy, found, interval)
+        if each.test is None:
+            return cls(value, each.count, each.redundancy, math.nan, (math.nan, math.nan))
+        found, quantile = factor * each.squares / each.redundancy, _photocore.chi_square_quantile
+        high, low = (quantile(OUTSIDE, each.freedom, upper=upper) / each.freedom for upper in (True, False))
+        return cls(value, each.count, each.redundancy, found, (found / high, found / low))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

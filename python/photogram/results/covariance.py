@@ -287,12 +287,10 @@ class Covariances:
         selected = self._adjusted.selected(selection)
         if all(kind != "step" for kind, _ in selected.rows):
             return selected.sd
-        found = []
-        for k in range(0, len(selected.rows), TOGETHER):
-            rows = selected.rows[k : k + TOGETHER]
-            cofactors = self._asked(partial(self._core.cofactors, rows, None, threads=0, progress=None))
-            found.append(np.sqrt(self._scale * np.diag(cofactors)))
-        return np.concatenate(found)
+        parts = [selected.rows[k : k + TOGETHER] for k in range(0, len(selected.rows), TOGETHER)]
+        ask = partial(self._core.cofactors, columns=None, threads=0, progress=None)
+        found = (self._asked(partial(ask, rows)) for rows in parts)
+        return np.sqrt(self._scale * np.concatenate([*map(np.diag, found)]))
 
     def propagate(
         self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.objects import require_name
 from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.datum import DatumRow, InnerConstraints
+from photogram.network.datum import DatumRow
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
 from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import RotationCoefficient
@@ -155,12 +154,6 @@ def _levelled(block: Block, held: int) -> Phrase | None:
         motions = ["place", "azimuth"] if beyond == 0 else ["turn", "shift"]
         return phrase("free.plumb-line", motions=[phrase(f"free.{name}") for name in motions + scale])
     return phrase("free.equal-heights") if kinds == {EqualHeight} and beyond == 1 else None
-
-
-def inner_datum(datum: object) -> InnerConstraints:
-    if not isinstance(datum, InnerConstraints):
-        raise argument_error("datum", "kind", kind="InnerConstraints", value=value_field(datum))
-    return datum
 
 
 def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None) -> DatumRow:

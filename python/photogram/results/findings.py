@@ -51,7 +51,7 @@ def network_findings(
     lost = None if summary is None else summary.downweighted
     test = _robust_test(result) if result.loss else result.global_test
     rejected = test is not None and (test.rejected_high or test.rejected_low)
-    assumed = [] if summary is None else summary.hypotheses.assumptions
+    assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
     return Findings(
         status=result.status,
@@ -124,6 +124,16 @@ def block_findings(result: Result) -> Findings:
     if few := int(np.count_nonzero(result.point_rays == 2)):
         fields = {"n": few, "all": int(np.count_nonzero(result.used_points))}
         unproved.append(Phrase("advice.two-rays", fields))
+    set_aside = iterate = None
+    if aside := result.set_aside:  # Images that the initial values removed and did not reinstate
+        images = sum(getattr(name, "code", "") == "named.image" for name in aside)
+        counts: dict[Text, tuple[int, int]] = {IMAGES: (images, images + len(result.image_points))}
+        set_aside = Removed([{"name": name} for name in aside], counts)
+    if result.status == "not converged":
+        weak = any(isinstance(each, Undetermined) for each in result.messages)
+        free = any(np.isinf(each.deviations).any() for each in result.block.cameras)
+        code = "advice.iterate-or-fix" if weak and free else "advice.iterate"
+        iterate = Phrase(code, {"n": len(result.iterations)})
     return replace(
         found,
         undetermined=left_open(result),
@@ -134,25 +144,15 @@ def block_findings(result: Result) -> Findings:
         duplicates=duplicates(result.block),
         hints=result.hints,
         exchanged=result.exchanged,
-        set_aside=_set_aside(result),
+        set_aside=set_aside,
         can_snoop=tests_more,
         weigh=Phrase("how.control"),
         calibrate=how_to_calibrate(result.block),
         check=Phrase("how.check.network"),
         take_out=Phrase("advice.snoop") if tests_more else None,
-        iterate=_iterated(result),
+        iterate=iterate,
         if_usable=unproved,
     )
-
-
-def _iterated(result: Result) -> Phrase | None:
-    """Return the remedy for exhausted iterations; None for other terminations."""
-    if result.status != "not converged":
-        return None
-    weak = any(isinstance(each, Undetermined) for each in result.messages)
-    free = any(np.isinf(each.deviations).any() for each in result.block.cameras)
-    code = "advice.iterate-or-fix" if weak and free else "advice.iterate"
-    return Phrase(code, {"n": len(result.iterations)})
 
 
 def left_open(result: AdjustedNetwork) -> list[str]:
@@ -167,21 +167,10 @@ def left_open(result: AdjustedNetwork) -> list[str]:
     return said or lengths
 
 
-def _set_aside(result: Result) -> Removed | None:
-    """Return the images that the initial values removed and did not reinstate."""
-    if not result.set_aside:
-        return None
-    images = sum(getattr(name, "code", "") == "named.image" for name in result.set_aside)
-    counts: dict[Text, tuple[int, int]] = {IMAGES: (images, images + len(result.image_points))}
-    return Removed([{"name": name} for name in result.set_aside], counts)
-
-
 def _on_checks(result: Result) -> list[Phrase]:
     """Return check points with assumed sd, and reasons for missing tests."""
     checks, axes = result.check_points, point_axes(result.block)
-    if not len(checks.rows):
-        return []
-    if checks.agreement is None:
+    if len(checks.rows) and checks.agreement is None:
         return [Phrase("line.checks-untested", {"reason": checks.untested})]
     if not checks.assumed.any():
         return []
@@ -195,10 +184,8 @@ def unseen(result: AdjustedNetwork) -> list[Phrase]:
     """Return the number of image coordinates without check by other observations."""
     redundancy = result.redundancy[chosen(result.used_images)]
     hidden = int(np.count_nonzero(redundancy <= TESTABLE))
-    if not hidden:
-        return []
     fields = {"hidden": hidden, "all": redundancy.size, "limit": TESTABLE}
-    return [Phrase("line.unseen", fields)]
+    return [Phrase("line.unseen", fields)] if hidden else []
 
 
 FEWEST = 4  # Equal image observations of two photos

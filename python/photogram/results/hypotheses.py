@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.unadjusted import Given
 from photogram.results.hypothesis_facts import NO_FACTS, Facts
 from photogram.results.network_trial import NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
@@ -99,12 +98,9 @@ class Hypotheses:
     drawn: Indices  # (d,) points whose changes effects contain
     limit: float  # Standard deviations from which on an undetected error of a point counts
     suspects: NamedSuspects
-    cameras: Sequence[str]  # names
     points: int  # number of adjusted points
-    point_ids: Sequence[str]
-    axes: Sequence[str]
-    units: Mapping[str, str]  # Units of the errors of types without a length
-    length: str  # Unit of all others
+    axes: Sequence[Axis]  # of the points
+    times: str  # Unit of errors of times
     single_odds: float  # Largest log odds of an error of a single observation, images among them
     excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
 
@@ -128,8 +124,9 @@ class Hypotheses:
         if group < 0:
             fields: dict[str, Any] = {"set": max(index, 0) + 1, "parameters": self.sets[row]["parameters"]}
             if index >= 0 and code in OF_CAMERAS:
+                cameras = getattr(self.suspects.given, "camera_names", ())
                 other = phrase("hypothesis.camera", number=index + 1)
-                fields["camera"] = self.cameras[index] if index < len(self.cameras) else other
+                fields["camera"] = cameras[index] if index < len(cameras) else other
             return Phrase(f"hypothesis.{code}", fields)
         named, component = self.suspects.name(group), int(self.component[row])
         if component < 0:
@@ -142,7 +139,13 @@ class Hypotheses:
         """Return the unit of an error, behind a blank."""
         if self.code[row] == "observation":
             return f" {self.suspects.unit(int(self.suspects.row_starts[self.group[row]]))}".rstrip()
-        return self.units.get(str(self.code[row]), self.length)
+        units = {
+            **dict.fromkeys(("camera-f", "camera-point"), self.suspects.given.image_unit),
+            **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
+            **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
+            **dict.fromkeys(("time-offset", "readout-time"), self.times),
+        }
+        return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()
 
     @property
     def harmful(self) -> list[int]:
@@ -178,19 +181,15 @@ class Hypotheses:
             return f"{abs(mdb[main]):.3g}{unit}", self.name(int(parts[main]))
         return f"{math.sqrt(squares.sum()):.3g}{unit}", self.name(row)
 
-    @property
-    def assumptions(self) -> list[Phrase]:
-        """Names of untested observations that define the datum."""
-        return self.assumed()
-
     def assumed(self, least: int = 0) -> list[Phrase]:
-        """Return these names; with `least`, only those whose errors move as many points or more."""
-        rows = [
-            row for row in range(len(self.sets)) if self.code[row] in DATUM and self.undetected(row) >= RARE
-        ]
-        if least:
-            rows = [row for row in rows if row in self.effects and self.effects[row].points >= least]
-        untested = {str(self.code[row]) for row in rows}
+        """Return untested observations that define the datum, or whose errors move `least` points or more."""
+        untested = {
+            str(self.code[row])
+            for row in range(len(self.sets))
+            if self.code[row] in DATUM
+            and self.undetected(row) >= RARE
+            and (not least or (row in self.effects and self.effects[row].points >= least))
+        }
         sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
         codes = [codes[0] for codes in sources if untested.intersection(codes)]
         return [phrase(f"datum.{code}") for code in codes]
@@ -202,13 +201,12 @@ class Hypotheses:
         """
         odds, sets = self.log_odds, range(len(self.sets))
         found = [k for k in sets if self.code[k] not in LENSES and self.probability[k] < DETECTION[0]]
-        found.sort(key=lambda row: -odds[row])
-        if not found or odds[found[0]] < max(self.single_odds, rivals):
-            return []
-        if self.statistic[found[0]] < EXPLAINED * self.excess:
+        first = max(found, key=lambda row: odds[row], default=0)
+        excess = EXPLAINED * self.excess
+        if not found or odds[first] < max(self.single_odds, rivals) or self.statistic[first] < excess:
             return []
         # A term of distortion may explain the same residuals better.
-        terms = [k for k in sets if self.code[k] == "camera-term" and odds[k] > odds[found[0]]]
+        terms = [k for k in sets if self.code[k] == "camera-term" and odds[k] > odds[first]]
         found = sorted([*terms, *found], key=lambda row: -odds[row])
         return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
@@ -255,13 +253,9 @@ class Hypotheses:
         ratios[[*self.effects]] = [effect.ratio for effect in self.effects.values()]
         return np.argsort(-ratios, kind="stable")[:LISTED]
 
-    @property
-    def every(self) -> Indices:
-        """All rows."""
-        return np.arange(len(self.code))
-
-    def tests(self, rows: Indices) -> Table:
-        """Return the declared table of the tests of some hypotheses."""
+    def tests(self, rows: Indices | None = None) -> Table:
+        """Return the declared table of the tests of all hypotheses, or of some."""
+        rows = np.arange(len(self.code)) if rows is None else rows
         columns = [
             *self._names(rows),
             column("dimension", self.rank[rows], "Parameters", decimals=0),
@@ -273,11 +267,13 @@ class Hypotheses:
         note = "Log odds compare an error of a plausible size with no error."
         return Table("hypotheses", "Tested hypotheses", columns, note)
 
-    def external_reliability(self, rows: Indices) -> Table:
-        """Return the declared table of undetected errors of some hypotheses, and of their effects."""
+    def external_reliability(self, rows: Indices | None = None) -> Table:
+        """Return the declared table of undetected errors and their effects, of all hypotheses or of some."""
+        rows = np.arange(len(self.code)) if rows is None else rows
         none = Effect(False, np.empty((0, 3)), 0, 0, math.nan, None, math.nan)
         effects = [self.effects.get(row, none) for row in rows.tolist()]
-        at = [each.at and f"{self.axes[each.at[1]]} of {self.point_ids[each.at[0]]}" for each in effects]
+        ids = self.suspects.given.point_ids
+        at = [each.at and f"{self.axes[each.at[1]].name} of {ids[each.at[0]]}" for each in effects]
         columns = [
             *self._names(rows),
             column("redundancy", self.redundancy[rows], "Redundancy", decimals=4),
@@ -321,7 +317,6 @@ def hypotheses(
     trial: NetworkTrial,
     tests: Tests,
     facts: Facts,
-    given: Given,
     axes: Sequence[Axis],
     standing: tuple[float, float],
     limit: float,
@@ -370,7 +365,10 @@ def hypotheses(
     for row, own in enumerate(rows):
         if (effect := own.pop("effect")) is not None:
             of_checks, of_points = np.split(np.reshape(effect[-1], (-1, 3)), [checks])
-            effects[row] = Effect(_is_checked(of_checks, check_sd), of_points, *effect[:-1])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratios = np.zeros(0) if check_sd is None else np.abs(of_checks) / check_sd
+            detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
+            effects[row] = Effect(detected, of_points, *effect[:-1])
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
     kind, index = of("group"), of("index")
@@ -389,17 +387,9 @@ def hypotheses(
         drawn=drawn,
         limit=limit,
         suspects=suspects,
-        cameras=getattr(given, "camera_names", ()),
         points=len(adjusted),
-        point_ids=given.point_ids,
-        axes=[axis.name for axis in axes],
-        units={
-            **dict.fromkeys(("camera-f", "camera-point"), f" {given.image_unit}"),
-            **dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad"),
-            **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
-            **dict.fromkeys(("time-offset", "readout-time"), " s" if timed else " exposures"),
-        },
-        length=f" {unit_written(axes[2].small)}",
+        axes=axes,
+        times="s" if timed else "exposures",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         single_odds=float(np.nanmax(odds[sets:], initial=of_images)),
     )
@@ -423,15 +413,6 @@ def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indic
     own = kinds >= 0
     found[own] = others[order[np.searchsorted(keys, (kinds * most + subjects)[own], sorter=order)]]
     return found
-
-
-def _is_checked(changes: Floats, check_sd: Floats | None) -> bool:
-    """Whether an error moves a check point by an amount that its test detects."""
-    if check_sd is None or not len(changes):
-        return False
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.abs(changes) / check_sd
-    return bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
 
 
 def largest_odds(tests: Iterable[Tested]) -> float:

@@ -26,7 +26,7 @@ from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import by_name, unknown_name
+from photogram.messages import by_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
@@ -59,19 +59,24 @@ class TermsTest:
     camera: str  # camera and its parameters
     names: tuple[str, ...]
     statistic: float  # T: increase of the weighted sum of squares without them, or decrease with them
-    # dimension, freedom: k, and the degrees of freedom of the unit variance with the terms; infinite if it is
-    # known
-    dimension: int
-    freedom: float
+    freedom: float  # Degrees of freedom of the unit variance with the terms; infinite if it is known
     scale: float  # Variance of unit weight of the test: 1 if it is known
-    probability: float  # Probability of a larger value under the null hypothesis
     # Their largest effect on an image, in its standard deviations; NaN for fixed terms
-    effect: float
+    effect: float = math.nan
+
+    @property
+    def dimension(self) -> int:
+        return len(self.names)
 
     @property
     def test_value(self) -> float:
         """T over its dimension and the variance of unit weight."""
         return self.statistic / self.scale / self.dimension
+
+    @property
+    def probability(self) -> float:
+        """The probability of a larger value under the null hypothesis."""
+        return tail_probability(self.statistic / self.scale, self.dimension, self.freedom)
 
     @property
     def significant(self) -> bool:
@@ -175,8 +180,7 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
     InputError
         If the camera does not exist, the terms are not estimated, or covariances are missing.
     """
-    found = _camera(result, camera)
-    rows = _rows(found, names)
+    found, rows = _camera(result, camera, names)
     if not set(rows) <= set(found.estimated):
         raise InputError(phrase("models.fixed", names=list(names), camera=found.name))
     if not np.isfinite(found.cofactors[np.ix_(rows, rows)]).all():
@@ -190,7 +194,7 @@ def joint_test(result: Result, camera: AdjustedCamera, names: Sequence[str]) -> 
     statistic = quadratic(camera.cofactors[np.ix_(rows, rows)], camera.values[rows])
     freedom = result.freedom_of_scale
     scale = result.covariance_scale if math.isfinite(freedom) else 1.0
-    return _tested(camera.name, names, statistic, freedom, scale)
+    return TermsTest(camera.name, tuple(names), statistic, freedom, scale)
 
 
 def score_test(
@@ -221,8 +225,7 @@ def score_test(
     block = result.block
     m = len(block.image_xy)
     if partials is None:
-        found = _camera(result, camera)
-        rows = _rows(found, names)
+        found, rows = _camera(result, camera, names)
         if set(rows) & set(found.estimated):
             raise InputError(phrase("models.estimated", names=list(names), camera=found.name))
         columns, title = _partials(result, found, rows), found.name
@@ -232,17 +235,15 @@ def score_test(
             raise InputError(phrase("models.partials", images=m, actual=str(columns.shape)))
         title = camera or ""
         names = tuple(names) or tuple(f"effect {k + 1}" for k in range(len(columns)))
-    used = result.used_images
-    b = np.where(used[:, np.newaxis], columns / block.image_sd, 0.0)
-    v = np.where(used[:, np.newaxis], result.residuals / block.image_sd, 0.0)
-    k = len(b)
+    used = result.used_images[:, np.newaxis]
+    b, v = (np.where(used, each / block.image_sd, 0.0) for each in (columns, result.residuals))
     statistic = score(factored(result), b, v)
     if statistic is None:
         raise InputError(phrase("models.inseparable", names=list(names)))
-    freedom = result.freedom_of_scale - k
-    omega = result.covariance_scale * (freedom + k) - statistic
+    freedom = result.freedom_of_scale - len(b)
+    omega = result.covariance_scale * result.freedom_of_scale - statistic
     scale = max(omega, 1e-12 * statistic) / freedom if 0 < freedom < math.inf else 1.0
-    return _tested(title, names, statistic, freedom, scale)
+    return TermsTest(title, tuple(names), statistic, freedom, scale)
 
 
 def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comparison:
@@ -347,34 +348,24 @@ def _corrected(camera: Camera, measured: Floats) -> Floats:
     return np.asarray(camera.parameters["c"] * u[:, :2] / u[:, 2:])
 
 
-def _camera(result: Result, name: str | None) -> AdjustedCamera:
+def _camera(result: Result, name: str | None, terms: Sequence[str]) -> tuple[AdjustedCamera, list[int]]:
+    """Return a camera, and the rows of its terms."""
     _require_block(result)
-    for each in result.cameras:
-        if each.name == name or (name is None and len(result.cameras) == 1):
-            return each
-    cameras = [each.name for each in result.cameras]
-    if name is None:
-        raise InputError(phrase("models.which-camera", names=cameras))
-    raise InputError(unknown_name("camera", name, cameras))
+    cameras = {each.name: each for each in result.cameras}
+    if name is None and len(cameras) != 1:
+        raise InputError(phrase("models.which-camera", names=list(cameras)))
+    name = next(iter(cameras)) if name is None else name
+    require_name("camera", name, cameras)
+    if isinstance(terms, str) or not terms:
+        raise argument_error("names", "kind", kind="a list of names", value=value_field(terms))
+    for term in terms:
+        require_name("parameter", str(term), cameras[name].names)
+    return cameras[name], [cameras[name].names.index(term) for term in terms]
 
 
 def _require_block(result: object) -> None:
     if not (isinstance(result, AdjustedNetwork) and hasattr(result, "block")):
         raise InputError(phrase("models.not-a-block", value=value_field(result)))
-
-
-def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:
-    if isinstance(names, str) or not names:
-        raise argument_error("names", "kind", kind="a list of names", value=value_field(names))
-    for name in names:
-        require_name("parameter", str(name), camera.names)
-    return [camera.names.index(name) for name in names]
-
-
-def _tested(camera: str, names: Sequence[str], statistic: float, freedom: float, scale: float) -> TermsTest:
-    k = len(names)
-    probability = tail_probability(statistic / scale, k, freedom)
-    return TermsTest(camera, tuple(names), statistic, k, freedom, scale, probability, math.nan)
 
 
 def tail_probability(value: float, k: int, freedom: float) -> float:
@@ -402,9 +393,8 @@ def _model(name: str, result: Result, known: bool) -> Model:
 
 def _all_freedom(result: Result) -> int:
     """Return observations minus unknowns, for any basis of the unit variance."""
-    if result.redundancies is not None:
-        return round(result.redundancies.total)
-    return round(result.degrees_of_freedom)
+    sums = result.redundancies
+    return round(result.degrees_of_freedom if sums is None else sums.total)
 
 
 def _is_within(small: Result, large: Result) -> bool:

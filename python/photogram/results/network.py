@@ -301,7 +301,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
         axes = self._terms().point_axes
         standing = found.standing.sum_and_freedom if self.KNOWN else self.sum_and_freedom
-        parts = found.trial, found.tests, facts, self.given, axes, standing, self.max_bias_ratio
+        parts = found.trial, found.tests, facts, axes, standing, self.max_bias_ratio
         return hypotheses(*parts, known=self.KNOWN)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
@@ -325,8 +325,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         AdjustmentError
             If the adjustment has not converged or has no redundancy.
         """
-        found = self._hypotheses()
-        return found.tests(found.every).frame()
+        return self._hypotheses().tests().frame()
 
     def external_reliability(self) -> pd.DataFrame:
         """Return effects of undetected errors as a data frame, a row for each hypothesis.
@@ -340,8 +339,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         AdjustmentError
             As in :meth:`hypotheses`.
         """
-        found = self._hypotheses()
-        return found.external_reliability(found.every).frame()
+        return self._hypotheses().external_reliability().frame()
 
     def with_max_bias_ratio(self, ratio: float | None) -> Self:
         """Return the result with a verdict that permits larger or smaller effects of undetected errors.

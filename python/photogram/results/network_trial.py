@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,6 +13,7 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
+from photogram.network.motion import on_shared
 from photogram.network.observations import Observation
 from photogram.network.unadjusted import Given
 from photogram.results.observation_kinds import kind_words, named_observation
@@ -131,13 +131,12 @@ class NetworkTrial:
 
     def stand(self) -> Standing:
         """Use the final state of the adjustment; with a loss, adjust without removed observations."""
-        if self.out is not None:
-            rows, photos = self.out.rows, sorted(self.out.photos)
-            options = {"tolerance": self.exact, "progress": None}
-            found = self.asked(self.core.adjust, rows, sorted(self.out.points), photos, **options)
-        else:
-            found = self.core.stand()
-        status, _, omega, freedom, collapsed = found
+        out, options = self.out, {"tolerance": self.exact, "progress": None}
+        status, _, omega, freedom, collapsed = (
+            self.core.stand()
+            if out is None
+            else self.asked(self.core.adjust, out.rows, sorted(out.points), sorted(out.photos), **options)
+        )
         if collapsed:
             raise LostSupportError(collapsed, [])
         return Standing(status, omega, freedom)
@@ -190,13 +189,10 @@ class NamedSuspects(ABC):
         lengths: Sequence[str],
     ) -> None:
         kinds, subjects = (values.astype(np.int64) for values in core.subjects)
-        points, photos = np.full(len(kinds), -1), np.full(len(kinds), -1)
-        image, control = kinds == IMAGE, kinds == CONTROL
+        image, station = kinds == IMAGE, (kinds == POSITION) | (kinds == ATTITUDE)
+        points, photos = (np.where(own, subjects, -1) for own in (kinds == CONTROL, station))
         points[image] = given.image_points[subjects[image]]
         photos[image] = given.image_photos[subjects[image]]
-        points[control] = subjects[control]
-        station = (kinds == POSITION) | (kinds == ATTITUDE)
-        photos[station] = subjects[station]
         self.row_starts: Indices = core.row_starts  # (G + 1,) first row of each group
         self.kinds, self.kind_names = kinds, KINDS  # (G,) types by their numbers: `image`, `control`, ...
         self.subjects = subjects  # (G,) number of the image, point, observation, ... of a group
@@ -288,29 +284,20 @@ LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a pa
 
 def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
     deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
-    # Photos with other observations do not need their images.
-    shared = {each.photo for each in block.timed if each.trajectory is not None}
-    on_shared = np.array([name in shared for name in block.photo_ids], dtype=bool)
-    return NetworkTrial(
-        core=core,
-        suspects=BlockSuspects(block, core.suspects),
-        supported=np.asarray(np.isfinite(deviations).all(axis=1) | on_shared),
-        rough=EXACT if _datum_is_loose(block) else ROUGH,
-        exact=EXACT,
-        control="plan and height" if parts else "whole",
-    )
-
-
-def _datum_is_loose(block: Block) -> bool:
-    """Whether only weak weights of photos define the datum of a block.
-
-    The standard deviations of its unknowns are then those of the datum. A step may be small relative to them
-    and leave partials that contradict the cofactors by hundreds.
-    """
+    # If only weak weights of photos define the datum, standard deviations of unknowns are those of the datum.
+    # A step may be small relative to them, and leave partials that contradict the cofactors by hundreds.
     position_sd = block.photo_position_sd[:, :2]
     extent = np.ptp(block.photo_positions[:, :2], axis=0).max(initial=0.0)
     firm = np.isfinite(block.point_sd).any() or (position_sd < LOOSE * extent).any()
-    return bool(np.isfinite(position_sd).any() and not firm)
+    return NetworkTrial(
+        core=core,
+        suspects=BlockSuspects(block, core.suspects),
+        # Photos with other observations do not need their images.
+        supported=np.asarray(np.isfinite(deviations).all(axis=1) | on_shared(block)),
+        rough=EXACT if np.isfinite(position_sd).any() and not firm else ROUGH,
+        exact=EXACT,
+        control="plan and height" if parts else "whole",
+    )
 
 
 def observations_of_core(block: Block) -> list[Observation]:
@@ -329,20 +316,11 @@ class BlockSuspects(NamedSuspects):
         self.block = block
         self.observations = observations_of_core(block)
 
-    @cached_property
-    def point_row(self) -> dict[str, int]:
-        """The row of each point; computed on demand because blocks may be large."""
-        return {name: row for row, name in enumerate(self.block.point_ids)}
-
-    @cached_property
-    def photo_row(self) -> dict[str, int]:
-        return {name: row for row, name in enumerate(self.block.photo_ids)}
-
     def touched(self, group: int) -> tuple[list[int], list[int]]:
         if self.kinds[group] != OBSERVATION:
             return super().touched(group)
-        own = self.observations[int(self.subjects[group])]
-        return [self.point_row[name] for name in own.points], [self.photo_row[name] for name in own.photos]
+        own, block = self.observations[int(self.subjects[group])], self.block
+        return [*map(block.point_ids.index, own.points)], [*map(block.photo_ids.index, own.photos)]
 
     def type(self, kind: int, subject: int) -> Phrase:
         return type_name(kind, self.observations[subject].label if kind == OBSERVATION else "")

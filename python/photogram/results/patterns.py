@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -80,8 +81,7 @@ def patterns(
     w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)[used]
     if not np.isfinite(w).any():
         return []
-    factor = float(np.nanmedian(np.abs(w))) / MEDIAN
-    if not factor > 0:
+    if not (factor := float(np.nanmedian(np.abs(w))) / MEDIAN) > 0:
         return []
     # ~v = w sqrt(r) of clipped w; 0 if untested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
@@ -149,18 +149,12 @@ def _of_camera(
     x, y = (each * size for each, size in zip(found.largest, scale.tolist(), strict=True))
     place = {"x": float(found.at[0]), "y": float(found.at[1])}
     fields = {"camera": camera.name, "rms": float(found.rms), "dx": float(x), "dy": float(y), "unit": unit}
-    sentence, dof = Phrase("pattern.frame", {**fields, **place}), (found.dof,)
-    kind = Phrase("test.frame", {"camera": camera.name})
-    return _systematic(found, kind, sentence, ("B", "chi2", dof), large=found.rms > NOTABLE)
-
-
-def _systematic(
-    found: Any, kind: Phrase, sentence: Phrase, law: tuple[str, str, tuple[float, ...]], **more: Any
-) -> Systematic:
-    """Return a test by its result, statistic, distribution and freedom."""
-    own = {"value": found.statistic, "probability": found.probability, "level": LEVEL_OF_PATTERNS}
-    names = dict(zip(("statistic", "distribution", "dof"), law, strict=True))
-    return Systematic(kind=kind, sentence=sentence, **{**own, **names, **more})
+    sentence, kind = (
+        Phrase("pattern.frame", {**fields, **place}),
+        Phrase("test.frame", {"camera": camera.name}),
+    )
+    test = "B", "chi2", (found.dof,), found.statistic, found.probability, LEVEL_OF_PATTERNS
+    return Systematic(kind, sentence, *test, large=found.rms > NOTABLE)
 
 
 def _of_photos(
@@ -169,18 +163,10 @@ def _of_photos(
     statistics, probabilities = group_patterns(image_photos, len(photos), xy, residuals, redundancy)
     if np.isnan(probabilities).all():
         return None
-    worst, tested = int(np.nanargmin(probabilities)), int(np.isfinite(probabilities).sum())
-    return Systematic(
-        kind=Phrase("test.photo"),
-        subject=str(photos[worst]),
-        sentence=Phrase("pattern.photo", {"photo": str(photos[worst])}),
-        statistic="c'C^-1c",
-        distribution="chi2",
-        dof=(6.0,),
-        value=float(statistics[worst]),
-        probability=float(probabilities[worst]),
-        level=bonferroni(LEVEL, tested),
-    )
+    worst, level = int(np.nanargmin(probabilities)), bonferroni(LEVEL, int(np.isfinite(probabilities).sum()))
+    name, values = str(photos[worst]), (float(statistics[worst]), float(probabilities[worst]))
+    kind, sentence = Phrase("test.photo"), Phrase("pattern.photo", {"photo": name})
+    return Systematic(kind, sentence, "c'C^-1c", "chi2", (6.0,), *values, level, subject=name)
 
 
 def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | None:
@@ -198,24 +184,21 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
     two, three = (100 * float(share) for share in found.beyond)
     tails = "heavier" if found.excess > 0 else "lighter"
     fields = {"excess": float(found.excess), "two": two, "three": three}
-    sentence, law = Phrase(f"pattern.{tails}-tails", fields), ("A^2", "Anderson-Darling", ())
+    sentence = Phrase(f"pattern.{tails}-tails", fields)
     notable = found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
     p = found.probability if notable else max(found.probability, LEVEL_OF_PATTERNS)
-    return _systematic(found, Phrase("test.normality"), sentence, law, probability=p)
+    test = "A^2", "Anderson-Darling", (), found.statistic, p, LEVEL_OF_PATTERNS
+    return Systematic(Phrase("test.normality"), sentence, *test)
 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:
     """Test the heights of control for bending over the area."""
     w = np.where(result.point_redundancy > TESTABLE, result.point_standardized, math.nan)[:, 2]
-    tested = np.isfinite(w)
-    if not tested.any():
+    tested, plan = np.isfinite(w), result.point_positions[:, :2]
+    if not (tested.any() and np.ptp(plan[tested], axis=0).any()):
         return None
-    plan = result.point_positions[:, :2] - result.point_positions[tested, :2].mean(axis=0)
-    extent = float(np.abs(plan[tested]).max())
-    if not extent > 0:
-        return None
-    plan = plan / extent
-    x, y = plan.T
+    plan = plan - plan[tested].mean(axis=0)
+    x, y = (plan / np.abs(plan[tested]).max()).T
     design = np.column_stack([np.ones(len(w)), x, y, x * x, x * y, y * y])
     return _regressed("bending", regression(w, design, tested))
 
@@ -224,7 +207,8 @@ def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | N
     if found is None:
         return None
     sentence = Phrase(f"pattern.{code}", {**fields, "rms": float(found.rms)})
-    return _systematic(found, Phrase(f"test.{code}", fields), sentence, ("F", "F", found.dof))
+    test = "F", "F", found.dof, found.statistic, found.probability, LEVEL_OF_PATTERNS
+    return Systematic(Phrase(f"test.{code}", fields), sentence, *test)
 
 
 @dataclass(frozen=True)
@@ -297,45 +281,35 @@ def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[D
         clipped = _clipped(w, redundancy, float(np.nanmedian(np.abs(w))) / MEDIAN)
         return np.array([value(clipped) for *_, value in tests])
 
-    found = values(result.residuals / block.image_sd)
+    found, drawn = values(result.residuals / block.image_sd), list[Floats]()
     random, core = np.random.default_rng(seed), factored(result)
-    drawn: list[Floats] = []
-    while len(drawn) < draws:
-        count = min(TOGETHER, draws - len(drawn))
+    while count := min(TOGETHER, draws - len(drawn)):
         errors = np.where(used[:, np.newaxis], random.normal(size=(count, *block.image_xy.shape)), 0.0)
         drawn += [values(each) for each in core.project_images(errors, threads=0, progress=None)]
     tested = []
     for (name, statistic, _), value, by_chance in zip(tests, found.tolist(), np.array(drawn).T, strict=True):
         if math.isfinite(value):
             strong = int((by_chance <= value if statistic == "d" else by_chance >= value).sum())
-            sd = float(by_chance.std(ddof=1)) if draws > 1 else math.nan
-            p = (1 + strong) / (1 + draws)
-            mean = float(by_chance.mean())
-            tested.append(DrawnPattern(name, statistic, value, mean, sd, p, draws))
+            sd, p = float(by_chance.std(ddof=1)) if draws > 1 else math.nan, (1 + strong) / (1 + draws)
+            tested.append(DrawnPattern(name, statistic, value, float(by_chance.mean()), sd, p, draws))
     return tested
 
 
 def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
-    block = result.block
-    tested = (redundancy > 0).any(axis=1)
+    block, photos = result.block, result.block.image_photos
+    tested, xy = (redundancy > 0).any(axis=1), focal_images(result.block)
+
+    def bins(own: Indices, v: Floats) -> float:
+        pattern = frame_pattern(xy[own], v[own], redundancy[own])
+        return math.nan if pattern is None else pattern.statistic
+
+    def alike(own: Indices, v: Floats) -> float:
+        return moran(xy[own], photos[own], v[own])
+
     found: list[_Pattern] = []
     for camera in _cameras(result):
-        own = np.flatnonzero(camera.photos[block.image_photos] & tested)
-        xy, on, r = focal_images(block)[own], block.image_photos[own], redundancy[own]
-
-        def bins(v: Floats, own: Indices = own, xy: Floats = xy, r: Floats = r) -> float:
-            pattern = frame_pattern(xy, v[own], r)
-            return math.nan if pattern is None else pattern.statistic
-
-        def alike(v: Floats, own: Indices = own, xy: Floats = xy, on: Indices = on) -> float:
-            return moran(xy, on, v[own])
-
-        found += [
-            (f"pattern over the frame of {camera.name}", "B", bins),
-            (f"neighbours in the frame of {camera.name}", "I", alike),
-        ]
-
-    def along(v: Floats) -> float:
-        return durbin_watson(block.image_photos, len(block.photo_ids), v, redundancy)
-
+        own = np.flatnonzero(camera.photos[photos] & tested)
+        found.append((f"pattern over the frame of {camera.name}", "B", partial(bins, own)))
+        found.append((f"neighbours in the frame of {camera.name}", "I", partial(alike, own)))
+    along = partial(durbin_watson, photos, len(block.photo_ids), redundancy=redundancy)
     return [*found, ("one photo and the next", "d", along)]

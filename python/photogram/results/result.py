@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.arguments.objects import require_kind
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
@@ -20,14 +21,7 @@ from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import timed_photos
 from photogram.results.check_points import CheckPoints, check_points, point_kinds
 from photogram.results.covariance import Adjusted, Failure, adjusted
-from photogram.results.datum import (
-    ResultDatum,
-    datum_messages,
-    datum_of,
-    inner_datum,
-    refused,
-    relative_datum,
-)
+from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused, relative_datum
 from photogram.results.films import OnFilm
 from photogram.results.iteration import Redundancies, SumsOfSquares
 from photogram.results.network import AdjustedNetwork
@@ -285,7 +279,8 @@ class Result(OnFilm, AdjustedNetwork):
         OutOfMemoryError, KeyboardInterrupt
             As in :meth:`covariances`.
         """
-        return self._in(datum_row(self.block, inner_datum(datum)))
+        require_kind("datum", datum, InnerConstraints)
+        return self._in(datum_row(self.block, datum))
 
     def relative_to(self, *, photo: str | None = None, points: Sequence[str] | None = None) -> Self:
         """Return the result with covariances relative to a photo or to points.

@@ -17,6 +17,7 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.results.network_trial import NamedSuspects, NetworkTrial
 
+LN10 = math.log(10)
 MAX_ROWS = 1500  # Largest number of rows for the complete R; an exact round has this number of solutions
 NEAR = 3.0  # Likelihood ratio of alternatives in the log
 ODDS = 20.0  # Largest likelihood ratio of alternatives
@@ -79,6 +80,15 @@ class Removal:
     def name(self) -> str:
         """Name of the group in English."""
         return str(self.subject)
+
+    @property
+    def log10_p(self) -> float:
+        return self.log_probability / LN10
+
+    @property
+    def prediction_log10_p(self) -> float | None:
+        log_p = self.prediction_log_probability
+        return None if log_p is None else log_p / LN10
 
     @property
     def is_out(self) -> bool:
@@ -181,7 +191,7 @@ def snooped(
     if errors:
         remarks.append(phrase("snooping.common", errors=list(errors)))
     return Outcome(
-        log=[names.removal(**removal) for removal in log["removals"]],
+        log=[names.removal(removal) for removal in log["removals"]],
         rounds=[
             Round(number, status, omega, freedom, log["tests"], limit, removed, returned)
             for number, (status, omega, freedom), limit, removed, returned in log["rounds"]
@@ -202,22 +212,9 @@ class _Names:
     def __init__(self, suspects: NamedSuspects, aside: Aside | None) -> None:
         self.suspects, self.aside = suspects, aside
 
-    def removal(
-        self,
-        *,
-        group: int,
-        photo: int | None,
-        rows: list[int],
-        error: list[float],
-        error_sd: list[float],
-        rivals: list[tuple[int, float, int, float]],
-        consequences: list[tuple[str, list[float]]],
-        prediction: tuple[float, float, list[float]] | None,
-        kept: str | None,
-        **values: Any,
-    ) -> Removal:
+    def removal(self, entry: dict[str, Any]) -> Removal:
         """Return an entry of the log of the core with names and units."""
-        suspects = self.suspects
+        suspects, group, rows, photo = self.suspects, entry["group"], entry["rows"], entry.pop("photo")
         components = tuple(map(suspects.row_name, rows))
         if photo is not None:
             subject = Phrase("named.whole", suspects.photo_name(photo).fields)
@@ -226,36 +223,33 @@ class _Names:
             subject = Phrase("named.parts", {"axes": axes, "named": suspects.name(group)})
         else:
             subject = suspects.name(group)
-        predicted: dict[str, Any] = {}
-        if prediction is not None:
+        if entry["prediction"] is not None:
             names = ("prediction", "prediction_log_probability", "prediction_error")
-            predicted = dict(zip(names, (*prediction[:2], tuple(prediction[2])), strict=True))
-        return Removal(
-            group=group,
-            kind=suspects.kind(group) if photo is None else "photo",
-            subject=subject,
-            rows=tuple(rows),
-            components=components,
-            units=tuple(map(suspects.unit, rows)),
-            error=tuple(error),
-            error_sd=tuple(error_sd),
-            rivals=tuple(Rival(str(suspects.name(rival)), t, rank, odds) for rival, t, rank, odds in rivals),
-            consequences=tuple(self._consequence(*each) for each in consequences),
-            kept=KEPT[kept] if kept else "",
-            **predicted,
-            **values,
-        )
+            entry |= dict(zip(names, entry["prediction"], strict=True))
+        entry |= {
+            "kind": suspects.kind(group) if photo is None else "photo",
+            "subject": subject,
+            "components": components,
+            "units": tuple(map(suspects.unit, rows)),
+            "rivals": [Rival(str(suspects.name(rival)), *values) for rival, *values in entry["rivals"]],
+            "consequences": [self._consequence(*each) for each in entry["consequences"]],
+            "kept": KEPT[entry["kept"]] if entry["kept"] else "",
+        }
+        fields: dict[str, Any] = {
+            name: tuple(own) if isinstance(own, list) else own for name, own in entry.items()
+        }
+        return Removal(**fields)
 
     def _consequence(self, code: str, values: list[float]) -> Phrase | str:
-        fields: dict[str, Any] = {}
         if code == "contradicted" and self.aside is not None:
             return self.aside.photos[int(values[0])]
+        fields: dict[str, Any] = {}
         if code == "single-ray":
-            fields = {"name": self.suspects.name(int(values[0]))}
+            fields["name"] = self.suspects.name(int(values[0]))
         elif code == "median":
-            fields = dict(zip(("median", "usual"), values, strict=True))
+            fields["median"], fields["usual"] = values
         elif code == "singly":
-            fields = dict(zip(("removed", "images"), map(int, values), strict=True))
+            fields["removed"], fields["images"] = map(int, values)
         return Phrase(f"snooping.{code}", fields)
 
     def remark(
@@ -286,16 +280,10 @@ def disputes(log: Sequence[Removal]) -> list[Phrase]:
     needed.sort(key=lambda each: -each.statistic)
     if len(needed) > 1:
         first, *others = needed
-        rivals = [
-            Rival(
-                each.name,
-                each.statistic,
-                each.dimension,
-                math.exp(min(first.statistic - each.statistic, 1e3) / 2),
-            )
-            for each in others
-        ]
-        if near := [rival for rival in rivals if rival.odds < ODDS]:
+        odds = [math.exp(min(first.statistic - each.statistic, 1e3) / 2) for each in others]
+        rivals = zip(others, odds, strict=True)
+        near = [Rival(each.name, each.statistic, each.dimension, own) for each, own in rivals if own < ODDS]
+        if near:
             found.append(_alternatives(first, near))
     return found
 

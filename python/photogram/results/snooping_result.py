@@ -185,7 +185,6 @@ def recorded(found: Snooped) -> Snooped:
     return replace(found, result=replace(found.result, snooped=record))
 
 
-LN10 = math.log(10)
 _COLUMNS = (
     *("round", "kind", "name", "component", "unit", "error", "error_sd"),
     *("dimension", "first_T", "T", "F", "log10_p", "limit_p", "redundancy"),
@@ -209,8 +208,6 @@ def _rows(entry: Removal, member: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def log_table(log: Sequence[Removal]) -> Table:
-    log_p = np.array([each.log_probability for each in log], dtype=float)
-    after = [each.prediction_log_probability for each in log]
     rivals = [
         [members(one, "name", T="statistic") | members(one, "dimension", "odds") for one in each.rivals]
         for each in log
@@ -224,12 +221,12 @@ def log_table(log: Sequence[Removal]) -> Table:
         *members_of_each(log, prediction_T="prediction", predicted_error="prediction_error"),
         Quantity([[*map(str, each.consequences)] for each in log], member="consequences"),
         *members_of_each(log, "dimension", first_T="first_statistic", T="statistic", F="fisher"),
-        Quantity(np.exp(log_p), member="p"),
-        Quantity(log_p / LN10, member="log10_p"),
+        Quantity(np.exp([each.log_probability for each in log]), member="p"),
+        of_each(log, "log10_p"),
         of_each(log, "limit", member="limit_p"),
         of_each(log, "redundancy", head="Redundancy", decimals=3),
         Quantity(rivals, member="rivals"),
-        Quantity([None if each is None else each / LN10 for each in after], member="prediction_log10_p"),
+        of_each(log, "prediction_log10_p"),
         of_each(log, "returned"),
         Quantity([str(each.kept) or None for each in log], member="kept"),
         Quantity([rivals_of(each.rivals[:3], 2) for each in log], kind="name", head="Or instead"),
@@ -239,20 +236,16 @@ def log_table(log: Sequence[Removal]) -> Table:
 
 
 def _tests_table(log: Sequence[Removal]) -> Table:
-    nothing = math.nan
-    after = [(each.prediction, each.prediction_log_probability) for each in log]
     columns = [
         of_each(log, "name", kind="name", head="What"),
         of_each(log, "first_statistic", head="T at first", decimals=2),
         of_each(log, "statistic", head="T", decimals=2),
         of_each(log, "dimension", head="Dimension", decimals=0),
         of_each(log, "fisher", head="F", decimals=2),
-        Quantity([each.log_probability / LN10 for each in log], head="log10 p", decimals=1),
+        of_each(log, "log10_p", head="log10 p", decimals=1),
         Quantity([math.log10(each.limit) for each in log], head="Limit", decimals=1),
-        Quantity([nothing if t is None else t for t, _ in after], head="T against the rest", decimals=2),
-        Quantity(
-            [nothing if log_p is None else log_p / LN10 for _, log_p in after], head="log10 p", decimals=1
-        ),
+        of_each(log, "prediction", head="T against the rest", decimals=2),
+        of_each(log, "prediction_log10_p", head="log10 p", decimals=1),
     ]
     return Table("removed-tests", "Tests", columns)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -52,37 +53,27 @@ class Tests:
     @cached_property
     def normal(self) -> list[ComponentTests]:
         """Standardized residuals w of all components, type by type."""
-        result, terms = self._result, self._terms
-        photos, points = terms.photos, terms.points
-        of_photos, of_points, every = result.given.image_photos, result.image_points, slice(None)
-
-        def image(row: int) -> Phrase:
-            point, photo = points[of_points[row]], photos[of_photos[row]]
-            return phrase("named.point", point=str(point), photo=str(photo))
-
-        def control(row: int) -> Phrase:
-            return phrase("named.control", point=str(points[row]))
-
-        def station(row: int) -> Phrase:
-            return phrase("named.photo", photo=str(photos[row]))
+        result, terms, given = self._result, self._terms, self._result.given
 
         def of_network(
-            title: Phrase, kind: str, what: str, name: Callable[[int], Phrase], groups: Mapping[str, slice]
+            title: str, kind: str, what: str, code: str, groups: Mapping[str, slice], **of: Any
         ) -> ComponentTests:
+            def name(row: int) -> Phrase:
+                return phrase(code, **{each[:-1]: str(getattr(terms, each)[of[each][row]]) for each in of})
+
             axes = {"image": terms.image_axes, "control": terms.point_axes, "station": terms.photo_axes}[kind]
             names = (f"{what or 'image_'}given_sd", f"{what}redundancy", f"{what}standardized")
             values = getattr(result, f"{what}residuals"), *(getattr(result, each) for each in names)
-            return _component_tests(title, kind, axes, name, values, groups)
+            return replace(_component_tests(phrase(title), kind, axes, name, values, groups), **of)
 
-        images = of_network(phrase("test.image_coordinates"), "image", "", image, {"images": every})
-        of_control = phrase("test.components_of_control")
-        controls = of_network(of_control, "control", "point_", control, {"control": every})
-        parts = {"positions": slice(3), "attitudes": slice(3, None)}
-        stations = of_network(phrase("test.components_of_stations"), "station", "photo_", station, parts)
+        every, images = slice(None), {"photos": given.image_photos, "points": result.image_points}
+        points, photos = (np.arange(len(names)) for names in (terms.points, terms.photos))
+        control, poses = {"control": every}, {"positions": slice(3), "attitudes": slice(3, None)}
+        titles = ("test.image_coordinates", "test.components_of_control", "test.components_of_stations")
         found = [
-            replace(images, photos=of_photos, points=of_points),
-            replace(controls, points=np.arange(len(points))),
-            replace(stations, photos=np.arange(len(photos))),
+            of_network(titles[0], "image", "", "named.point", {"images": every}, **images),
+            of_network(titles[1], "control", "point_", "named.control", control, points=points),
+            of_network(titles[2], "station", "photo_", "named.photo", poses, photos=photos),
         ]
         for each in terms.kinds:
             title = phrase("test.components", kind=kind_words(each.kind))

@@ -120,17 +120,13 @@ class AdjustedTrajectory:
         )
         covariances = np.empty((len(times), 6, 6))
         shapes = axes.reshape(-1, 3, 3), jacobians.reshape(-1, 3, 3)
-        for row in range(len(times)):
+        for row, parts in enumerate(zip(of_position, of_rotation, strict=True)):
             names, partials = list[str](), [np.zeros((6, 0))]
-            for part, (active, own) in enumerate(
-                zip((of_position[row], of_rotation[row]), shapes, strict=True)
-            ):
-                first, values = active
-                for k, value in enumerate(values):
-                    by = np.zeros((6, 3))
-                    by[3 * part : 3 * part + 3] = value * own[row]
-                    names.append(self.given.coefficients[part][first + k].name)
-                    partials.append(by)
+            for part, ((first, values), own) in enumerate(zip(parts, shapes, strict=True)):
+                by = np.zeros((6, 3, len(values)))
+                by[3 * part : 3 * part + 3] = own[row][:, :, np.newaxis] * values
+                names += [each.name for each in self.given.coefficients[part][first : first + len(values)]]
+                partials.append(by.transpose(0, 2, 1).reshape(6, -1))
             t = np.hstack(partials)
             covariances[row] = t @ self.joint(names) @ t.T if names else 0.0
         return TrajectoryPoses(times, positions, attitudes.reshape(-1, 3, 3), covariances)
@@ -228,37 +224,31 @@ def restarted_motion(
     for key, each in found.items():
         for before, after in zip(each.given.coefficients, moved[key].coefficients, strict=True):
             coefficients |= {id(one): other for one, other in zip(before, after, strict=True)}
+
+    def flown(own: Timed, trajectory: Trajectory) -> Timed:
+        if own.trajectory is not None:
+            return replace(own, trajectory=moved[id(own.trajectory)])
+        each = found[id(trajectory)]
+        return replace(
+            own,
+            velocity=np.where(np.isinf(own.sd_velocity), each.position[1], own.velocity),
+            rotation_rate=np.where(np.isinf(own.sd_rate), each.rotation[1], own.rotation_rate),
+        )
+
+    def changed(own: Observation) -> Observation:
+        changes: dict[str, Any] = {}
+        if isinstance(own, Smoothness):
+            changes["coefficients"] = [coefficients[id(each)] for each in own.coefficients]
+        elif isinstance(own, Prior) and isinstance(own.unknown, Coefficient):
+            changes["unknown"] = coefficients[id(own.unknown)]
+        elif own.moment is not None:
+            changes["trajectory"] = moved[id(own.moment.trajectory)]
+        return replace(own, **changes) if changes else own
+
     return block.replace(
-        timed=[
-            _flown(each, found[id(own)], moved)
-            for each, own in zip(block.timed, block.trajectories, strict=True)
-        ],
-        observations=[_observed(each, moved, coefficients) for each in block.observations],
+        timed=[*map(flown, block.timed, block.trajectories)],
+        observations=[*map(changed, block.observations)],
     )
-
-
-def _flown(own: Timed, adjusted: AdjustedTrajectory, moved: dict[int, Trajectory]) -> Timed:
-    if own.trajectory is not None:
-        return replace(own, trajectory=moved[id(own.trajectory)])
-    velocity, rate = adjusted.position[1], adjusted.rotation[1]
-    return replace(
-        own,
-        velocity=np.where(np.isinf(own.sd_velocity), velocity, own.velocity),
-        rotation_rate=np.where(np.isinf(own.sd_rate), rate, own.rotation_rate),
-    )
-
-
-def _observed(
-    own: Observation, moved: dict[int, Trajectory], coefficients: dict[int, Coefficient]
-) -> Observation:
-    if isinstance(own, Smoothness):
-        return replace(own, coefficients=[coefficients[id(each)] for each in own.coefficients])
-    if isinstance(own, Prior) and isinstance(own.unknown, Coefficient):
-        return replace(own, unknown=coefficients[id(own.unknown)])
-    if own.moment is not None:
-        changes: dict[str, Any] = {"trajectory": moved[id(own.moment.trajectory)]}
-        return replace(own, **changes)
-    return own
 
 
 STEPS = 8  # Positions in each interval of knots, or for each coefficient of a polynomial

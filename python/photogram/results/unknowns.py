@@ -24,6 +24,17 @@ _PLACED = {"lever arm", "shift", "drift", "instrument", "level", "sensor", "posi
 _PLACED |= {"rotation coefficient", "gyro bias", "readout", "bend", "knot"}
 _NUMBERS = {"film placement", "film size", "film bend", "roll"}
 _NUMBERS |= {"fiducial", "pattern", "scanner", "scanner curve"}
+_PLACES = {
+    "x": 0,
+    "y": 1,
+    "z": 2,
+    "scale": 0,
+    "constant": 1,
+    "height": 2,
+    "offset": 0,
+    "time": 0,
+    "factor": 0,
+}
 _ARRAYS = ("change", "position", "attitude", "cofactors", "covariance", "with_former", "redundancy")
 
 
@@ -76,17 +87,12 @@ class AdjustedUnknown:
     @property
     def values(self) -> Floats:
         """(k,) its components of `position`, or else `change`."""
-        own = {"x": 0, "y": 1, "z": 2, "scale": 0, "constant": 1, "height": 2}
-        own |= {"offset": 0, "time": 0, "factor": 0}
         if self.kind in _NUMBERS:
             return self.position[: len(self.components)]
         if self.kind not in _PLACED:
             return self.change
-        found = [
-            self.position[own[name]] if name in own else self.change[k]
-            for k, name in enumerate(self.components)
-        ]
-        return np.array(found)
+        pairs = zip(self.components, self.change, strict=True)
+        return np.array([self.position[_PLACES[name]] if name in _PLACES else own for name, own in pairs])
 
     @property
     def standardized(self) -> Floats:

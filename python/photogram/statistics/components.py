@@ -95,6 +95,10 @@ class Component:
         return math.sqrt(self.factor)
 
     @property
+    def interval_of_sd(self) -> tuple[float, float]:
+        return math.sqrt(self.interval[0]), math.sqrt(self.interval[1])
+
+    @property
     def worth_changing(self) -> bool:
         """Whether it is significant and far enough from 1 to affect weights."""
         low, high = WORTH_CHANGING

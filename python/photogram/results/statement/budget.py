@@ -292,26 +292,23 @@ class Rows(network_trial.BlockSuspects):
     def named(self, row: int) -> tuple[str, ...]:
         """Return the type of a row, its items, and its component."""
         group = int(np.searchsorted(self.row_starts, row, "right")) - 1
-        kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        kind, subject = self.kind(group), int(self.subjects[group])
         block, component = self.block, int(self.components[row])
-        if kind == network_trial.IMAGE:
-            axes = ("column", "row") if block.image_unit == "px" else ("x", "y")
-            photo, point = self.photos[group], self.points[group]
-            return "image", block.photo_ids[photo], block.point_ids[point], axes[component]
-        if kind == network_trial.CONTROL:
-            return "control", block.point_ids[subject], "xyz"[component]
-        if kind in (network_trial.POSITION, network_trial.ATTITUDE):
-            own = ("x", "y", "z") if kind == network_trial.POSITION else ("omega", "phi", "kappa")
-            return network_trial.KINDS[kind], block.photo_ids[subject], own[component]
-        if kind == network_trial.OBSERVATION:
+        if kind == "observation":
             observation = self.observations[subject]
             names = observation.components(geographic=block.geographic)
             return kind_of(observation.label), *observation.of, names[component].lower()
-        if network_trial.KINDS[kind] == "camera":
+        if kind == "camera":
             parameters = block.cameras[subject].names if block.cameras else ("c",)
-            return "camera", block.camera_names[subject], parameters[component]
-        unknown = block.unknowns[subject]
-        return unknown.KIND, unknown.name, unknown.components[component]
+            return kind, block.camera_names[subject], parameters[component]
+        if kind == "unknown":
+            unknown = block.unknowns[subject]
+            return unknown.KIND, unknown.name, unknown.components[component]
+        images = ("column", "row") if block.image_unit == "px" else ("x", "y")
+        axes: dict[str, Sequence[str]] = {"image": images, "attitude": network_trial.ANGLES}
+        points, photos = self.touched(group)
+        of = [*(block.photo_ids[row] for row in photos), *(block.point_ids[row] for row in points)]
+        return kind, *of, axes.get(kind, ("x", "y", "z"))[component]
 
     def groups(self, grouping: Grouping) -> Indices:
         """Return (M,) the group of each row in a grouping; -1 for none."""

@@ -250,11 +250,8 @@ def _survey_covariance(sd: Floats, asked: Asked) -> Floats:
     known = np.nan_to_num(sd).ravel()
     survey = np.diag(known**2)
     if not asked.survey_common_in_control:
-        inside = np.isfinite(sd).astype(float) * asked.survey_common_sd
-        for k in range(3):
-            one = np.zeros(sd.shape)
-            one[:, k] = inside[:, k]
-            survey += np.outer(one.ravel(), one.ravel())
+        for k, common in enumerate((np.isfinite(sd) * np.array(asked.survey_common_sd)).T):
+            survey[k::3, k::3] += np.outer(common, common)
     return survey
 
 
@@ -320,18 +317,15 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
         factors = np.array([np.degrees(1.0) if axis.angle else 1.0 for axis in axes])
         x, y, z = ((axis.name, "deg" if axis.angle else axis.unit) for axis in axes)
         system = System("", (x, y, z), lambda positions: positions * factors)
-    observed = {each.point: each for each in block.observations.of_type(Control)}
     kinds = result.point_kinds.copy()
     positions, sd = block.point_positions.copy(), block.point_sd.copy()
-    for name, each in observed.items():
-        row = block.point_ids.index(name)
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    for each in block.observations.of_type(Control):
+        row = places[each.point]
         kinds[row], positions[row] = "control", np.asarray(each.position, dtype=float)
         sd[row] = np.sqrt(np.diag(each.precision))
-    survey = dict(zip(found.names, found.survey_sd, strict=True))
+    sd[[places[name] for name in found.names]] = found.survey_sd
     rows = in_order(block, np.flatnonzero(kinds != "pass"))
-    for row in rows.tolist():
-        if block.point_ids[row] in survey:
-            sd[row] = survey[block.point_ids[row]]
     return Survey(
         names=tuple(block.point_ids[row] for row in rows.tolist()),
         kinds=tuple(str(kinds[row]) for row in rows.tolist()),
@@ -381,28 +375,20 @@ def leave_one_out(result: Result) -> list[LeftOut]:
     control = np.flatnonzero(result.used_points & held_by)
     residuals = result.point_residuals
     for row in in_order(block, control).tolist():
-        name = block.point_ids[row]
-        q = result.point_cofactors[row]
-        turn = turned_to_east(block, result.point_positions[row : row + 1])[0]
-        if name in observed:
-            given, own = np.asarray(observed[name].position, dtype=float), observed[name].precision
-            root = np.asarray(np.linalg.cholesky(own), dtype=np.float64)
-            # In geographic blocks they are along east, north, up already.
-            factor = root if block.geographic else turn @ root
-            v = turn @ (given - result.point_positions[row])
-            found.append(_predicted(name, np.arange(3), v, factor, turn @ q @ turn.T, result))
-            continue
-        held = np.flatnonzero(np.isfinite(block.point_sd[row]) & (block.point_sd[row] > 0))
+        name, axes = block.point_ids[row], turned_to_east(block, result.point_positions[row : row + 1])[0]
+        if (own := observed.get(name)) is not None:
+            held, v = np.arange(3), np.asarray(own.position, dtype=float) - result.point_positions[row]
+            root = np.asarray(np.linalg.cholesky(own.precision), dtype=np.float64)
+        else:
+            held = np.flatnonzero(np.isfinite(block.point_sd[row]) & (block.point_sd[row] > 0))
+            v, root = residuals[row, held], np.diag(block.point_sd[row, held])
+            if len(held) < 3:  # Weighted along the axes of the block, which is not geocentric
+                axes = np.diag(np.diag(axes)[held])
         if len(held):
-            # Weighted along the axes of the block; all axes of geocentric blocks are transformed together.
-            sd, v = block.point_sd[row, held], residuals[row, held]
-            if len(held) == 3:
-                whole = turn @ np.diag(sd)
-                found.append(_predicted(name, held, turn @ v, whole, turn @ q @ turn.T, result))
-            else:
-                units = np.diag(turn)[held]
-                inside = np.outer(units, units) * q[np.ix_(held, held)]
-                found.append(_predicted(name, held, units * v, np.diag(units * sd), inside, result))
+            # In geographic blocks, observed covariances are along east, north, up already.
+            factor = root if own is not None and block.geographic else axes @ root
+            q = axes @ result.point_cofactors[row][np.ix_(held, held)] @ axes.T
+            found.append(_predicted(name, held, axes @ v, factor, q, result))
     return found
 
 

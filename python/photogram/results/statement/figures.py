@@ -12,6 +12,7 @@ are tested by T_i = d_i' C_ii^-1 d_i, and given all others by y_i' (C^-1)_ii^-1 
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -56,14 +57,11 @@ class Prediction:
     sum_of_squares_without_correlations: float  # Sum of d^2 / C_ii
 
     @property
-    def rejected_high(self) -> bool:
-        """Whether differences are larger than predicted."""
-        return self.rank > 0 and not self.p_high_f >= LEVEL / 2
-
-    @property
-    def rejected_low(self) -> bool:
-        """Whether differences are smaller than predicted."""
-        return self.rank > 0 and self.p_low < LEVEL / 2
+    def rejected(self) -> str | None:
+        """Whether differences are larger (`high`) or smaller (`low`) than predicted; None if they agree."""
+        if not self.rank > 0:
+            return None
+        return "high" if not self.p_high_f >= LEVEL / 2 else "low" if self.p_low < LEVEL / 2 else None
 
 
 @dataclass(frozen=True)
@@ -182,14 +180,6 @@ def prediction(found: Compared, part: str) -> Prediction | None:
     )
 
 
-def _inverse(covariance: Floats) -> Floats:
-    scale = scale_of(covariance)
-    scaled = covariance / np.outer(scale, scale)
-    if root_of(scaled) is not None:
-        return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale))
-    return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True) / np.outer(scale, scale))
-
-
 def bias(found: Compared, component: str, k: float) -> Bias | None:
     """Test the mean of `e`, `n` or `h` with coverage factor k, or None."""
     d, covariance = found.of(component)
@@ -244,9 +234,11 @@ def point_tests(found: Compared) -> PointTests:
     dimension = counted.sum(axis=1).astype(float)
     statistic, others = np.full(n, np.nan), np.full(n, np.nan)
     rows = np.flatnonzero(counted.ravel())
-    whole = found.covariance[np.ix_(rows, rows)]
-    d = found.differences.ravel()[rows]
-    inverse = _inverse(whole) if len(rows) else whole
+    d, whole = found.differences.ravel()[rows], found.covariance[np.ix_(rows, rows)]
+    inverse, scale = whole, np.outer(scale_of(whole), scale_of(whole))
+    if len(rows):
+        singular = root_of(whole / scale) is None
+        inverse = (_pseudo_inverse if singular else np.linalg.inv)(whole / scale) / scale
     y = inverse @ d
     firsts = np.searchsorted(rows // 3, np.arange(n))
     for size in np.unique(dimension[dimension > 0]).astype(int).tolist():
@@ -272,10 +264,12 @@ def point_tests(found: Compared) -> PointTests:
     )
 
 
+_pseudo_inverse = partial(np.linalg.pinv, rcond=SINGULAR, hermitian=True)
+
+
 def _each(matrices: Floats, vectors: Floats) -> Floats:
     """Return v' M^+ v of each of (n, k, k) matrices and (n, k) vectors."""
-    inverse = np.linalg.pinv(matrices, rcond=SINGULAR, hermitian=True)
-    return np.asarray(np.einsum("ni,nij,nj->n", vectors, inverse, vectors))
+    return np.asarray(np.einsum("ni,nij,nj->n", vectors, _pseudo_inverse(matrices), vectors))
 
 
 PROBABILITIES = (0.9, 0.95)

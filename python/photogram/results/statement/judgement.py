@@ -99,10 +99,10 @@ def judged(found: Statement) -> Judged:
     texts, asprs, lengths = found.texts, found.standards.asprs, found.standards.lengths
     test = None if lengths is None else lengths.test
     whole = None if test is None else test.together
-    high, low = _rejected(found.of_all)
+    side = _side(found.of_all)
     holds = {
-        "high": high,
-        "low": low,
+        "high": side == "high",
+        "low": side == "low",
         "missed": test is not None and test.met is False,
         "met": test is not None and bool(test.met),
         "lengths": whole is not None and (whole.rejected_high or whole.rejected_low),
@@ -134,10 +134,9 @@ def _whole(of_all: Figures) -> Prediction | None:
     return of_all.prediction["all"] or of_all.prediction["h"] or of_all.prediction["plan"]
 
 
-def _rejected(of_all: Figures | None) -> tuple[bool, bool]:
-    """Return whether differences are larger, or smaller, than predicted."""
+def _side(of_all: Figures | None) -> str | None:
     whole = None if of_all is None else _whole(of_all)
-    return (False, False) if whole is None else (whole.rejected_high, whole.rejected_low)
+    return None if whole is None else whole.rejected
 
 
 def _doubtful(of_all: Figures | None) -> bool:
@@ -147,7 +146,7 @@ def _doubtful(of_all: Figures | None) -> bool:
     parts = [each for each in of_all.prediction.values() if each is not None]
     shifts = [each for each in of_all.bias.values() if each is not None]
     return (
-        any(each.rejected_high or each.rejected_low for each in parts)
+        any(each.rejected for each in parts)
         or any(each.rejected for each in shifts)
         or (of_all.surface is not None and of_all.surface.rejected)
         or bool(of_all.points.wrong.any())
@@ -195,9 +194,10 @@ def _lengths(of: Statement) -> Iterator[Sentence]:
     if found.limit is None or test.within is None:
         yield "lengths.found", own
     else:
-        limit = f"{texts.length(found.limit.constant)} + {texts.significant(found.limit.slope, 2)} L"
-        if math.isfinite(found.limit.most):
-            limit += f" ≤ {texts.length(found.limit.most)}"
+        constant, slope, most = found.limit
+        limit = f"{texts.length(constant)} + {texts.significant(slope, 2)} L"
+        if math.isfinite(most):
+            limit += f" ≤ {texts.length(most)}"
         beyond = int((~test.within).sum())
         yield f"lengths.{'missed' if beyond else 'met'}", {**own, "limit": limit, "beyond": beyond}
     if test.together is not None:
@@ -211,14 +211,12 @@ def _honest(found: Statement) -> Iterator[Sentence]:
     if of_all is None:
         yield "honest.none", {}
         return
-    whole = _whole(of_all)
-    high, low = _rejected(of_all)
-    if whole is not None:
+    if (whole := _whole(of_all)) is not None:
         fields = {"n": whole.points, **_factor(whole.factor_of_sd, whole.factor_interval_95)}
-        yield f"honest.{'high' if high else 'low' if low else 'yes'}", fields
+        yield f"honest.{whole.rejected or 'yes'}", fields
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
-        if own is not None and (own.rejected_high or own.rejected_low):
+        if own is not None and own.rejected:
             fields = _factor(own.factor_of_sd, own.factor_interval_95)
             yield "honest.part", {"component": texts(f"component.{part}"), **fields}
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
@@ -311,9 +309,7 @@ def _asprs_remarks(found: Statement, own: Asprs) -> Iterator[Sentence]:
     for name, good in own.control_good_enough.items():
         rmse = own.control_rmse[name]
         if not good and math.isfinite(rmse):
-            # The limit is half a class; without vertical class, the full horizontal one.
-            limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
-            yield f"asprs.control.{name}", {"sd": rmse, "limit": texts.size(limit)}
+            yield f"asprs.control.{name}", {"sd": rmse, "limit": texts.size(own.control_limits[name])}
     for each in own.remarks[:NAMED]:
         fields = {"component": texts(f"component.{each.component}"), **members(each, "value", "limit")}
         if each.point is None:
@@ -351,7 +347,7 @@ def _weights(found: Statement) -> Iterator[Sentence]:
     if components is not None:
         parts = [
             f"{texts.kind(each.name)} x {texts.number(each.factor_of_sd, 2)}"
-            f" ({texts.number(each.interval[0] ** 0.5, 2)} – {texts.number(each.interval[1] ** 0.5, 2)})"
+            f" ({' – '.join(texts.number(end, 2) for end in each.interval_of_sd)})"
             for each in components.components
             if not each.held
         ]

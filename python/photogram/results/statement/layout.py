@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
 
@@ -63,12 +63,16 @@ def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
     heights, known = (each[np.isfinite(each)] for each in (extent[:, 2], points[:, 2]))
     span = np.ptp(heights) if heights.size else 0.0
     quadrants = np.bincount(above[:, 0] + 2 * above[:, 1], minlength=4) / len(own)
+    middles = (np.arange(CELLS) + 0.5) / CELLS
+    grid = low + (high - low) * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
+    inside = grid[~outside(grid, hull(block))]
+    far = _photocore.nearest_points(inside, own, FAR * diagonal) < 0
     return Layout(
         len(own),
         diagonal,
         (float(quadrants[0]), float(quadrants[1]), float(quadrants[2]), float(quadrants[3])),
         _least_spacing(own) / diagonal,
-        _far(own, block, FAR * diagonal),
+        float(np.mean(far)) if len(inside) else math.nan,
         float(np.ptp(known) / span) if known.size and span > 0 else math.nan,
         int(outside(own, hull(control[:, :2])).sum()) if len(control) else len(own),
     )
@@ -87,14 +91,3 @@ def _least_spacing(plan: Floats) -> float:
         return 0.0
     neighbours = _photocore.nearest_points(plan, plan, reach, np.arange(len(plan)))
     return float(np.hypot(*(plan - plan[neighbours]).T).min())
-
-
-def _far(plan: Floats, block: Floats, limit: float) -> float:
-    """Return the share of block area farther from all points than a limit."""
-    low, extent = block.min(axis=0), np.ptp(block, axis=0)
-    middles = (np.arange(CELLS) + 0.5) / CELLS
-    grid = low + extent * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
-    inside: Bools = ~outside(grid, hull(block))
-    if not inside.any():
-        return math.nan
-    return float(np.mean(_photocore.nearest_points(grid[inside], plan, limit) < 0))

@@ -24,20 +24,6 @@ ALONG = math.radians(15.0)  # Largest angle between a line and a diagonal of the
 REFERENCE = 20.0  # Temperature of calibrated lengths, degrees Celsius
 
 
-@dataclass(frozen=True)
-class Limit:
-    """The error limit of a length L: A + K L, at most B; A, B and L in the same unit."""
-
-    # A, K and B; B may be infinite
-    constant: float
-    slope: float
-    most: float = math.inf
-
-    def of(self, lengths: Floats) -> Floats:
-        """Return (m,) error limits of lengths, in their unit."""
-        return np.minimum(self.constant + self.slope * lengths, self.most)
-
-
 @dataclass(frozen=True, eq=False)
 class LengthTest:
     """m measured lengths against calibrated ones."""
@@ -135,7 +121,7 @@ def length_test(
     covariance: Floats,
     sd: Floats,
     lines: Sequence[str],
-    limit: Limit | None = None,
+    limit: tuple[float, float, float] | None = None,
     diagonal: float = math.nan,
     off_diagonal: float = math.nan,
     freedom: float = math.inf,
@@ -143,19 +129,19 @@ def length_test(
     """Test (m,) measured lengths against calibrated ones, both at 20 degrees.
 
     `covariance` is the (m, m) matrix of the measured lengths (:func:`measured_lengths`), `sd` are (m,)
-    standard deviations of the calibrated ones, `lines` (m,) names of their lines. `diagonal` and
-    `off_diagonal` belong to the measured volume: its diagonal, and the smallest angle between a length and it
-    (:func:`angle_to_diagonal`); NaN if unknown. `freedom` are degrees of freedom of the estimated unit weight
-    of the covariance.
+    standard deviations of the calibrated ones, `lines` (m,) names of their lines. `limit` are A, K and B (may
+    be infinite) of error limits A + K L, at most B. `diagonal` and `off_diagonal` belong to the measured
+    volume: its diagonal, and the smallest angle between a length and it; NaN if unknown. `freedom` are
+    degrees of freedom of the estimated unit weight of the covariance.
     """
-    errors = measured - calibrated
+    errors, (constant, slope, most) = measured - calibrated, limit or (0.0, 0.0, math.inf)
     found = agreement(errors[:, np.newaxis], covariance, sd[:, np.newaxis, np.newaxis] ** 2, second=freedom)
     spread = found.sd[:, 0]
     return LengthTest(
         errors=errors,
         sd=spread,
         normalised=np.divide(errors, spread, out=np.full(errors.shape, math.nan), where=spread > 0),
-        limits=None if limit is None else limit.of(calibrated),
+        limits=None if limit is None else np.minimum(constant + slope * calibrated, most),
         together=found.together,
         lines=len(set(lines)),
         least=min(lines.count(each) for each in set(lines)),

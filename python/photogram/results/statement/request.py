@@ -31,9 +31,10 @@ def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> Inp
     return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
 
 
-def _positive(name: str, value: float) -> None:
-    if not 0 < value < math.inf:
+def _positive(name: str, value: Any) -> float:
+    if not 0 < (found := number(name, value)) < math.inf:
         raise invalid(name, "error.positive", value)
+    return found
 
 
 def _text(name: str, value: object) -> str:
@@ -153,8 +154,8 @@ class Asked:
     """
 
     standards: tuple[str, ...] = _option(_several, default=("asprs-2023", "plain"))
-    classes: Mapping[str, float] = _option(_by_name(number), default_factory=dict)
-    area: float | None = _option(number)
+    classes: Mapping[str, float] = _option(_by_name(_positive), default_factory=dict)
+    area: float | None = _option(_positive)
     sd: tuple[float, ...] | None = _option(_three)
     without: Mapping[str, str] = _option(_by_name(_text), default_factory=dict)
     independent: str | None = None
@@ -204,9 +205,8 @@ class Asked:
     def _check(self) -> None:
         for standard in self.standards:
             require_name("standard", standard, STANDARDS)
-        for name, size in self.classes.items():
+        for name in self.classes:
             one_of("a class", name, ("h", "v", "3d"))
-            _positive(f"class {name}", size)
         if self.independent is not None:
             one_of("independent", self.independent, INDEPENDENT)
         if not 0 < self.coverage < 1:
@@ -215,8 +215,6 @@ class Asked:
             raise invalid("expansion", "error.finite", self.expansion)
         if "vdi-2634" in self.standards and not self.lengths:
             raise InputError(phrase("error.requires", name="vdi-2634", other=phrase("request.lengths")))
-        if self.area is not None:
-            _positive("area", self.area)
         for point, reason in self.without.items():
             if not reason.strip():
                 raise InputError(phrase("request.reason", point=point))

@@ -13,7 +13,7 @@ standard adds the errors of the survey again: correct for common errors, otherwi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -86,16 +86,6 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
     return Accuracy(count, found, survey, math.hypot(found, survey), math.hypot(upper, survey), product)
 
 
-def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accuracy:
-    """Return RMSE_3D, the root of RMSE_H^2 + RMSE_V^2, of the NVA or the VVA area.
-
-    `freedom` are effective degrees of freedom of all rows together.
-    """
-    found = math.hypot(horizontal.found, vertical.found)
-    survey = math.hypot(horizontal.survey, vertical.survey)
-    return accuracy(found, survey, freedom, min(horizontal.count, vertical.count))
-
-
 def verdict(figure: Accuracy | None, limit: float) -> str:
     """Return the verdict on a class in the linear unit.
 
@@ -119,24 +109,11 @@ def wording(count: int) -> str:
     return "produced" if count else "none"
 
 
-def survey_good_enough(survey: float, limit: float) -> bool:
-    """Return whether a check survey has RMSE_2 <= N/2, half of the class (7.12).
-
-    RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
-    """
-    return survey <= limit / 2
-
-
-def control_good_enough(
-    plan: float, height: float, class_h: float, class_v: float | None = None
-) -> tuple[bool, bool]:
-    """Return whether control is accurate enough in plan and in height (7.9).
-
-    `plan` and `height` are root mean squares of its standard deviations, radial in plan, in the linear unit.
-    The limits are half of the horizontal and vertical classes; the full horizontal class for height without a
-    vertical class.
-    """
-    return plan <= class_h / 2, height <= (class_h if class_v is None else class_v / 2)
+def control_limits(classes: Mapping[str, float]) -> dict[str, float]:
+    """Return limits of the RMSE of control in plan (radial) and height (7.9); empty without class `h`."""
+    if "h" not in classes:
+        return {}
+    return {"h": classes["h"] / 2, "v": classes["v"] / 2 if "v" in classes else classes["h"]}
 
 
 def remarks(
@@ -148,24 +125,17 @@ def remarks(
     with the class divided by the root of 2. `differences` are (n, 3) east, north, height: adjusted minus
     given, in the linear unit; NaN if not given. Classes are None unless requested.
     """
-    axis = None if class_h is None else class_h / math.sqrt(2)
-    limits = {"e": axis, "n": axis, "h": class_v}
-    return tuple(
-        remark
-        for (component, limit), column in zip(limits.items(), differences.T, strict=True)
-        if limit is not None
-        for remark in _beyond(component, limit, column)
-    )
-
-
-def _beyond(component: str, limit: float, values: Floats) -> Iterator[Remark]:
-    """Yield values above the limits of an axis: the mean, then single differences."""
-    known = np.flatnonzero(np.isfinite(values))
-    mean = float(values[known].mean()) if known.size else 0.0
-    if abs(mean) > MEAN_SHARE * limit:
-        yield Remark("mean", component, mean, MEAN_SHARE * limit)
-    for row in known[np.abs(values[known]) > MOST_TIMES * limit].tolist():
-        yield Remark("difference", component, float(values[row]), MOST_TIMES * limit, row)
+    axis, found = None if class_h is None else class_h / math.sqrt(2), list[Remark]()
+    for component, limit, values in zip("enh", (axis, axis, class_v), differences.T, strict=True):
+        if limit is None:
+            continue
+        known = np.flatnonzero(np.isfinite(values))
+        mean, most = float(values[known].mean()) if known.size else 0.0, MOST_TIMES * limit
+        if abs(mean) > MEAN_SHARE * limit:
+            found.append(Remark("mean", component, mean, MEAN_SHARE * limit))
+        beyond = known[np.abs(values[known]) > most].tolist()
+        found += [Remark("difference", component, float(values[row]), most, row) for row in beyond]
+    return tuple(found)
 
 
 ENOUGH = 20  # Required check points
@@ -199,13 +169,19 @@ class Asprs:
     # Square kilometres; number of check points that the standard requires
     area: float
     points_asked: int
-    # Whether survey and control are accurate enough for the classes, by `h` and `v`
-    survey_good_enough: Mapping[str, bool]
-    control_good_enough: Mapping[str, bool]
+    survey_good_enough: Mapping[
+        str, bool
+    ]  # Whether the survey has half of the classes (7.12), by `h` and `v`
+    control_limits: Mapping[str, float]
     # Root mean squares of the standard deviations of control, radial in plan, and in height; linear unit
     control_rmse: Mapping[str, float]
     remarks: tuple[Remark, ...]  # Means and differences to investigate first
     leave_one_out: Mapping[str, float]  # RMSE of control predicted by the others, `h` and `v`; NaN without
+
+    @property
+    def control_good_enough(self) -> dict[str, bool]:
+        """Whether control is accurate enough for the classes, by `h` and `v`."""
+        return {name: self.control_rmse[name] <= limit for name, limit in self.control_limits.items()}
 
     def member(self, asked: Asked, metre: float) -> dict[str, Any]:
         found: dict[str, Any] = dict.fromkeys(_METRES_OF.values())
@@ -249,7 +225,7 @@ class Lengths:
     lines: Sequence[str]
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
-    limit: length_tests.Limit | None
+    limit: tuple[float, float, float] | None  # A, K and B; B may be infinite
     test: length_tests.LengthTest
     expansion: float | None
 
@@ -291,10 +267,6 @@ def asprs_figures(
     counts = [0 if own is None else own.count for own in (figures["h"], figures["v"])]
     plan, height = _control_rmse(result)
     d = np.array([each.difference for each in left_out]).reshape(-1, 3)
-    control: dict[str, bool] = {}
-    if "h" in classes:
-        good = control_good_enough(plan, height, classes["h"], classes.get("v"))
-        control = dict(zip(("h", "v"), good, strict=True))
     return Asprs(
         figures=figures,
         verdicts=verdicts,
@@ -302,11 +274,11 @@ def asprs_figures(
         area=km2,
         points_asked=points_asked_for(km2),
         survey_good_enough={
-            name: survey_good_enough(own.survey, size)
+            name: own.survey <= size / 2
             for name, size in classes.items()
             if name != "3d" and (own := figures[name])
         },
-        control_good_enough=control,
+        control_limits=control_limits(classes),
         control_rmse={"h": plan, "v": height},
         remarks=()
         if of_all is None
@@ -324,8 +296,10 @@ def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[st
             pair = own.rmse[f"rmse_{axis}1"], own.rmse[f"rmse_{axis}2"]
             found[key] = accuracy(*pair, predicted.effective_dof, predicted.points)
     whole = None if of_all is None else of_all.prediction["all"]
-    if found["h"] is not None and found["v"] is not None and whole is not None:
-        found["3d"] = three_d(found["h"], found["v"], whole.effective_dof)
+    h, v = found["h"], found["v"]
+    if h is not None and v is not None and whole is not None:
+        both = math.hypot(h.found, v.found), math.hypot(h.survey, v.survey)
+        found["3d"] = accuracy(*both, whole.effective_dof, min(h.count, v.count))
     return found
 
 
@@ -375,7 +349,6 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
     turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
     if turned and asked.expansion is not None:
         measured = length_tests.at_reference(measured, temperatures, asked.expansion)
-    limit = None if asked.limit is None else length_tests.Limit(*asked.limit)
     extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
     ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
     lines = [str(each["line"]) for each in asked.lengths]
@@ -386,21 +359,20 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         covariance=covariance,
         sd=np.array([each["sd"] for each in asked.lengths], dtype=float),
         lines=lines,
-        limit=limit,
+        limit=asked.limit,
         diagonal=float(np.linalg.norm(extent)),
         off_diagonal=length_tests.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
-    return Lengths(lines, ends, calibrated, limit, test, asked.expansion if turned else None)
+    return Lengths(lines, ends, calibrated, asked.limit, test, asked.expansion if turned else None)
 
 
 def iso_measures(
     result: Result, asked: Asked, of_all: Figures | None, lengths: Lengths | None
 ) -> list[dict[str, Any]]:
     """Return the figures as measures of ISO 19157."""
-    more = {"unit": result.block.linear_unit, "date": asked.date}
-    found: list[dict[str, Any]] = []
+    figures: list[tuple[str, str, object, str]] = []  # Keys, elements, values and scopes
     if of_all is not None:
         whole = of_all.parts["all"]
         values: dict[str, Any] = {
@@ -410,29 +382,22 @@ def iso_measures(
             **{name: of_all.of_moments[name] for name in ("ce90", "ce95", "le90", "le95")},
             "ellipse": _ellipse(of_all.moments),
         }
-        found += measures(values, ABSOLUTE, scope=counted(of_all.n, "check point"), **more)
+        scope = counted(of_all.n, "check point")
+        figures += [(key, ABSOLUTE, value, scope) for key, value in values.items()]
     if lengths is not None:
-        scope = counted(len(lengths.lines), "length")
-        found += measures({"rmse": lengths.test.rms}, RELATIVE, scope=scope, **more)
-    return found
-
-
-def measures(
-    values: Mapping[str, object], element: str, *, unit: str, date: str, scope: str
-) -> list[dict[str, Any]]:
-    """Return figures as data quality measures for JSON by keys in `MEASURES`."""
+        figures.append(("rmse", RELATIVE, lengths.test.rms, counted(len(lengths.lines), "length")))
     return [
         {
             "element": element,
             "measure": MEASURES[key][1],
             "measure_id": MEASURES[key][0],
             "value": value,
-            "unit": unit,
+            "unit": result.block.linear_unit,
             "evaluation": "direct external",
-            "date": date,
+            "date": asked.date,
             "scope": scope,
         }
-        for key, value in values.items()
+        for key, element, value, scope in figures
         if value is not None
     ]
 

@@ -15,7 +15,7 @@ from photogram.io.csv_text import csv_text
 from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
-from photogram.results.statement.figures import Figures, Prediction, Sized, point_tests
+from photogram.results.statement.figures import Figures, Sized, point_tests
 from photogram.results.statement.request import lengths_in
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
@@ -298,7 +298,10 @@ def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None
         "spatial": _radial(found.parts["all"]),
         "without_survey": {part: found.without_survey(part) for part in ("h", "v")},
         "nssda": None if nssda is None else dict(nssda),
-        "prediction": {part: _prediction(each) for part, each in found.prediction.items()},
+        "prediction": {
+            part: each and {**vars(each), "rejected": each.rejected}
+            for part, each in found.prediction.items()
+        },
         "bias": {part: each and vars(each) for part, each in found.bias.items()},
         "inside_95": found.inside,
         "circular_linear": {
@@ -312,13 +315,6 @@ def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None
 
 def _radial(own: Sized | None) -> dict[str, Any] | None:
     return None if own is None else members(own, "n", "rmse", "largest", largest_point="point")
-
-
-def _prediction(found: Prediction | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    rejected = "high" if found.rejected_high else "low" if found.rejected_low else None
-    return {**vars(found), "rejected": rejected}
 
 
 def budget_member(found: Budget) -> dict[str, Any]:
