@@ -84,7 +84,6 @@ def test_text_and_page_write_the_same_cells():
     ]
     by_hand = Document("Survey", "A", [], [], [], [Section("points", "Points", [cells], "In metres.")])
     by_key = Document("Survey", "A", [], [], [], [Section.of(declared)])
-    pytest.importorskip("jinja2")
     assert html.page_html(by_hand) == html.page_html(by_key)
 
 
@@ -234,7 +233,6 @@ def test_a_result_with_a_document_needs_no_other_definition():
 
     assert Survey().document().sections[0].key == "points"
     assert json.loads(Survey().to_json())["name"] == "A"
-    pytest.importorskip("jinja2")
     assert b"Points" in Survey().to_html()
 
 
@@ -244,5 +242,4 @@ def test_details_are_in_the_report_and_in_json_but_not_on_the_page():
     assert record(made)["details"]["P1"] == {"position": [1.25, -2.5], "sd": [0.01, 0.02]}
     assert made.table("details") is declared
     assert "All points" in text(made)
-    pytest.importorskip("jinja2")
     assert b"All points" not in html.page_html(made)

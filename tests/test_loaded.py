@@ -17,7 +17,6 @@ except SystemExit as end:
 """
 HEAVY = (
     "matplotlib",
-    "jinja2",
     "pandas",
     "pyarrow",
     "pydantic",

@@ -327,17 +327,14 @@ def test_the_report_goes_where_it_is_asked_for_or_nowhere(run, tmp_path):
 def test_without_the_extra_there_is_a_remark_and_an_error_only_where_it_was_asked_for(
     run, tmp_path, monkeypatch
 ):
-    from photogram.show import html
-
-    monkeypatch.setitem(sys.modules, "jinja2", None)
-    html._environment.cache_clear()
-    done = run("giant", "--example")
+    monkeypatch.setitem(sys.modules, "contourpy", None)
+    done = run("comparator", "--example")
     assert done.exit_code == 0
     assert "report.html is not written; run pip install 'photogram[report]'" in done.stderr
     assert "report.html" not in done.stdout
-    asked = run("giant", "--example", "--html", "report.html", "--out", "o")
+    asked = run("comparator", "--example", "--html", "report.html", "--out", "o")
     assert asked.exit_code == 1
-    assert "jinja2 is required; run pip install 'photogram[report]'" in asked.stderr
+    assert "contourpy is required; run pip install 'photogram[report]'" in asked.stderr
     assert not (tmp_path / "o").exists()
 
 

@@ -357,7 +357,20 @@ def sampled(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
     if len(rows) <= most:
         return rows
     # Not `numpy.random`, whose import takes far longer than the selection.
-    return rows[sorted(random.Random(0).sample(range(len(rows)), most))]
+    keys = np.frombuffer(random.Random(0).randbytes(8 * len(rows)), "<u8")
+    return rows[np.sort(np.argpartition(keys, most)[:most])]
+
+
+def by_occurrence(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the distinct ones of (m,) numbers from 0, in the order of their first occurrence."""
+    first = np.full(numbers.max(initial=-1) + 1, len(numbers))
+    first[numbers[::-1]] = np.arange(len(numbers))[::-1]
+    return np.argsort(first)[: np.count_nonzero(first < len(numbers))]
+
+
+def bounds(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (2, k) least and largest values of (m, k) places; faster column by column."""
+    return np.array([[column.min() for column in places.T], [column.max() for column in places.T]])
 
 
 def finite_rows(pairs: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -135,16 +135,13 @@ def _finish(
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
-    page = documents.page(job, "adjust", target, lambda: document)
     beside = {} if stated is None else statement_files(job, stated, target / "statement")
     sizes = project.sizes if project.block.image_unit == "px" else ()
     code = result.verdict.exit_code(strict=strict)
     job.finish(
-        {target / name: content for name, content in files.items()}
-        | documents.plots_of(result, target)
-        | page
-        | sheets
-        | beside,
+        {target / name: content for name, content in files.items()} | sheets | beside,
+        lambda: documents.page(job, "adjust", target, lambda: document),
+        documents.plots_of(result, target),
         documents.as_json(told),
         documents.data(result),
         documents.charts(result, sizes, quiet=job.quiet),

@@ -29,7 +29,6 @@ SUMMARY = ("remarks", "components", "removed", "features", "tests", "worst")
 
 EXTRAS = {
     "contourpy": "report",
-    "jinja2": "report",
     "matplotlib": "plots",
     "PIL": "photos",
     "cv2": "targets",

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from photogram.show.sketch.plot import Plot
 
 TEXT, HTML = "report.txt", "report.html"
-NEEDED = ("jinja2", "contourpy")  # Packages of the browser report, in the extra `report`
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class Documents:
     def page(
         self, job: Job, command: str, out: Path | None, make: Callable[[], Document], mark: str = ""
     ) -> dict[Path, bytes]:
-        """Return the browser report; none, with a remark, without its packages."""
+        """Return the browser report; none, with a remark, if its contours require contourpy."""
         place = self.place(out)
         if place is None:
             return {}
@@ -77,8 +76,7 @@ class Documents:
                 page = make()
                 content = page_html(page.with_sections(reproducibility(job.run(command), page.phases)))
         except ModuleNotFoundError as error:
-            # Only some pages require contourpy.
-            if self.html is not None or error.name not in NEEDED:
+            if self.html is not None or error.name != "contourpy":
                 raise
             if not job.quiet:
                 print_remark(phrase("command.no-file", name=HTML, extra="report"))

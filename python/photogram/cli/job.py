@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from photogram import Progress
-    from photogram.io.writing import Content, OutputSet
+    from photogram.io.writing import Files, OutputSet
     from photogram.show.run import Run
 
 STANDS = {"example": "--example", "plan_views": "--plan"}
@@ -152,20 +152,28 @@ class Job:
         self._outputs += [path for path in files if path not in self._outputs]
         self._check()
 
-    def write(self, *results: Mapping[Path, Content]) -> None:
-        """Write results, all or none: none over an input, no two to one path."""
+    def write(self, *results: Files | Callable[[], Files]) -> list[Path]:
+        """Write results, all or none: none over an input, no two to one path; return the paths.
+
+        A function computes its results while the disk receives those before it.
+        """
+        written = []
         with self.outputs() as outputs:
             for files in results:
-                for path, content in files.items():
+                for path, content in (files() if callable(files) else files).items():
                     self._check_projects(path)
                     outputs.write(path, content)
+                    written.append(path)
+        return written
 
     def finish(
-        self, *results: Mapping[Path, Content], summary: Callable[[], None] | None = None, code: int = 0
+        self,
+        *results: Files | Callable[[], Files],
+        summary: Callable[[], None] | None = None,
+        code: int = 0,
     ) -> None:
         """Write the results, print a summary, and end with an exit code."""
-        self.write(*results)
-        self.conclude([path for each in results for path in each], summary=summary, code=code)
+        self.conclude(self.write(*results), summary=summary, code=code)
 
     def conclude(
         self, written: Iterable[Path], *, summary: Callable[[], None] | None = None, code: int = 0

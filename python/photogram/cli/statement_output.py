@@ -139,17 +139,14 @@ def stated(
 
 
 def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, bytes]:
-    """Return all files of a statement, with a remark on each missing package."""
+    """Return all files of a statement, with a remark if the package for PDF is missing."""
     from photogram.results.statement.tables import files_of_statement
 
     files = {folder / name: content for name, content in files_of_statement(found).items()}
     files[folder / "statement.json"] = found.to_json()
-    for name, extra, library, make in (
-        ("statement.html", "report", "jinja2", found.to_html),
-        ("statement.pdf", "pdf", "typst", found.to_pdf),
-    ):
-        if find_spec(library):
-            files[folder / name] = make()
-        elif not job.quiet:
-            print_remark(phrase("command.no-file", name=name, extra=extra))
+    files[folder / "statement.html"] = found.to_html()
+    if find_spec("typst"):
+        files[folder / "statement.pdf"] = found.to_pdf()
+    elif not job.quiet:
+        print_remark(phrase("command.no-file", name="statement.pdf", extra="pdf"))
     return files

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -148,6 +149,7 @@ class AdjustedCollection(AdjustedNetwork):
     def _core_network(self) -> _photocore.CollectionNetwork:
         return collection_network(self.collection, self.options)
 
+    @cached_property
     def _terms(self) -> Terms:
         from photogram.collection.document import collection_terms
 

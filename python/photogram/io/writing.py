@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO, Self
 
@@ -26,8 +27,10 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 Content = bytes | Callable[[BinaryIO], object]  # Bytes, or a function that writes them to a file
+Files = Mapping[Path, Content]
 
 NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+MOST_PENDING = 32  # Largest number of files that wait for the disk
 MOST_LINKS = 40  # Largest number of symbolic links that are followed, as in Linux
 _Identity = tuple[int, int]
 
@@ -182,6 +185,8 @@ class _Staged:
     path: str
     file: io.BufferedWriter | None = None
     is_moved: bool = False  # Or is being moved
+    flushing: Thread | None = None  # Flushes the file to disk
+    error: OSError | None = None  # Of this thread
 
     @property
     def old(self) -> str:
@@ -201,13 +206,30 @@ class _Staged:
             os.fchmod(descriptor, mode)
         return self.file
 
-    def complete(self) -> None:
+    def begin_flush(self) -> None:
+        """Start to flush a file to disk; meanwhile other results are computed and written."""
+        if self.flushing is None:
+            self.flushing = Thread(target=self._flush)
+            self.flushing.start()
+
+    def _flush(self) -> None:
         assert self.file is not None
-        if not self.file.closed:
-            with naming(self.target.given):
-                self.file.flush()
-                os.fsync(self.file.fileno())
-            self.file.close()
+        # A signal that ends the process closes the file: a ValueError.
+        with suppress(ValueError):
+            try:
+                with naming(self.target.given):
+                    self.file.flush()
+                    os.fsync(self.file.fileno())
+                self.file.close()
+            except OSError as error:
+                self.error = error
+
+    def complete(self) -> None:
+        """Wait until a file is on disk."""
+        if self.flushing is not None:
+            self.flushing.join()
+        if self.error is not None:
+            raise self.error
 
     def move(self) -> None:
         if self.target.status:
@@ -258,6 +280,8 @@ class OutputSet:
         try:
             if kind is None:
                 for staged in self._staged:
+                    staged.begin_flush()
+                for staged in self._staged:
                     staged.complete()
                 for file in self._streams:
                     file.close()
@@ -268,6 +292,9 @@ class OutputSet:
                     staged.move()
                 self._is_complete = True
         finally:
+            for staged in self._staged:
+                with suppress(OSError):
+                    staged.complete()
             self.abandon()
 
     def open(self, path: Path) -> io.BufferedWriter:
@@ -284,7 +311,9 @@ class OutputSet:
         target = self._target(path)
         if target.regular:
             _put(self._stage(target), content)
-            self._staged[-1].complete()
+            self._staged[-1].begin_flush()
+            if len(self._staged) > MOST_PENDING:
+                self._staged[-MOST_PENDING].complete()
         else:
             self._late.append((target, content))
 
@@ -341,7 +370,7 @@ def abandon_all() -> None:
         _live[-1].abandon()
 
 
-def write_whole(files: Mapping[Path, Content]) -> None:
+def write_whole(files: Files) -> None:
     """Write contents by path: all, or none."""
     with OutputSet() as outputs:
         for path, content in files.items():

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.arguments.arrays import by_occurrence
 from photogram.arguments.types import Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -109,17 +110,16 @@ def structure(image_photos: Indices, image_points: Indices, order: Indices | Non
         place[order] = np.arange(len(order))
         walked = place[image_photos]
     rows = np.argsort(walked, kind="stable")
-    walked = walked[rows]
-    points, first, which = np.unique(image_points[rows], return_index=True, return_inverse=True)
-    turn = np.argsort(first)
-    rank = np.empty_like(turn)
-    rank[turn] = np.arange(len(turn))
+    walked, seen = walked[rows], image_points[rows]
+    points = by_occurrence(seen)
+    rank = np.empty(seen.max() + 1, dtype=np.int64)
+    rank[points] = np.arange(len(points))
     starts = np.flatnonzero(np.diff(walked, prepend=-1))
-    entry = np.minimum.reduceat(rank[which], starts)
-    exit_ = np.maximum.reduceat(rank[which], starts)
+    entry = np.minimum.reduceat(rank[seen], starts)
+    exit_ = np.maximum.reduceat(rank[seen], starts)
     photos = image_photos[rows][starts]
     entered = np.argsort(entry, kind="stable")
-    return Structure(photos[entered], entry[entered], exit_[entered], points[turn])
+    return Structure(photos[entered], entry[entered], exit_[entered], points)
 
 
 def ties(block: Block) -> Indices:

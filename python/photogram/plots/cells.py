@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.arguments.arrays import bounds
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
@@ -36,11 +37,14 @@ class Cells:
 
 def cells(xy: Floats, longer: int) -> Cells:
     """Return nearly square cells over (m, 2) image points, `longer` on the long side."""
-    low, high = xy.min(axis=0), xy.max(axis=0)
+    low, high = bounds(xy)
     extent = np.maximum(high - low, 1e-12 + 1e-9 * np.abs(high))
     columns, rows = np.maximum(1, np.round(longer * extent / extent.max())).astype(int).tolist()
-    place = np.minimum((xy - low) / extent * [columns, rows], [columns - 1, rows - 1]).astype(np.int64)
-    own = place[:, 1] * columns + place[:, 0]
+    across, up = (
+        np.minimum((values - least) / width * count, count - 1).astype(np.int64)
+        for values, least, width, count in zip(xy.T, low, extent, (columns, rows), strict=True)
+    )
+    own = up * columns + across
     return Cells(
         columns, rows, np.array([low, low + extent]), own, np.bincount(own, minlength=columns * rows)
     )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import bounds
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
@@ -35,7 +36,7 @@ def residuals(result: Any) -> Plot:
     rows = -(-len(cameras) // columns)
     width = 6.4 if columns == 1 else 4.2 * columns
     shown = images.xy[images.cameras == cameras[0]]
-    extent = np.ptp(shown, axis=0) if len(shown) else np.ones(2)
+    extent = np.ptp(bounds(shown), axis=0) if len(shown) else np.ones(2)
     across, up = np.maximum(extent + 2 * MARGIN * extent.max(), 1e-12)
     many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > MAX_SINGLE_IMAGES
     # Title, scale and labels; for means, also an explanation.

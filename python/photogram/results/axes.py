@@ -98,7 +98,7 @@ def block_terms(result: Result) -> Terms:
         layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
         parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
         of_points=(Quantity(point_kinds, (), "name", "kind", "kind", "what it is", "Kind"),),
-        kinds=result.kinds.values(),
+        kinds=tuple(result.kinds.values()),
         observation_rows=np.array(block.observations.core_order, dtype=np.int64),
         lengths=lengths,
         linear_unit=block.linear_unit,

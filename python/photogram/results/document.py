@@ -161,7 +161,7 @@ def rms_of(values: Floats) -> float:
 
 
 def _differences(result: Result, values: Iterable[float]) -> list[str]:
-    axes, lengths, unit = point_axes(result.block), result._terms().lengths, result.block.linear_unit
+    axes, lengths, unit = point_axes(result.block), result._terms.lengths, result.block.linear_unit
     return [
         f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
         + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.arrays import bounds
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
@@ -122,7 +123,7 @@ def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = (
             continue
         own = block.image_xy[of_images == row]
         if len(own):
-            found[row] = *own.min(axis=0), *own.max(axis=0)
+            found[row] = bounds(own).ravel()
     return found
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, value_field
+from photogram.arguments.arrays import argument_error, by_occurrence, value_field
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -188,7 +188,7 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
     def weighted(residuals: Floats, sd: Floats) -> Floats:
         return np.where((sd > 0) & np.isfinite(sd), (residuals / sd) ** 2, np.nan)
 
-    kinds = [*result._terms().kinds]
+    kinds = [*result._terms.kinds]
     size = sum(len(kind.rows) for kind in kinds)
     of_observations, shares, components = np.full(size, np.nan), np.full(size, np.nan), np.ones(size)
     for kind in kinds:
@@ -312,7 +312,7 @@ BASES = ("kind", "camera", "strip", "photo", "point class", "component", "rays")
 PARTS = ("images", "control", "stations", "observations")  # Parts with labels of the user
 MANY_RAYS = 5  # Smallest number of rays of the last group
 
-_Labels = NDArray[np.object_]
+_Labels = tuple[list[str], Indices]  # Names, and the number of the name of each observation
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,46 +399,46 @@ _Labelled = tuple[dict[str, _Labels], dict[str, str]]
 
 
 def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
-    components = "component" in bases
-    of_images = [_images_by(of, basis) for basis in bases if basis not in ("kind", "component")]
-    named = np.full(len(of.given.image_photos), "images", dtype=object)
-    if of_images:
-        named[:] = [", ".join(("images", *parts)) for parts in zip(*of_images, strict=True)]
-    images = np.stack([named, named], axis=1)
+    names, codes = ["images"], np.zeros(len(of.given.image_photos), dtype=np.int64)
     parents: dict[str, str] = {}
-    if of_images:
-        parents |= dict.fromkeys(named.tolist(), "other images")
-    if components:
-        for axis in (0, 1):
-            images[:, axis] = [f"{each}, {'xy'[axis]}" for each in named.tolist()]
-            parents |= dict(zip(images[:, axis].tolist(), named.tolist(), strict=True))
-    points = np.full(of.point_observed.shape, "control", dtype=object)
-    if components:
-        points[:] = ["control, plan", "control, plan", "control, height"]
-        parents |= dict.fromkeys(("control, plan", "control, height"), "control")
-    photos = np.empty(of.photo_observed.shape, dtype=object)
-    photos[:] = of.stations
+    for basis in bases:
+        if basis not in ("kind", "component"):
+            more, own = _images_by(of, basis)
+            pairs, codes = np.unique(codes * len(more) + own, return_inverse=True)
+            names = [f"{names[pair // len(more)]}, {more[pair % len(more)]}" for pair in pairs.tolist()]
+            parents = dict.fromkeys(names, "other images")
+    images = names, np.stack([codes, codes], axis=1)
+    points = ["control"], np.zeros(of.point_observed.shape, dtype=np.int64)
+    if "component" in bases:
+        along = [[f"{name}, {axis}" for name in names] for axis in "xy"]
+        parents |= {each: name for part in along for each, name in zip(part, names, strict=True)}
+        images = [*along[0], *along[1]], np.stack([codes, codes + len(names)], axis=1)
+        points = ["control, plan", "control, height"], points[1] + [0, 0, 1]
+        parents |= dict.fromkeys(points[0], "control")
+    photos = [*of.stations], np.broadcast_to(np.arange(len(of.stations)), of.photo_observed.shape)
     parents |= dict.fromkeys(of.stations, "stations")
-    observations = np.array([each.label for each in of.given.observations], dtype=object)
-    labels = {"images": images, "points": points, "photos": photos, "observations": observations}
-    return labels, parents
+    observations = [each.label for each in of.given.observations]
+    others = observations, np.arange(len(observations))
+    return {"images": images, "points": points, "photos": photos, "observations": others}, parents
 
 
-def _images_by(of: Observables, basis: str) -> list[str]:
-    photos, seen = of.given.image_photos.tolist(), of.given.image_points
+def _images_by(of: Observables, basis: str) -> tuple[list[str], Indices]:
+    """Return names of groups of images, and the number of the group of each image."""
+    photos, seen = of.given.image_photos, of.given.image_points
     if basis == "photo":
-        return [f"photo {of.given.photo_ids[photo]}" for photo in photos]
+        return [f"photo {name}" for name in of.given.photo_ids], photos
     if basis == "camera":
-        return [f"camera {of.camera_names[of.photo_cameras[photo]]}" for photo in photos]
+        return [f"camera {name}" for name in of.camera_names], of.photo_cameras[photos]
     if basis == "strip":
-        number = np.empty(len(of.photo_cameras), dtype=np.int64)
-        for strip, members in enumerate(of.strips(), 1):
+        number, strips = np.empty(len(of.photo_cameras), dtype=np.int64), of.strips()
+        for strip, members in enumerate(strips):
             number[members] = strip
-        return [f"strip {number[photo]}" for photo in photos]
+        return [f"strip {strip}" for strip in range(1, len(strips) + 1)], number[photos]
     if basis == "point class":
-        return [f"{each} points" for each in of.point_classes[seen].tolist()]
-    rays = np.bincount(seen, minlength=len(of.point_classes))[seen]
-    return [f"{each} rays" if each < MANY_RAYS else f"{MANY_RAYS} rays and more" for each in rays.tolist()]
+        classes, codes = np.unique(of.point_classes, return_inverse=True)
+        return [f"{each} points" for each in classes.tolist()], codes[seen]
+    rays = np.minimum(np.bincount(seen), MANY_RAYS)[seen]
+    return [*(f"{number} rays" for number in range(MANY_RAYS)), f"{MANY_RAYS} rays and more"], rays
 
 
 def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
@@ -447,13 +447,15 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
     labels, parents = _by(of, ["kind"])
     for name, part in zip(PARTS, labels, strict=True):
         if name in given:
-            default, own = labels[part], np.asarray(given[name], dtype=object)
+            default, own = labels[part][1], np.asarray(given[name], dtype=object)
             if own.shape == default.shape[:1] and default.ndim == 2:
                 own = np.repeat(own[:, np.newaxis], default.shape[1], axis=1)
             if own.shape != default.shape:
                 shapes = f"{default.shape[:1]} or {default.shape}"
                 raise argument_error(f"labels of {name}", "shape", shape=shapes, actual=own.shape)
-            labels[part] = np.vectorize(_text, otypes=[object])(own) if own.size else own
+            texts = [_text(label) for label in own.ravel().tolist()]
+            codes = {text: code for code, text in enumerate(dict.fromkeys(texts))}
+            labels[part] = [*codes], np.array([codes[text] for text in texts], np.int64).reshape(own.shape)
     return labels, parents
 
 
@@ -466,27 +468,29 @@ def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, st
     """Assign numbers to the groups, first those of images."""
     numbers: dict[str, int] = {"": -1}
 
-    def enter(found: list[str]) -> None:
-        for label in dict.fromkeys(found):
-            numbers.setdefault(label, len(numbers) - 1)
+    def enter(names: Sequence[str], codes: Indices) -> None:
+        for code in by_occurrence(codes.ravel()).tolist():
+            numbers.setdefault(names[code], len(numbers) - 1)
 
-    def number(part: _Labels, used: Any = ...) -> Indices:
-        found, flat = np.full(part.shape, -1, dtype=np.int64), part[used].ravel().tolist()
-        enter(flat)
-        found[used] = np.fromiter(map(numbers.__getitem__, flat), np.int64).reshape(part[used].shape)
+    def number(part: str, used: Any = ...) -> Indices:
+        names, codes = labels[part]
+        enter(names, codes[used])
+        found = np.full(codes.shape, -1, dtype=np.int64)
+        found[used] = np.array([numbers.get(name, -1) for name in names], dtype=np.int64)[codes[used]]
         return found
 
     # In the order of the photos, independent of the order of the images.
-    enter(labels["images"][np.argsort(of.given.image_photos, kind="stable")].ravel().tolist())
-    images = number(labels["images"])
+    names, codes = labels["images"]
+    enter(names, codes[np.argsort(of.given.image_photos, kind="stable")])
+    images = number("images")
     of_images = len(numbers) - 1
-    points, photos = number(labels["points"], of.point_observed), number(labels["photos"], of.photo_observed)
-    observations = number(labels["observations"])
-    names = tuple(name for name in numbers if name)
+    points, photos = number("points", of.point_observed), number("photos", of.photo_observed)
+    observations = number("observations")
+    known = tuple(name for name in numbers if name)
     groups = GroupsOf(
-        names,
-        tuple(parents.get(name, "") for name in names),
-        tuple(number < of_images for number in range(len(names))),
+        known,
+        tuple(parents.get(name, "") for name in known),
+        tuple(number < of_images for number in range(len(known))),
     )
     return Grouping(
         groups, images, points, photos, observations, of.commons, len(of.camera_names), of.records

@@ -230,6 +230,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     @abstractmethod
     def _core_network(self) -> CoreNetwork: ...
 
+    @property
     @abstractmethod
     def _terms(self) -> Terms: ...
 
@@ -271,7 +272,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
             from photogram.results.reliability import downweighted
 
             weights = self.image_weights, self.used_images
-            lost = downweighted(trial, self._terms(), *weights)
+            lost = downweighted(trial, self._terms, *weights)
             trial.out = lost.out
         return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 
@@ -299,7 +300,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """Evaluate the hypotheses of the catalogue with some facts."""
         from photogram.results.hypotheses import hypotheses
 
-        axes = self._terms().point_axes
+        axes = self._terms.point_axes
         standing = found.standing.sum_and_freedom if self.KNOWN else self.sum_and_freedom
         parts = found.trial, found.tests, facts, axes, standing, self.max_bias_ratio
         return hypotheses(*parts, known=self.KNOWN)

@@ -66,7 +66,7 @@ def network_document(
     if result.loss is not None:
         course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
     summary = result.reliability_summary
-    reliability = [] if summary is None else summary.parts(result._terms().linear_unit)
+    reliability = [] if summary is None else summary.parts(result._terms.linear_unit)
     return Document(
         what=what,
         title=title,
@@ -157,7 +157,7 @@ def size_section(
 
 
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
-    used, (axis, _) = result.used_images, result._terms().image_axes
+    used, (axis, _) = result.used_images, result._terms.image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
     variance, sigma, note = (
         result.variance_of_unit_weight,
@@ -182,7 +182,7 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
 
 
 def _images_facts(result: AdjustedNetwork) -> list[Fact]:
-    used, (axis, _) = result.used_images, result._terms().image_axes
+    used, (axis, _) = result.used_images, result._terms.image_axes
     unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
     if not len(residuals):
         return []
@@ -207,7 +207,7 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
 
 def _precision_table(result: AdjustedNetwork) -> quantity.Table:
     """Return the distribution of standard deviations of values."""
-    terms, rows = result._terms(), list[tuple[Any, ...]]()
+    terms, rows = result._terms, list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
         ("photos", terms.photo_axes, result.photo_sd),

@@ -45,7 +45,7 @@ def weakest_points(result: AdjustedNetwork) -> Table:
     chosen = [*near[np.argsort(distance[near])].tolist(), *worst.tolist()]
     rows = np.array(list(dict.fromkeys(chosen))[:WORST], dtype=np.int64)
     columns = [
-        network_tables.names(result._terms(), "point", rows, "point"),
+        network_tables.names(result._terms, "point", rows, "point"),
         Quantity(ratio[rows], member="ratio", head="Largest over smallest sd", figures=4),
         Quantity(distance[rows], member="distance", head="Distance", figures=4),
         Quantity(result.point_rays[rows], member="rays", head="Rays", decimals=0),
@@ -70,7 +70,7 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
     order = np.argsort(-condition, kind="stable")[:WORST]
     rows = np.flatnonzero(known)[order]
     columns = [
-        network_tables.names(result._terms(), "photo", rows, "photo"),
+        network_tables.names(result._terms, "photo", rows, "photo"),
         Quantity(condition[order], member="condition", head="Condition", figures=4),
         Quantity(images[rows], member="images", head="Images", decimals=0),
     ]
@@ -198,7 +198,7 @@ def _compared(key: str, title: str, columns: Sequence[Quantity]) -> Table:
 
 def stations_section(result: AdjustedNetwork) -> Section:
     tables: list[Table] = []
-    layers, own = result._terms().layers, result.stations
+    layers, own = result._terms.layers, result.stations
     there, sd = np.isfinite(own.sd), result.photo_sd[own.rows]
     for caption, of in layers.items():
         columns = [
@@ -259,7 +259,7 @@ def _chosen_rows(
 
 def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
     """Return photos, first `others`: unknowns, and the fit of their images, in layers."""
-    terms = result._terms()
+    terms = result._terms
     fit = fit_of_images(result, result.given.image_photos, len(terms.photos))
     orders = [np.argsort(-np.nan_to_num(column, nan=-1.0), kind="stable") for column in fit.T[[3, 4]]]
     rows, note = _chosen_rows("photos", np.arange(len(terms.photos)), others, orders)
@@ -311,7 +311,7 @@ def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
 
 def points_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
     """Return points with their standard deviations, first `others`."""
-    terms, used = result._terms(), np.flatnonzero(result.used_points)
+    terms, used = result._terms, np.flatnonzero(result.used_points)
     # An approximate number of metres per radian is sufficient for sorting.
     lengths = np.array([6.4e6 if axis.angle else 1.0 for axis in terms.point_axes])
     size = np.where(result.used_points, np.linalg.norm(result.point_sd * lengths, axis=1), np.nan)

@@ -38,7 +38,7 @@ def part(each: Quantity, of: slice) -> Quantity:
 
 
 def photos(result: AdjustedNetwork) -> list[Quantity]:
-    terms = result._terms()
+    terms = result._terms
     rows = np.arange(len(terms.photos))
     return [
         names(terms, "photo", rows, "id" if terms.identity == "id" else "", here=True),
@@ -52,7 +52,7 @@ def photos(result: AdjustedNetwork) -> list[Quantity]:
 
 def points(result: AdjustedNetwork) -> list[Quantity]:
     """Return the used points: names, rays, coordinates, standard deviations."""
-    terms, used = result._terms(), np.flatnonzero(result.used_points)
+    terms, used = result._terms, np.flatnonzero(result.used_points)
     rays, places, sd = result.point_rays[used], result.point_positions[used], result.point_sd[used]
     return [
         names(terms, "point", used, terms.identity, here=True),
@@ -65,7 +65,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
 
 def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantity]:
     """Return used images, or some: residuals, redundancy numbers, test values."""
-    terms, used = result._terms(), np.flatnonzero(result.used_images) if rows is None else rows
+    terms, used = result._terms, np.flatnonzero(result.used_images) if rows is None else rows
     axes = terms.image_axes
     return [
         names(terms, "photo", result.given.image_photos[used], "photo"),
@@ -98,7 +98,7 @@ def stations(result: AdjustedNetwork) -> list[Quantity]:
 
 def _observed(result: AdjustedNetwork, kind: str) -> list[Quantity]:
     """Return prior, posterior, difference and test of observed components."""
-    terms, own = result._terms(), result.control if kind == "point" else result.stations
+    terms, own = result._terms, result.control if kind == "point" else result.stations
     axes, adjusted, sd = terms.point_axes, result.point_positions, result.point_sd
     given = result.given.point_positions
     if kind == "photo":

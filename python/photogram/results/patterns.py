@@ -86,7 +86,7 @@ def patterns(
     # ~v = w sqrt(r) of clipped w; 0 if untested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = _clipped(w, redundancy, factor)
-    given, (axis, _) = result.given, result._terms().image_axes
+    given, (axis, _) = result.given, result._terms.image_axes
     # Tests by photo use measured coordinates: samples and lines for scanners.
     image_photos, xy, measured = given.image_photos, focal_images(given), given.image_xy
     scale = factor * given.image_sd[used].mean(axis=0) * axis.factor

@@ -211,6 +211,7 @@ class Result(OnFilm, AdjustedNetwork):
     def _core_network(self) -> _photocore.BlockNetwork:
         return block_network(self.block, self.options)
 
+    @cached_property
     def _terms(self) -> Terms:
         from photogram.results.axes import block_terms
 

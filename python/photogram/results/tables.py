@@ -55,7 +55,7 @@ def unheld(result: Result) -> list[Quantity]:
 
 
 def _compared(result: Result, rows: Indices, differences: Floats, given_sd: Floats) -> list[Quantity]:
-    terms, axes, sd = result._terms(), point_axes(result.block), result.point_sd[rows]
+    terms, axes, sd = result._terms, point_axes(result.block), result.point_sd[rows]
     with np.errstate(all="ignore"):
         tests = differences / np.hypot(sd, np.nan_to_num(given_sd))
     return [

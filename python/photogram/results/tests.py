@@ -48,7 +48,7 @@ class Tests:
     """The tests of an adjusted network: of single components, and of groups."""
 
     def __init__(self, result: AdjustedNetwork) -> None:
-        self._result, self._terms = result, result._terms()
+        self._result, self._terms = result, result._terms
 
     @cached_property
     def normal(self) -> list[ComponentTests]:

@@ -1,81 +1,156 @@
-"""A page as one self-contained HTML file, with the extra `photogram[report]`."""
+"""A page as one self-contained HTML file."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Set
 from dataclasses import replace
-from functools import cache
+from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 from photogram import _photocore
+from photogram.show import page as parts
 from photogram.show.cells import formatted
-from photogram.show.page import Cell, Column, Document, Drawing, Table
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
-    from markupsafe import Markup
+from photogram.show.page import Cell, Column, Document, Drawing, Fact, Judgement, Section, Table
 
 LONG = 16  # Characters; longer words may be broken
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # Numbers that the script of a page can read
 
 
 def page_html(page: Document) -> bytes:
-    """Return a page as self-contained HTML (UTF-8).
-
-    It requires jinja2 (`pip install 'photogram[report]'`).
-    """
+    """Return a page as self-contained HTML (UTF-8)."""
     page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title), details=()), inlined)
     tables = (part for part in page.parts(layers=True) if isinstance(part, Table))
-    text = (
-        _environment()
-        .get_template("report.html")
-        .render(
-            page=page,
-            known={cell.id for table in tables for row in table.rows for cell in row if cell.id},
-            version=_photocore.__version__,
-            attributes=_attributes,
-        )
+    known = {cell.id for table in tables for row in table.rows for cell in row if cell.id}
+    links = [("verdict", page.first), *((each.key, each.title) for each in page.sections if each.title)]
+    text = _file("report.html").format(
+        language=page.language,
+        version=_photocore.__version__,
+        style=_file("style.css"),
+        contents=escape(page.contents),
+        links=_list("ol", (_element("a", escape(title), href=f"#{key}") for key, title in links)),
+        title=escape(page.title or page.what),
+        what=_element("p", escape(page.what), class_="what") if page.title else "",
+        head=_facts("facts", page.head),
+        judgements="".join(map(_judgement, page.judgements)),
+        advice=_advice(page),
+        highlights=_facts("highlights", page.highlights, "b"),
+        sections="\n".join(_section(each, known, page.more) for each in page.sections),
+        script=_file("script.js"),
     )
     return text.encode("utf-8", errors="replace")
 
 
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FunctionLoader(_text),  # Templates of a package, also if it is zipped
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["coded"] = _coded
-    return environment
-
-
-def _text(name: str) -> str:
+def _file(name: str) -> str:
     return files("photogram.show").joinpath("templates", name).read_text(encoding="utf-8")
 
 
-def _coded(text: str) -> Markup:
+def _element(name: str, content: str, /, **attributes: str) -> str:
+    """Return an element without empty attributes; its content is HTML."""
+    written = [f' {key.rstrip("_")}="{escape(value)}"' for key, value in attributes.items() if value]
+    return f"<{name}{''.join(written)}>{content}</{name}>"
+
+
+def _list(name: str, items: Iterable[str], **attributes: str) -> str:
+    lines = "".join(f"<li>{item}</li>\n" for item in items)
+    return _element(name, f"\n{lines}", **attributes) if lines else ""
+
+
+def _coded(text: str) -> str:
     """Format text between grave accents as code."""
-    from markupsafe import Markup, escape
-
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
-def _attributes(column: Column, cell: Cell) -> dict[str, str]:
-    long = column.text and any(len(word) > LONG for word in cell.text.split())
+def _unit(unit: str) -> str:
+    return " " + _element("span", escape(unit), class_="unit") if unit else ""
+
+
+def _facts(kind: str, facts: Iterable[Fact], value: str = "", caption: str = "") -> str:
+    """Return named values; `value` is an element for the values."""
+    lines = []
+    for fact in facts:
+        text, note = escape(fact.value), _element("small", escape(fact.note)) if fact.note else ""
+        content = f"{_element(value, text) if value else text}{_unit(fact.unit)}{note}"
+        name = _element("dt", escape(fact.name))
+        lines.append(_element("div", name + _element("dd", content), class_=fact.tone) + "\n")
+    return _element("dl", f"{caption}\n{''.join(lines)}", class_=kind) if lines else ""
+
+
+def _judgement(one: Judgement) -> str:
+    on = " " + _element("span", escape(one.on)) if one.on else ""
+    mark = _element("p", escape(one.mark) + on, class_="mark")
+    lines = _list("ul", (escape(line[:1].upper() + line[1:]) for line in one.lines))
+    return _element("div", mark + _element("h2", escape(one.headline)) + lines, class_=f"verdict {one.tone}")
+
+
+def _advice(page: Document) -> str:
+    steps = _list("ol", (_coded(str(sentence)) for sentence in page.advice))
+    return _element("div", _element("h3", "What to do next") + steps, class_="advice") if steps else ""
+
+
+def _section(section: Section, known: Set[str], more: str) -> str:
+    title = _element("h2", escape(section.title)) if section.title else ""
+    intro = _element("p", escape(section.intro), class_="intro") if section.intro else ""
+    content = [title, intro, *(_part(part, section.title, known, more) for part in section.parts)]
+    return _element("section", "\n".join(content), id=section.key, class_="annex" * section.annex)
+
+
+def _part(part: parts.Part, within: str, known: Set[str], more: str) -> str:
+    """Return a part; `again` marks the title of its section."""
+    match part:
+        case Table():
+            return _table(part, within, known)
+        case parts.Facts():
+            again = " again" * (part.caption == within)
+            caption = _element("div", escape(part.caption), class_=f"caption{again}")
+            return _facts("facts", part.facts, caption=caption)
+        case Drawing():
+            caption = _element("figcaption", escape(part.caption))
+            return _element("figure", f"\n{part.markup}\n{caption}", id=part.name)
+        case parts.Layers():
+            layers = (
+                f'<div class="layer" data-title="{escape(one.title)}">{_part(one, "", known, more)}</div>'
+                for one in part.parts
+            )
+            return _element("div", "\n".join(layers), class_="layers", id=part.name)
+        case parts.Text():
+            return _element("p", _coded(part.text))
+        case parts.Remarks():
+            shown, hidden = part.sentences[: part.most], part.sentences[part.most :]
+            first, others = (_list("ul", map(escape, each), class_="remarks") for each in (shown, hidden))
+            summary = _element("summary", escape(more.format(len(hidden))))
+            return first + (_element("details", summary + others) if hidden else "")
+    raise TypeError(f"a page does not show {type(part).__name__}")
+
+
+def _table(table: Table, within: str, known: Set[str]) -> str:
+    columns, again = table.columns, "again" * (table.title == within)
+    note = " " + _element("small", escape(table.note)) if table.note else ""
+    caption = _element("caption", _element("span", escape(table.title)) + note, class_=again)
+    heads = (
+        _element("th", escape(each.head) + _unit(each.unit), scope="col", class_="text" * each.text)
+        for each in columns
+    )
+    rows = (
+        "".join(_cell(cell, column, known) for cell, column in zip(row, columns, strict=True))
+        for row in table.rows
+    )
+    body = "".join(f"<tr>{row}</tr>\n" for row in rows)
+    content = f"{caption}\n<thead><tr>{''.join(heads)}</tr></thead>\n<tbody>\n{body}</tbody>"
+    return f'<div class="table" tabindex="0">\n<table>\n{content}\n</table>\n</div>'
+
+
+def _cell(cell: Cell, column: Column, known: Set[str]) -> str:
+    text, number = cell.text, cell.number
+    long = column.text and any(len(word) > LONG for word in text.split())
+    kinds = " ".join(filter(None, ("text" * column.text, "long" * long, cell.tone)))
     # Columns are sorted by these numbers if the texts of cells are not numbers.
-    sorts = cell.number is not None and math.isfinite(cell.number) and not NUMBER.fullmatch(cell.text)
-    return {
-        "class": " ".join(filter(None, ("text" if column.text else "", "long" if long else "", cell.tone))),
-        "id": cell.id,
-        "data-value": f"{cell.number:.9g}" if sorts else "",
-    }
+    sorts = number is not None and math.isfinite(number) and not NUMBER.fullmatch(text)
+    value = f' data-value="{number:.9g}"' if sorts else ""
+    content = _element("a", escape(text), href=f"#{cell.goes_to}") if cell.goes_to in known else escape(text)
+    start = "".join(f' {key}="{escape(each)}"' for key, each in (("class", kinds), ("id", cell.id)) if each)
+    return f"<td{start}{value}>{content}</td>"
 
 
 def inlined(drawing: Drawing) -> Drawing | None:

@@ -58,10 +58,7 @@ class Documented:
         return to_json(self.document())
 
     def to_html(self) -> bytes:
-        """Return the HTML report, one self-contained file (docs/report.md).
-
-        Needs jinja2 (`pip install 'photogram[report]'`).
-        """
+        """Return the HTML report, one self-contained file (docs/report.md)."""
         from photogram.show.html import page_html
         from photogram.show.run import reproducibility
 

@@ -201,10 +201,7 @@ class Statement(Brief):
         return statement_document(self)
 
     def to_html(self, path: str | PathLike[str] | None = None) -> bytes:
-        """Return the page as a self-contained HTML file; optionally write it to a path.
-
-        Needs jinja2 (`pip install 'photogram[report]'`).
-        """
+        """Return the page as a self-contained HTML file; optionally write it to a path."""
         from photogram.show.html import page_html
 
         return _written(page_html(self.document()), path)

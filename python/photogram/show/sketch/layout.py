@@ -83,7 +83,7 @@ class Placed:
         if self.panel.legend in ("beside", "below"):
             x, y = (right + GAP, top) if self.panel.legend == "beside" else (left, low + self.axis_below)
             return x, y, x + wide, y + high
-        curves = np.concatenate([np.empty((0, 2)), *map(self.at, _curves(self.panel))])
+        curves = self.at(np.concatenate([np.empty((0, 2)), *_curves(self.panel)]))
         inner = left + GAP / 2, top + GAP / 2, right - wide - GAP / 2, low - high - GAP / 2
         corners = [(x, y) for y in (inner[1], inner[3]) for x in (inner[2], inner[0])]
         x, y = min(corners, key=lambda corner: _inside(curves, corner, self.legend_size))
@@ -203,8 +203,10 @@ def _curves(panel: Panel) -> list[Floats]:
         if isinstance(mark, Line):
             lines = (np.clip(line, *ends) for line in mark.lines)
             found += [np.linspace(line[0], line[-1], 60) if len(line) == 2 else line for line in lines]
-        elif isinstance(mark, (Markers, Polygons)):
-            found += [places.reshape(-1, 2) for places in mark.places]
+        elif isinstance(mark, Markers):
+            found.append(mark.places)
+        elif isinstance(mark, Polygons):
+            found.extend(mark.places)
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
+from collections.abc import Sequence
 from html import escape
 from typing import TypeAlias
 
@@ -61,11 +62,20 @@ def place(left: float, top: float, right: float, low: float) -> Attributes:
     return {"x": left, "y": top, "width": right - left, "height": low - top}
 
 
-def joined(places: Floats, end: str = "") -> str:
-    """Return a line through (n, 2) points of the plot."""
-    decimals = 1 if len(places) > MAX_EXACT_PLACES else 2
-    known = np.clip(places[~np.isnan(places).any(axis=1)], -MAX_COORDINATE, MAX_COORDINATE).round(decimals)
-    return "M" + " ".join(f"{x:g} {y:g}" for x, y in known.tolist()) + end if len(known) > 1 else ""
+def joined(lines: Sequence[Floats] | Floats, placed: Placed | None = None, end: str = "") -> list[str]:
+    """Return every line through (n, 2) points of a panel, or of the plot."""
+    if not len(lines):
+        return []
+    places = np.concatenate(lines)
+    places = np.clip(placed.at(places) if placed else places, -MAX_COORDINATE, MAX_COORDINATE)
+    exact, first, found = places.round(2).tolist(), 0, []
+    for count in map(len, lines):
+        last = first + count
+        own = exact[first:last] if count <= MAX_EXACT_PLACES else places[first:last].round(1).tolist()
+        known = [f"{x:g} {y:g}" for x, y in own if x == x and y == y]  # without NaN
+        found.append(f"M{' '.join(known)}{end}" if len(known) > 1 else "")
+        first = last
+    return found
 
 
 def _each(places: Floats, sign: str) -> str:
@@ -80,7 +90,7 @@ def svg(mark: marks.Mark, placed: Placed) -> str:
         case marks.Markers():
             return _markers(mark, placed)
         case marks.Line():
-            data = "".join(joined(placed.at(line)) for line in mark.lines)
+            data = "".join(joined(mark.lines, placed))
             join = "round" if any(len(line) > 2 for line in mark.lines) else ""
             return path(data, **_stroke(mark, mark.dash), opacity=mark.opacity, stroke_linejoin=join)
         case marks.Arrows():
@@ -154,14 +164,14 @@ def _arrows(mark: marks.Arrows, placed: Placed) -> str:
     found, colours = [], np.broadcast_to(mark.colours, len(lengths))
     for colour in dict.fromkeys(colours.tolist()):
         own = (colours == colour) & (lengths > 0)
-        shafts = "".join(joined(each) for each in np.stack([tails, necks], axis=1)[own & long])
-        heads = "".join(joined(each, "z") for each in outlines[own])
+        shafts = "".join(joined(np.stack([tails, necks], axis=1)[own & long]))
+        heads = "".join(joined(outlines[own], end="z"))
         found += [path(shafts, stroke=colour, stroke_width=thick), path(heads, fill=colour)]
     return "".join(found)
 
 
 def _polygons(mark: marks.Polygons, placed: Placed) -> str:
-    outlines = [joined(placed.at(outline), "z") for outline in mark.places]
+    outlines = joined(mark.places, placed, "z")
     if not mark.edge:
         return path("".join(outlines), fill=mark.face, opacity=mark.face_opacity)
     inside: Attributes = {"fill": mark.face, "fill_opacity": f"{mark.face_opacity:.3g}"}
