@@ -8,6 +8,11 @@ import numpy as np
 import pytest
 
 from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result
+from photogram.network import Attitude
+from photogram.network.geometry import rotation_matrix
+from photogram.results.findings import duplicates
+from photogram.statistics.findings import IMAGES, Removed
+from photogram.words import phrase
 
 GOLDEN = json.loads(gzip.decompress((Path(__file__).parent / "data/hypotheses/golden.json.gz").read_bytes()))
 SETS = {
@@ -154,10 +159,11 @@ def test_the_verdict_names_the_errors_that_the_data_cannot_distinguish(case, ver
     assert bool(found) is bool(codes)
 
 
-def test_photos_and_points_that_were_entered_twice_are_not_accepted():
-    block = block_of("clean")
+def twice(block, difference, rng):
+    """Return a block with each photo twice; image coordinates of the second one have a `difference` in sd."""
     count = len(block.photo_ids)
-    twice = block.replace(
+    noise = rng.normal(size=block.image_xy.shape) * block.image_sd * difference
+    return block.replace(
         photo_ids=[*block.photo_ids, *(f"again {name}" for name in block.photo_ids)],
         photo_positions=np.tile(block.photo_positions, (2, 1)),
         photo_attitudes=np.tile(block.photo_attitudes, (2, 1)),
@@ -166,11 +172,79 @@ def test_photos_and_points_that_were_entered_twice_are_not_accepted():
         photo_cameras=np.zeros(2 * count, dtype=np.int64),
         image_photos=np.concatenate([block.image_photos, block.image_photos + count]),
         image_points=np.tile(block.image_points, 2),
-        image_xy=np.tile(block.image_xy, (2, 1)),
+        image_xy=np.concatenate([block.image_xy, block.image_xy + noise]),
         image_sd=np.tile(block.image_sd, (2, 1)),
     )
-    verdict = adjust(twice).verdict
+
+
+@pytest.mark.parametrize("difference", [0.0, 0.05])
+def test_photos_that_were_entered_twice_are_not_accepted(difference):
+    verdict = adjust(twice(block_of("clean"), difference, np.random.default_rng(1))).verdict
     assert (verdict.code, verdict.exit) == ("duplicates", 4)
+    assert verdict.message.fields["duplicates"][0].fields["n"] == len(GOLDEN["velocity"])
+
+
+def test_points_that_were_entered_twice_are_not_accepted():
+    block = block_of("clean")
+    count = len(block.point_ids)
+    verdict = adjust(
+        block.replace(
+            point_ids=[*block.point_ids, *(f"again {name}" for name in block.point_ids)],
+            point_positions=np.concatenate([block.point_positions, np.full((count, 3), np.nan)]),
+            point_sd=np.concatenate([block.point_sd, np.full((count, 3), np.inf)]),
+            point_check_sd=None,
+            image_photos=np.tile(block.image_photos, 2),
+            image_points=np.concatenate([block.image_points, block.image_points + count]),
+            image_xy=np.concatenate([block.image_xy, block.image_xy + 0.05 * block.image_sd]),
+            image_sd=np.tile(block.image_sd, (2, 1)),
+        )
+    ).verdict
+    assert (verdict.code, verdict.exit) == ("duplicates", 4)
+
+
+def test_repeated_exposures_from_one_station_are_not_duplicates():
+    """Their measurements are independent: differences are 1.4 times the noise."""
+    assert not duplicates(twice(block_of("clean"), np.sqrt(2), np.random.default_rng(2)))
+
+
+def test_a_misalignment_of_attitudes_is_named_before_an_incomplete_lens():
+    block, clean = block_of("clean"), adjust(block_of("clean"))
+    misalignment = rotation_matrix([[0.003, -0.002, 0.004]])[0]
+    attitudes = [
+        Attitude(name, matrix.T @ misalignment, 1e-4)
+        for name, matrix in zip(block.photo_ids, rotation_matrix(clean.photo_attitudes), strict=True)
+    ]
+    result = adjust(block.replace(observations=[*block.observations, *attitudes]))
+    every = result._hypotheses()
+    assert result.verdict.code == "common-error"
+    assert "boresight" in [every.code[row] for row in every.common()]
+
+
+def test_a_missing_term_of_distortion_is_named_before_gross_errors():
+    block = block_of("clean")
+    camera = block.cameras[0]
+    k = camera.parameters["k"]
+    wrong = Camera("simple_radial", {**camera.parameters, "k": k - 0.02})
+    result = adjust(block.replace(cameras=[wrong]))
+    every = result._hypotheses()
+    assert result.verdict.code in ("common-error", "model")
+    assert every.code[every.common()[0]] == "camera-term"
+    assert every.estimate[every.common()[0], 0] == pytest.approx(0.02, rel=0.2)
+
+
+def test_removed_images_of_one_photo_are_counted_if_they_are_many():
+    suspects = adjust(block_of("clean"))._trial().suspects
+    images = np.flatnonzero((suspects.kinds == 0) & (suspects.photos == 2))
+    for count, excessive in (
+        (3, []),
+        (len(images) // 2, [phrase("test.images_of", photo="2")]),
+        (len(images), []),
+    ):
+        removed = np.isin(np.arange(len(suspects)), images[:count])
+        rows = np.repeat(removed, np.diff(suspects.row_starts))
+        counts = suspects.counts(rows, np.ones(len(suspects), dtype=bool))
+        found = Removed([], counts).excessive
+        assert [kind for kind in found if kind != IMAGES] == excessive
 
 
 def test_one_distance_alone_leaves_the_scale_unchecked():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
-from photogram.arguments.types import Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.messages import Undetermined
 from photogram.network.block import Block
 from photogram.results.axes import point_axes
@@ -53,6 +53,7 @@ def network_findings(
     rejected = test is not None and (test.rejected_high or test.rejected_low)
     assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
+    rivals = largest_odds(fixed)
     return Findings(
         status=result.status,
         observations=[
@@ -70,7 +71,8 @@ def network_findings(
         unsupported=[] if lost is None else lost.unsupported,
         remarks=[*unseen(result), *assumptions],
         unchecked=[] if summary is None else summary.hypotheses.unchecked(),
-        common=[] if summary is None else summary.hypotheses.common_errors(largest_odds(fixed)),
+        common=[] if summary is None else summary.hypotheses.common_errors(rivals),
+        common_fall=0.0 if summary is None else summary.hypotheses.explained(rivals),
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )
@@ -141,7 +143,7 @@ def block_findings(result: Result) -> Findings:
         intersected=intersected,
         scaled=result.unit_variance != "unity",
         remarks=[*found.remarks, *left_out, *_on_checks(result)],
-        duplicates=duplicates(result.block),
+        duplicates=duplicates(result.block, found.global_test.factor if found.global_test else 1.0),
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=set_aside,
@@ -191,35 +193,45 @@ def unseen(result: AdjustedNetwork) -> list[Phrase]:
 FEWEST = 4  # Equal image observations of two photos
 SHARE = 0.5  # Share of equal observations of a photo
 FEWEST_OF_POINT = 2  # Equal image observations of two points
+EQUAL = 0.25  # Largest differences of copies, in standard deviations of image observations
 
 
-def duplicates(block: Block) -> list[Phrase]:
-    """Return messages on photos, and on points, that have the same image observations."""
-    # Different observations have different sums and are not compared.
-    sums = np.sort(block.image_xy[:, 0] * np.pi + block.image_xy[:, 1])
-    if not (np.diff(sums) == 0).any():
-        return []
+def duplicates(block: Block, factor: float = 1.0) -> list[Phrase]:
+    """Return messages on photos, and on points, that have the same image observations within their noise.
+
+    `factor` is the factor of the given standard deviations that the residuals indicate.
+    """
+    limit = EQUAL * min(factor, 1.0) * float(np.median(block.image_sd)) if len(block.image_xy) else 0.0
     messages = []
     for name, owners, others, ids, fewest in (
         ("photos", block.image_photos, block.image_points, block.photo_ids, FEWEST),
         ("points", block.image_points, block.image_photos, block.point_ids, FEWEST_OF_POINT),
     ):
-        pairs = _equal_pairs(owners, others, block, fewest)
+        pairs = _equal_pairs(owners, others, block.image_xy, limit, fewest)
         if pairs:
             names = [phrase("part.pair", first=str(ids[i]), second=str(ids[j])) for i, j in pairs]
             messages.append(phrase(f"duplicates.{name}", n=len(names), names=names))
     return messages
 
 
-def _equal_pairs(owners: Indices, others: Indices, block: Block, fewest: int) -> list[tuple[int, int]]:
-    """Return pairs of owners with mostly equal image observations."""
-    xy = block.image_xy
-    order = np.lexsort((xy[:, 1], xy[:, 0], others))
-    first, second = order[:-1], order[1:]
-    equal = (others[first] == others[second]) & (xy[first] == xy[second]).all(axis=1)
-    if not equal.any():
+def _equal_pairs(
+    owners: Indices, others: Indices, xy: Floats, limit: float, fewest: int
+) -> list[tuple[int, int]]:
+    """Return pairs of owners whose observations are mostly equal within a limit."""
+    # Sums of different coordinates on one photo, or of one point, are rarely near each other.
+    sums = xy[:, 0] + xy[:, 1] / np.pi
+    low = float(sums.min(initial=0.0))
+    keys = others * (2.0 * (float(sums.max(initial=0.0)) - low) + 1.0) + (sums - low)
+    if np.count_nonzero(np.diff(np.sort(keys)) <= 2 * limit) < fewest:
         return []
+    order = np.argsort(keys)
+    first, second = order[:-1], order[1:]
+    near = np.flatnonzero(np.diff(keys[order]) <= 2 * limit)
+    first, second = first[near], second[near]
+    equal = (np.abs(xy[first] - xy[second]) <= limit).all(axis=1) & (others[first] == others[second])
     pairs = np.sort(np.column_stack([owners[first[equal]], owners[second[equal]]]), axis=1)
+    if not len(pairs):
+        return []
     found, counts = np.unique(pairs, axis=0, return_counts=True)
     sizes = np.bincount(owners, minlength=int(owners.max()) + 1)
     most = counts >= np.maximum(fewest, SHARE * sizes[found].min(axis=1))

@@ -32,9 +32,6 @@ DRAWN = 300  # Largest number of points whose changes are stored for plots
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
-LENSES = frozenset(
-    {"camera-term", "bending"}
-)  # Errors that patterns of residuals reveal, or that have such a cause
 OF_CAMERAS = frozenset({"camera-f", "camera-point", "camera-term", "readout-time"})
 EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
 LISTED = 10  # Rows of each table of documents
@@ -200,14 +197,12 @@ class Hypotheses:
         The first is the most likely. `rivals` are the largest log odds of an error of a fixed value.
         """
         odds, sets = self.log_odds, range(len(self.sets))
-        found = [k for k in sets if self.code[k] not in LENSES and self.probability[k] < DETECTION[0]]
-        first = max(found, key=lambda row: odds[row], default=0)
-        excess = EXPLAINED * self.excess
-        if not found or odds[first] < max(self.single_odds, rivals) or self.statistic[first] < excess:
+        found = [k for k in sets if self.code[k] != "bending" and self.probability[k] < DETECTION[0]]
+        found.sort(key=lambda row: -odds[row])
+        if not found or odds[found[0]] < max(self.single_odds, rivals):
             return []
-        # A term of distortion may explain the same residuals better.
-        terms = [k for k in sets if self.code[k] == "camera-term" and odds[k] > odds[first]]
-        found = sorted([*terms, *found], key=lambda row: -odds[row])
+        if self.statistic[found[0]] < EXPLAINED * self.excess:
+            return []
         return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
@@ -222,6 +217,10 @@ class Hypotheses:
             )
             for row in found
         ]
+
+    def explained(self, rivals: float = -math.inf) -> float:
+        """Return the decrease of the sum of squares with the most likely of these errors; 0 without any."""
+        return max((float(self.statistic[row]) for row in self.common(rivals)[:1]), default=0.0)
 
     def _size(self, row: int) -> str:
         """Return the estimate of a set with its standard deviation; the largest of several."""

@@ -26,6 +26,8 @@ KINDS = ("image", "control", "position", "attitude", "observation", "camera", "u
 """Items of the suspects of the core by number."""
 IMAGE, CONTROL, POSITION, ATTITUDE, OBSERVATION = range(5)
 
+MANY, MOST_OF_PHOTO = 4, 0.25  # Smallest number, and share, of removed images of a photo that is doubtful
+
 _TESTS = ("active", "rank", "statistic", "least", "residual", "error", "error_sd")
 
 T = TypeVar("T")
@@ -232,7 +234,10 @@ class NamedSuspects(ABC):
         return self.other_name(kind, subject)
 
     def counts(self, rows: Bools, used: Bools) -> dict[Text, tuple[int, int]]:
-        """Return the numbers of groups with removed rows, and of all used groups, by type."""
+        """Return the numbers of groups with removed rows, and of all used groups, by type.
+
+        A photo of which many images were removed is a type of its own.
+        """
         removed = self.with_any(rows)
         found: dict[Text, tuple[int, int]] = {}
         for kind in np.unique(self.kinds[removed]).tolist():
@@ -241,7 +246,22 @@ class NamedSuspects(ABC):
             for each in dict.fromkeys(types[removed[own]].tolist()):
                 same = types == each
                 found[each] = (int(removed[own][same].sum()), int(same.sum()))
-        return found
+        return {**found, **self._of_photos(removed, used | removed)}
+
+    def _of_photos(self, removed: Bools, used: Bools) -> dict[Text, tuple[int, int]]:
+        """Return these numbers of images of photos that lost many of them, but not all."""
+        images = (self.kinds == IMAGE) & used
+        count = len(self.given.photo_ids)
+        all_ = np.bincount(self.photos[images], minlength=count)
+        lost = np.bincount(self.photos[images & removed], minlength=count)
+        many = np.flatnonzero((lost >= MANY) & (lost > MOST_OF_PHOTO * all_) & (lost < all_))
+        return {
+            phrase("test.images_of", photo=str(self.given.photo_ids[photo])): (
+                int(lost[photo]),
+                int(all_[photo]),
+            )
+            for photo in many.tolist()
+        }
 
     def with_any(self, rows: Bools) -> Bools:
         """Return (G,) groups with any of some rows."""

@@ -30,6 +30,8 @@ ENOUGH = 20  # Smallest number of test values for a median
 EXPLAINED, SINGLE = 0.8, 0.2
 """Parts of the excess of the sum of squares: least part of a lens, largest part of one observation."""
 
+LENS_PARAMETERS = 7  # Parameters of the lens model whose decrease of the sum of squares is known
+
 WITHHELD = 0.001  # Significance level of check points that forbid the use of the result
 
 MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
@@ -224,6 +226,9 @@ class Evidence:
         """
         fall, single = self._falls
         if not fall or not self.high or self.test is None or self.found.exchanged:
+            return False
+        # An error in common with fewer parameters explains the same residuals better.
+        if fall < self.found.common_fall + LENS_PARAMETERS * math.log(max(self.number, 2)):
             return False
         too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
         return fall > EXPLAINED * too_much and single < SINGLE * too_much

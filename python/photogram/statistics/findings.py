@@ -265,6 +265,7 @@ class Findings:
     # Detected common errors of sets of observations, and whether they forbid the use
     common: Sequence[Text] = ()
     common_is_harmful: bool = False
+    common_fall: float = 0.0  # Decrease of the weighted sum of squares with the most likely of them
     # Undetectable errors that affect many points, the worst first
     unchecked: Sequence[Text] = ()
     snooped: Removed | None = None
