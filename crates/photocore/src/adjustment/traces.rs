@@ -52,12 +52,12 @@ const COLUMNS: usize = 64;
 #[derive(Clone, Copy)]
 struct Column {
     class: usize,
-    what: Kind,
+    what: Probe,
     weight: f64,
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum Probe {
     /// One at the equation with this index in each group.
     Unit(usize),
     Signs(u64),
@@ -94,9 +94,9 @@ impl<'a> Numbered<'a> {
             exact.push(largest <= probing.exact.max(probing.vectors));
             let column = |what, weight| Column { class, what, weight };
             if exact[class] {
-                columns.extend((0..largest).map(|k| column(Kind::Unit(k), 1.0)));
+                columns.extend((0..largest).map(|k| column(Probe::Unit(k), 1.0)));
             } else {
-                let signs = |k: usize| Kind::Signs(mixed(probing.seed ^ mixed(k as u64 + 1)));
+                let signs = |k: usize| Probe::Signs(mixed(probing.seed ^ mixed(k as u64 + 1)));
                 let weight = (probing.vectors.max(1) as f64).recip();
                 columns.extend((0..probing.vectors.max(1)).map(|k| column(signs(k), weight)));
             }
@@ -109,8 +109,8 @@ impl<'a> Numbered<'a> {
             let (group, number) = (self.groups.of[row], self.number[row]);
             if group < self.groups.count && group % classes == column.class && number != usize::MAX {
                 *z = match column.what {
-                    Kind::Unit(k) => f64::from(u8::from(number == k)),
-                    Kind::Signs(seed) => 1.0 - 2.0 * (mixed(seed ^ row as u64) >> 63) as f64,
+                    Probe::Unit(k) => f64::from(u8::from(number == k)),
+                    Probe::Signs(seed) => 1.0 - 2.0 * (mixed(seed ^ row as u64) >> 63) as f64,
                 };
             }
         }
