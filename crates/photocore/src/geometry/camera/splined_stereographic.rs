@@ -46,13 +46,13 @@ struct Grid {
 }
 
 /// Nonzero spline values at a position along an axis, their slopes, and the first knot.
-struct Basis {
+struct SplineBasis {
     first: usize,
     values: [f64; NODES],
     slopes: [f64; NODES],
 }
 
-impl Basis {
+impl SplineBasis {
     /// Evaluates the basis at a position in units of knots, of which there are `count`; the edge polynomials extrapolate.
     #[inline]
     fn at(place: f64, count: usize, nodes: usize) -> Self {
@@ -93,10 +93,10 @@ impl Grid {
 
     /// Returns the splines along columns and rows at a position of the stereographic image.
     #[inline]
-    fn bases(&self, place: [f64; 2]) -> [Basis; 2] {
+    fn bases(&self, place: [f64; 2]) -> [SplineBasis; 2] {
         [0, 1].map(|k| {
             let at = self.per_place * place[k] + 0.5 * (self.size[k] as f64 - 1.0);
-            Basis::at(at, self.size[k], self.nodes)
+            SplineBasis::at(at, self.size[k], self.nodes)
         })
     }
 }
