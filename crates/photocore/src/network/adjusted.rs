@@ -7,7 +7,7 @@ use super::input::{Network, Point};
 use super::model::Bundle;
 use super::problem::Assembled;
 use super::selection::TOGETHER;
-use super::stations::Placed;
+use super::stations::Stations;
 use crate::adjustment::{Adjustment, Problem};
 use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Cofactors;
@@ -56,7 +56,7 @@ pub(super) fn adjusted_photos(
     let model = &problem.model;
     let origin = model.origin;
     let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
-    let placed = model.placed(&unknowns[model.of_stations()]);
+    let stations = model.without_points(&unknowns[model.of_stations()]);
     let photo = |index: usize| {
         let photo = &network.photos[index];
         let range = model.of_photo(index);
@@ -82,7 +82,7 @@ pub(super) fn adjusted_photos(
             // In a node of a larger network, its images may belong to child nodes.
             let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
             let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
-            let (pose, cofactors) = mounted_pose(network, problem, &placed, index, cofactors);
+            let (pose, cofactors) = mounted_pose(network, problem, &stations, index, cofactors);
             let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; POSE];
             return AdjustedPhoto { pose, camera, cofactors, redundancy, images: model.images_on[index] };
         }
@@ -109,7 +109,7 @@ pub(super) fn adjusted_photos(
 fn mounted_pose(
     network: &Network,
     problem: &Problem<Bundle>,
-    Placed { photos, mounted, .. }: &Placed,
+    Stations { photos, mounted, .. }: &Stations,
     photo: usize,
     cofactors: Option<&Cofactors>,
 ) -> ([f64; POSE], DMatrix<f64>) {

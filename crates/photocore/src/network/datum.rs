@@ -4,14 +4,13 @@ use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{Matrix4, Vector6};
 
-use super::commons::Motion;
+use super::commons::SimilarityMotion;
 use super::error::NetworkError;
-use super::input::Network;
+use super::input::{InnerConstraints, Network};
 use super::model::Bundle;
-use super::parts::{Joined, MOST_PARTS, MOTIONS, Part, Parts};
+use super::parts::{Component, Components, Joined, MOST_PARTS, MOTIONS};
 use super::problem::Assembled;
-use super::state::InnerConstraints;
-use super::stations::{Placed, Station, Stations};
+use super::stations::{Station, Stations};
 use crate::Threads;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
@@ -45,12 +44,12 @@ fn along(shift: Vector3, rotation: &Vector3, scale: f64) -> Vector3 {
 
 impl Bundle {
     /// Returns the connected components of the network, computed at first use.
-    pub(super) fn parts(&self) -> &Parts {
+    pub(super) fn parts(&self) -> &Components {
         self.parts.get_or_init(|| self.find_parts())
     }
 
     /// Finds the connected components; a frame counts the images of all photos on it.
-    fn find_parts(&self) -> Parts {
+    fn find_parts(&self) -> Components {
         let (photos, points) = (self.images_on.len(), self.points.len());
         let of_point = |point: usize| photos + point;
         let of_common = |common: usize| photos + points + common;
@@ -99,9 +98,9 @@ impl Bundle {
         let most = |best: usize, &next: &usize| if images_on[next] > images_on[best] { next } else { best };
         let part = |(_, photos): (usize, Vec<usize>)| {
             let central = asked.filter(|_| has_asked(&photos));
-            Part { central: central.unwrap_or_else(|| photos.iter().fold(photos[0], most)), photos }
+            Component { central: central.unwrap_or_else(|| photos.iter().fold(photos[0], most)), photos }
         };
-        Parts { all: found.into_iter().map(part).collect(), of_photo, of_point, of_common }
+        Components { all: found.into_iter().map(part).collect(), of_photo, of_point, of_common }
     }
 
     /// Returns the similarity transformations of each component about its central photo. The preferred datum is the pose of this photo and,
@@ -111,7 +110,7 @@ impl Bundle {
         if parts.all.is_empty() {
             return None;
         }
-        let placed = self.placed(&unknowns[self.of_stations()]);
+        let placed = self.without_points(&unknowns[self.of_stations()]);
         let photos = &placed.photos;
         let origins: Vec<Vector3> =
             parts.all.iter().map(|part| photos[part.central].orientation.centre()).collect();
@@ -146,7 +145,7 @@ impl Bundle {
             let turn = if (3..6).contains(&k) { Vector3::ith(k - 3, 1.0) } else { Vector3::zeros() };
             let scale = if k == SCALE { 2.0 } else { 1.0 };
             let displacement = |place: &Vector3| displacement(k, &(place - origins[part]));
-            let motion = Motion { displacement: &displacement, turn, scale };
+            let motion = SimilarityMotion { displacement: &displacement, turn, scale };
             self.move_commons_of(parts, part, vector, |vector| {
                 self.move_commons(&placed, &motion, |common, state| common.change(state, &motion), vector);
             });
@@ -167,13 +166,14 @@ impl Bundle {
     /// Returns the preferred datum by component: pose of its central photo, then coordinates of distant photos along their direction.
     fn preferred(
         &self,
-        parts: &Parts,
+        parts: &Components,
         photos: &[Station],
         origins: &[Vector3],
         vectors: &[Vec<f64>],
     ) -> Vec<usize> {
         let mut preferred = vec![];
-        for (part, (Part { photos: own, central }, origin)) in parts.all.iter().zip(origins).enumerate() {
+        for (part, (Component { photos: own, central }, origin)) in parts.all.iter().zip(origins).enumerate()
+        {
             preferred.extend(self.holding(*central));
             let asked = self.datum.minimum.filter(|minimum| self.carrier(minimum.photo) == *central);
             let coordinate = asked.and_then(|minimum| minimum.coordinate);
@@ -217,7 +217,7 @@ impl Bundle {
     /// Calls `moved`, but changes only shared parameters of one component.
     fn move_commons_of(
         &self,
-        parts: &Parts,
+        parts: &Components,
         part: usize,
         unknowns: &mut [f64],
         moved: impl FnOnce(&mut [f64]),
@@ -232,13 +232,20 @@ impl Bundle {
     /// Transforms each component exactly, along the motion with rates e, w and s for unit time: a rotation about any centre fixes this
     /// centre. P -> o + e^s Exp(w) (P - o) + V e, with o the centre of the central photo.
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
-        let (parts, placed) = (self.parts(), self.placed(&unknowns[self.of_stations()]));
+        let (parts, placed) = (self.parts(), self.without_points(&unknowns[self.of_stations()]));
         for (part, amounts) in amounts.chunks_exact(MOTIONS).take(parts.all.len()).enumerate() {
             self.move_part(parts, &placed, part, unknowns, amounts);
         }
     }
 
-    fn move_part(&self, parts: &Parts, placed: &Placed, part: usize, unknowns: &mut [f64], amounts: &[f64]) {
+    fn move_part(
+        &self,
+        parts: &Components,
+        placed: &Stations,
+        part: usize,
+        unknowns: &mut [f64],
+        amounts: &[f64],
+    ) {
         let photos = &placed.photos;
         let origin = photos[parts.all[part].central].orientation.centre();
         let shift = Vector3::new(amounts[0], amounts[1], amounts[2]);
@@ -247,7 +254,7 @@ impl Bundle {
         let shift = along(shift, &rotation, amounts[SCALE]);
         let moved = |place: Vector3| origin + scale * (turn * (place - origin)) + shift;
         let displacement = |place: &Vector3| moved(*place) - place;
-        let motion = Motion { displacement: &displacement, turn: rotation, scale };
+        let motion = SimilarityMotion { displacement: &displacement, turn: rotation, scale };
         self.move_commons_of(parts, part, unknowns, |unknowns| {
             self.move_commons(placed, &motion, |common, state| common.moved(state, &motion), unknowns);
         });

@@ -20,7 +20,7 @@
 //! | values and equations at given parameters | `evaluated`, `diverging`, `composed`, `passing`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
 //! | unknowns and observations | `station_values`, `layout`, `bundle`, `model`, `camera_priors`, `blocks`, `stations` |
 //! | selection of the input | `check`, `neighbourhood`, `selection` |
-//! | input and errors | `error`, `surroundings`, `state`, `input` |
+//! | input and errors | `error`, `surroundings`, `input` |
 //! | types of observations and parameters | `passages`, `observations`, `mounts`, `film`, `commons` |
 //! | numbers | `parts` |
 //!
@@ -100,7 +100,6 @@ mod screens;
 mod selection;
 pub mod snooping;
 mod solution;
-mod state;
 mod station_values;
 mod stations;
 mod surroundings;
@@ -118,7 +117,10 @@ pub use covariance::{Covariances, Of};
 pub use error::{Coarse, Combination, NetworkError, PosePart};
 pub use group_tests::Tests;
 pub use groups::Groups;
-pub use input::{Camera, Image, Minimum, Network, Options, Photo, Point, Screens, Start, UnitVariance};
+pub use input::{
+    Camera, Image, InnerConstraints, Minimum, Network, NetworkDatum, Options, Photo, Point, Screens, Start,
+    State, UnitVariance,
+};
 #[doc(hidden)]
 pub use intersection::meet;
 pub use mounts::{Mount, Trajectory};
@@ -132,7 +134,6 @@ pub use selection::{Dropped, Reason};
 pub use solution::{
     DatumInForce, Joint, LEAST_REDUNDANCY, Redundancies, Solution, SumsOfSquares, Unseen, Weak,
 };
-pub use state::{InnerConstraints, NetworkDatum, State};
 pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::{Subject, Suspects};
 pub use trial::{Converged, Out, Outcome, Trial};

@@ -4,12 +4,11 @@
 //! Then W = Q B and the cofactors of outer parameters are passed from parents to children, and each node transforms its own cofactors.
 
 use super::error::NetworkError;
-use super::input::{Network, Options};
+use super::input::{InnerConstraints, Network, Options};
 use super::model::Owner;
 use super::node::{FormedNode, Node};
 use super::problem::Assembled;
 use super::selection::Selected;
-use super::state::InnerConstraints;
 use super::surroundings::Surroundings;
 use crate::Threads;
 use crate::adjustment::{Adjusted, DatumColumns, Watch, moved_with_columns};

@@ -1,8 +1,7 @@
 //! Selection of the points that take part in the adjustment.
 
 use super::error::NetworkError;
-use super::input::Network;
-use super::state::State;
+use super::input::{Network, State};
 use super::surroundings::Surroundings;
 use crate::parallel;
 use crate::sorting::sort_by;

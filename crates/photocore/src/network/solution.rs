@@ -10,12 +10,11 @@ use super::adjusted::{
 };
 use super::cameras::AdjustedCamera;
 use super::error::NetworkError;
-use super::input::{Network, Options, UnitVariance};
+use super::input::{Network, Options, State, UnitVariance};
 use super::model::{Bundle, Owner};
 use super::observations::{AdjustedObservation, KindSums};
 use super::problem::Assembled;
 use super::selection::Dropped;
-use super::state::State;
 use super::trial::Converged;
 use super::weak_points::WeakPoint;
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};

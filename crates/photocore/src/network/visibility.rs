@@ -4,7 +4,7 @@ use super::input::Image;
 use super::problem::Assembled;
 use super::selection::TOGETHER;
 use super::solution::{Solution, Unseen};
-use super::stations::{Placed, Station};
+use super::stations::{Station, Stations};
 use crate::parallel;
 
 impl Solution {
@@ -16,7 +16,7 @@ impl Solution {
         unknowns: &[f64],
     ) -> Vec<f64> {
         let model = &problem.model;
-        let Placed { photos, films, .. } = model.placed(&unknowns[model.of_stations()]);
+        let Stations { photos, films, .. } = model.without_points(&unknowns[model.of_stations()]);
         let mut of_shared = vec![None; model.stations()];
         let fold = |(station, block): (&Station, &Option<usize>)| match *block {
             None => station.camera.fold(),
