@@ -3,7 +3,7 @@
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
 use super::model::{Unit, parameters};
-use super::radial_tangential::{Distorted, RadialTangential, DistortionTerms, power_of};
+use super::radial_tangential::{Distorted, DistortionTerms, RadialTangential, power_of};
 
 /// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, to which they are added.
 ///
