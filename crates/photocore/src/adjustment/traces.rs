@@ -50,7 +50,7 @@ const COLUMNS: usize = 64;
 
 /// Column z: unit vectors or random signs on the groups of a class, which have equal remainders of their index.
 #[derive(Clone, Copy)]
-struct Column {
+struct ProbeColumn {
     class: usize,
     what: Probe,
     weight: f64,
@@ -86,13 +86,13 @@ impl<'a> Numbered<'a> {
     }
 
     /// Returns the columns for a number of classes of groups.
-    fn columns(&self, classes: usize, probing: &Probing) -> (Vec<Column>, Vec<bool>) {
+    fn columns(&self, classes: usize, probing: &Probing) -> (Vec<ProbeColumn>, Vec<bool>) {
         let (mut columns, mut exact) = (vec![], vec![]);
         for class in 0..classes {
             let largest = self.equations[..self.groups.count].iter().skip(class).step_by(classes).max();
             let largest = largest.copied().unwrap_or(0);
             exact.push(largest <= probing.exact.max(probing.vectors));
-            let column = |what, weight| Column { class, what, weight };
+            let column = |what, weight| ProbeColumn { class, what, weight };
             if exact[class] {
                 columns.extend((0..largest).map(|k| column(Probe::Unit(k), 1.0)));
             } else {
@@ -104,7 +104,7 @@ impl<'a> Numbered<'a> {
         (columns, exact)
     }
 
-    fn write(&self, column: Column, classes: usize, z: &mut [f64]) {
+    fn write(&self, column: ProbeColumn, classes: usize, z: &mut [f64]) {
         for (row, z) in z.iter_mut().enumerate() {
             let (group, number) = (self.groups.of[row], self.number[row]);
             if group < self.groups.count && group % classes == column.class && number != usize::MAX {
@@ -191,10 +191,10 @@ impl Linearized {
         &self,
         problem: &AnyProblem<'_>,
         numbered: &Numbered<'_>,
-        (columns, classes): (&[Column], usize),
+        (columns, classes): (&[ProbeColumn], usize),
         threads: &Threads,
         between: Between<'_>,
-        mut tell: impl FnMut(Column, &[f64]),
+        mut tell: impl FnMut(ProbeColumn, &[f64]),
     ) -> Result<(), AdjustError> {
         let height = problem.equations().max(1);
         for together in columns.chunks((TOGETHER / height).clamp(1, COLUMNS)) {

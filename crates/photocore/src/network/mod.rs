@@ -131,9 +131,7 @@ pub use passages::Passage;
 pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
 pub use selection::{Dropped, Reason};
-pub use solution::{
-    DatumInForce, Joint, LEAST_REDUNDANCY, Redundancies, Solution, SumsOfSquares, Unseen, Weak,
-};
+pub use solution::{DatumInForce, Joint, LEAST_REDUNDANCY, Solution, SumsByType, Unseen, Weak};
 pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::{Subject, Suspects};
 pub use trial::{Converged, Out, Outcome, Trial};

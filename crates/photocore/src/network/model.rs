@@ -85,6 +85,20 @@ pub enum Owner {
     Common(usize),
 }
 
+impl Owner {
+    pub fn photo(self) -> Option<usize> {
+        if let Self::Photo(photo) = self { Some(photo) } else { None }
+    }
+
+    pub fn camera(self) -> Option<usize> {
+        if let Self::Camera(camera) = self { Some(camera) } else { None }
+    }
+
+    pub fn common(self) -> Option<usize> {
+        if let Self::Common(common) = self { Some(common) } else { None }
+    }
+}
+
 impl Bundle {
     /// Returns the range of parameters of photos, shared cameras and shared parameters among all.
     pub fn of_stations(&self) -> Range<usize> {
