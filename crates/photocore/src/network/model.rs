@@ -10,10 +10,10 @@ use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, InBlock, PlacedCommon};
 use super::input::{Image, Minimum, Point, Screens};
 use super::mounts::{AT_PHOTO, Mounts};
+use super::neighbourhood::PointImages;
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Components;
 use super::passages::Passages;
-use super::selection::PointImages;
 use super::stations::{Refracted, Station, Stations};
 use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,

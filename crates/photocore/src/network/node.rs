@@ -8,7 +8,7 @@ use super::error::NetworkError;
 use super::input::{Image, Network, Options, Point};
 use super::model::Owner;
 use super::problem::Assembled;
-use super::selection::Dropped;
+use super::selection::{Dropped, Selected};
 use super::solution::{Solution, SumsByType, observations, owned, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
 use crate::Threads;
@@ -65,6 +65,18 @@ pub struct NodePrediction {
 const FOUND: usize = 7;
 
 impl Network {
+    /// Returns the active parts of the whole network.
+    pub(super) fn select_whole(
+        &self,
+        middle: Option<[f64; 3]>,
+        threads: &Threads,
+    ) -> Result<Selected, NetworkError> {
+        self.check()?;
+        let left_out = self.left_out(self.untouched_photos(), None)?;
+        let surroundings = Surroundings { middle, ..Surroundings::default() };
+        Ok(threads.install(|| self.select(&left_out, surroundings)))
+    }
+
     /// Returns the parameters that an adjustment of the whole network fixes as its datum: photo and number of the pose parameter (see
     /// [`Surroundings::held`]). The list is empty if the network defines a datum.
     ///

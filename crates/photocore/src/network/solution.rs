@@ -6,9 +6,8 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::adjusted::{
-    AdjustedCommon, AdjustedPhoto, AdjustedPoint, adjusted_photos, adjusted_points, in_order,
+    AdjustedCamera, AdjustedCommon, AdjustedPhoto, AdjustedPoint, adjusted_photos, adjusted_points, in_order,
 };
-use super::cameras::AdjustedCamera;
 use super::error::NetworkError;
 use super::input::{Network, Options, State, UnitVariance};
 use super::model::{Bundle, Owner};
@@ -16,6 +15,7 @@ use super::observations::{AdjustedObservation, KindSums};
 use super::problem::Assembled;
 use super::selection::Dropped;
 use super::trial::Converged;
+use super::visibility::{Unseen, find_unseen};
 use super::weak_points::WeakPoint;
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
@@ -46,15 +46,6 @@ impl SumsByType {
     pub fn total(&self) -> f64 {
         self.camera + self.ground + self.plates + self.observations
     }
-}
-
-/// Physically impossible images, ascending.
-#[derive(Debug, Default)]
-pub struct Unseen {
-    /// Images of points behind the camera.
-    pub behind: Vec<usize>,
-    /// Images outside the invertible area of the lens model: they may belong to another direction.
-    pub folded: Vec<usize>,
 }
 
 /// Weakly determined points, and the parameters of combinations along which the iteration did not converge.
@@ -232,7 +223,8 @@ impl Solution {
             variance_of_unit_weight,
             adjustment,
         };
-        let squares = solution.find_behind(assembled, &unknowns);
+        let (squares, unseen) = find_unseen(assembled, &unknowns, &mut solution.points);
+        solution.unseen = unseen;
         let (model, points) = (&problem.model, &assembled.points[..]);
         solution.weak.points = network.weak_points(model, points, &solution.points, &squares);
         let found = Leverages::of(&mut solution.adjustment, &unknowns);
