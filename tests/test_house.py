@@ -146,6 +146,21 @@ def test_files_of_the_engine_name_each_other_in_no_circle(folder):
     assert list(TopologicalSorter(inside).static_order())
 
 
+def test_types_from_a_network_to_covariances_are_few_and_exist():
+    """The table of the main types, in the documentation of the crate."""
+    table = re.findall(
+        r"^//! \|[^|]+\| `(\w+)` \|([^|]+)\|$", (CRATE / "lib.rs").read_text(encoding="utf-8"), re.M
+    )
+    types = [(layer, name) for layer, names in table for name in re.findall(r"`(\w+)`", names)]
+    assert 20 < len(types) == len(set(types)) <= 30
+    text = {
+        layer: "".join(path.read_text(encoding="utf-8") for path in (CRATE / layer).rglob("*.rs"))
+        for layer in KNOWS
+    }
+    for layer, name in types:
+        assert re.search(rf"\b(struct|enum|trait|type) {name}\b", text[layer]), f"{layer} has no {name}"
+
+
 def test_files_of_a_network_import_in_the_order_of_their_table():
     table = order(CRATE / "network")
     assert len(table) == len(set(table)) > 30

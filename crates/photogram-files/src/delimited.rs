@@ -18,7 +18,7 @@ const PART: usize = 1 << 18;
 pub struct Table {
     delimiter: u8,
     columns: Vec<Column>,
-    state: State,
+    state: ParserState,
 }
 
 /// Column of a table.
@@ -32,7 +32,7 @@ pub enum Column {
 
 /// Conditions that previous lines impose on the next ones.
 #[derive(Debug, Default)]
-struct State {
+struct ParserState {
     /// Decimal mark of all numbers, set by the first number with a mark.
     mark: Option<u8>,
     /// Whether a blank line was read: no line may follow.
@@ -40,9 +40,9 @@ struct State {
 }
 
 /// Cells of some lines.
-struct Part {
+struct TextPart {
     columns: Vec<Cells>,
-    state: State,
+    state: ParserState,
     /// Number of lines that are not blank.
     lines: usize,
 }
@@ -59,7 +59,7 @@ impl Table {
         let column = |&numeric: &bool| {
             if numeric { Column::Numbers(vec![]) } else { Column::Names(Names::default()) }
         };
-        Self { delimiter, columns: numeric.iter().map(column).collect(), state: State::default() }
+        Self { delimiter, columns: numeric.iter().map(column).collect(), state: ParserState::default() }
     }
 
     /// Returns the columns.
@@ -69,7 +69,7 @@ impl Table {
 
     /// Appends whole lines, on the threads of the current pool. Returns `None` for an irregular line; the table is then unusable.
     pub fn add(&mut self, piece: &[u8]) -> Option<()> {
-        let parts: Vec<Part> =
+        let parts: Vec<TextPart> =
             parts_of(piece).into_par_iter().map(|lines| self.part(piece, lines)).collect::<Option<_>>()?;
         for part in &parts {
             self.state.follow(part)?;
@@ -81,9 +81,9 @@ impl Table {
     }
 
     /// Reads whole lines of a piece.
-    fn part(&self, piece: &[u8], lines: Range<usize>) -> Option<Part> {
+    fn part(&self, piece: &[u8], lines: Range<usize>) -> Option<TextPart> {
         let columns = self.columns.iter().map(Column::cells).collect();
-        let mut part = Part { columns, state: State::default(), lines: 0 };
+        let mut part = TextPart { columns, state: ParserState::default(), lines: 0 };
         let (mut at, text) = (lines.start, &piece[..lines.end]);
         while at < text.len() {
             let first = after_blanks(text, at, b'\n');
@@ -104,7 +104,7 @@ impl Table {
     }
 
     /// Appends a line to a part; returns the start of the next line.
-    fn line(&self, piece: &[u8], mut at: usize, part: &mut Part) -> Option<usize> {
+    fn line(&self, piece: &[u8], mut at: usize, part: &mut TextPart) -> Option<usize> {
         for (k, (column, cells)) in self.columns.iter().zip(&mut part.columns).enumerate() {
             if k > 0 {
                 if piece.get(at) != Some(&self.delimiter) {
@@ -172,9 +172,9 @@ impl Column {
     }
 }
 
-impl State {
+impl ParserState {
     /// Appends the state of a part; `None` if its lines may not follow.
-    fn follow(&mut self, part: &Part) -> Option<()> {
+    fn follow(&mut self, part: &TextPart) -> Option<()> {
         let marks = self.mark.is_none() || part.state.mark.is_none() || self.mark == part.state.mark;
         if !marks || (self.ended && part.lines > 0) {
             return None;
@@ -251,7 +251,7 @@ pub struct Names {
     pub text: Vec<u8>,
     starts: Vec<usize>,
     /// Hash table: a power of two of slots, at most half of them filled.
-    slots: Vec<Slot>,
+    slots: Vec<ColumnSlot>,
     hashes: RandomState,
     /// Whether names contain lower-case or upper-case letters.
     lower: bool,
@@ -261,7 +261,7 @@ pub struct Names {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Slot {
+struct ColumnSlot {
     hash: u32,
     /// Index of a name, from 1; 0 for a free slot.
     number: u32,
@@ -294,7 +294,7 @@ impl Names {
             self.text.extend_from_slice(name);
             self.text.push(b'\n');
             self.slots[slot] =
-                Slot { hash: (hash >> 32) as u32, number: u32::try_from(self.starts.len()).ok()? };
+                ColumnSlot { hash: (hash >> 32) as u32, number: u32::try_from(self.starts.len()).ok()? };
         }
         Some(i64::from(self.slots[slot].number) - 1)
     }
@@ -319,14 +319,14 @@ impl Names {
 
     fn grow(&mut self) {
         let count = (2 * self.slots.len()).max(64);
-        self.slots = vec![Slot { hash: 0, number: 0 }; count];
+        self.slots = vec![ColumnSlot { hash: 0, number: 0 }; count];
         for (number, name) in (1..).zip(self.text.split(|&byte| byte == b'\n').take(self.starts.len())) {
             let hash = self.hashes.hash_one(name);
             let mut at = hash as usize & (count - 1);
             while self.slots[at].number > 0 {
                 at = (at + 1) & (count - 1);
             }
-            self.slots[at] = Slot { hash: (hash >> 32) as u32, number };
+            self.slots[at] = ColumnSlot { hash: (hash >> 32) as u32, number };
         }
     }
 

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::arrays::{Array, InputError, Matrix, from_rows, matrices, row_major, rows, squares, table};
 
 /// Two arrays with one row or matrix per attitude.
-type Pair<'py, A, B> = PyResult<(Bound<'py, A>, Bound<'py, B>)>;
+type RotationRow<'py, A, B> = PyResult<(Bound<'py, A>, Bound<'py, B>)>;
 
 /// Representation of an attitude by numbers.
 enum Representation {
@@ -59,7 +59,7 @@ pub fn attitudes_from_numbers<'py>(
     representation: &str,
     numbers: Array<'py>,
     boresight: [[f64; 3]; 3],
-) -> Pair<'py, PyArray3<f64>, PyArray3<f64>> {
+) -> RotationRow<'py, PyArray3<f64>, PyArray3<f64>> {
     let representation = Representation::named(representation, boresight)?;
     let (mut attitudes, mut rates) = (vec![], vec![]);
     match &representation {
@@ -93,7 +93,7 @@ pub fn numbers_of_attitudes<'py>(
     representation: &str,
     attitudes: Array<'py>,
     boresight: [[f64; 3]; 3],
-) -> Pair<'py, PyArray2<f64>, PyArray3<f64>> {
+) -> RotationRow<'py, PyArray2<f64>, PyArray3<f64>> {
     let representation = Representation::named(representation, boresight)?;
     let attitudes = matrices::<3>("matrices", &attitudes)?;
     let count = attitudes.len();

@@ -10,10 +10,10 @@ use crate::options::unknown;
 
 /// Formula, parameters with the power of the image unit, number of constants (the last parameters), direction of the lens, and direction of
 /// the second image coordinate.
-type Facts = (&'static str, Vec<(&'static str, i32)>, usize, &'static str, &'static str);
+type CameraFacts = (&'static str, Vec<(&'static str, i32)>, usize, &'static str, &'static str);
 
 #[pyfunction]
-pub fn camera_models() -> Vec<(&'static str, Facts)> {
+pub fn camera_models() -> Vec<(&'static str, CameraFacts)> {
     let power = |unit: Unit| match unit {
         Unit::Image => 1,
         Unit::PerImage(power) => -i32::from(power),
@@ -100,7 +100,7 @@ pub fn camera_correct<'py>(
 }
 
 /// Images, and their partials with respect to u and to the parameters.
-type Partials<'py> = (Matrix<'py>, Blocks<'py>, Blocks<'py>);
+type PartialsRow<'py> = (Matrix<'py>, Blocks<'py>, Blocks<'py>);
 
 #[pyfunction]
 #[pyo3(signature = (model, parameters, u, knots=None))]
@@ -110,7 +110,7 @@ pub fn camera_partials<'py>(
     parameters: Array<'py>,
     u: Array<'py>,
     knots: Option<Array<'py>>,
-) -> PyResult<Partials<'py>> {
+) -> PyResult<PartialsRow<'py>> {
     let camera = given(model, &parameters, knots.as_ref())?;
     let images: Vec<_> = rows("u", &u)?.into_iter().map(|u: [f64; 3]| camera.linearize(&u.into())).collect();
     let by_u = images.iter().flat_map(|image| image.by_u).flat_map(<[f64; 3]>::from).collect();

@@ -10,7 +10,8 @@ use pyo3::prelude::*;
 use crate::arrays::{Array, InputError, Matrix, Vector, rows, table};
 
 /// Names and whether they are lengths, values, covariance, deviations, test.
-type Row<'py> = (Vec<(&'static str, bool)>, Vector<'py>, Matrix<'py>, Matrix<'py>, Option<(f64, usize)>);
+type FeatureRow<'py> =
+    (Vec<(&'static str, bool)>, Vector<'py>, Matrix<'py>, Matrix<'py>, Option<(f64, usize)>);
 
 #[pyfunction]
 pub fn measured_feature<'py>(
@@ -18,7 +19,7 @@ pub fn measured_feature<'py>(
     kind: &str,
     points: Array<'py>,
     covariance: Array<'py>,
-) -> PyResult<Row<'py>> {
+) -> PyResult<FeatureRow<'py>> {
     let points: Vec<Vector3> = rows("points", &points)?.into_iter().map(<Vector3>::from).collect();
     let covariance = match covariance.shape() {
         // The matrix is symmetric, so that row and column order are equivalent.
@@ -35,7 +36,7 @@ pub fn measured_feature<'py>(
     }
 }
 
-fn row(py: Python<'_>, found: Measured) -> PyResult<Row<'_>> {
+fn row(py: Python<'_>, found: Measured) -> PyResult<FeatureRow<'_>> {
     let Measured { quantities, covariance, deviations, test } = found;
     let names = quantities.iter().map(|each| (each.name, each.is_length)).collect();
     let values = PyArray1::from_vec(py, quantities.iter().map(|each| each.value).collect());

@@ -17,7 +17,7 @@ fn film(film: &Array<'_>, vectors: &Array<'_>) -> PyResult<(FilmOf, FilmAt)> {
 }
 
 /// Readings, and their partials with respect to position, t1 .. b2 and h or g, (n, 2, 10).
-type Readings<'py> = (Matrix<'py>, Blocks<'py>);
+type ReadingsRow<'py> = (Matrix<'py>, Blocks<'py>);
 
 #[pyfunction]
 pub fn film_readings<'py>(
@@ -25,7 +25,7 @@ pub fn film_readings<'py>(
     numbers: Array<'py>,
     vectors: Array<'py>,
     places: Array<'py>,
-) -> PyResult<Readings<'py>> {
+) -> PyResult<ReadingsRow<'py>> {
     let (own, at) = film(&numbers, &vectors)?;
     let places = rows::<2>("places", &places)?;
     let mut read = Read::default();

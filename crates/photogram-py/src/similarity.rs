@@ -187,7 +187,7 @@ fn told(py: Python<'_>, found: Solution) -> PyResult<SimilaritySolution> {
 }
 
 /// Positions and covariances.
-type Points<'py> = (Matrix<'py>, Blocks<'py>);
+type PointsRow<'py> = (Matrix<'py>, Blocks<'py>);
 
 #[pyfunction]
 pub fn transform_points<'py>(
@@ -196,7 +196,7 @@ pub fn transform_points<'py>(
     tangent_covariance: Array<'py>,
     points: Array<'py>,
     points_sd: Array<'py>,
-) -> PyResult<Points<'py>> {
+) -> PyResult<PointsRow<'py>> {
     let similarity = from_row(similarity);
     let points: Vec<[f64; 3]> = rows("points", &points)?;
     let points_sd: Vec<[f64; 3]> = rows("points_sd", &points_sd)?;

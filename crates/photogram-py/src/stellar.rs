@@ -29,7 +29,7 @@ create_exception!(
 );
 
 /// Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury).
-type Place = (f64, f64, f64, f64);
+type PlaceRow = (f64, f64, f64, f64);
 /// Camera model without its values.
 #[derive(FromPyObject)]
 pub enum CameraKind {
@@ -44,7 +44,7 @@ pub enum CameraKind {
 /// Attitude, standard coordinates, plate coordinates and weight of the axis.
 type AxisRow = (usize, [f64; 2], [f64; 2], [[f64; 2]; 2]);
 
-fn station((latitude, aberration, temperature, pressure): Place) -> Station {
+fn station((latitude, aberration, temperature, pressure): PlaceRow) -> Station {
     Station::new(latitude, aberration, Air::new(temperature, pressure))
 }
 
@@ -102,7 +102,7 @@ pub fn standard_coordinates<'py>(
     py: Python<'py>,
     places: Array<'py>,
     sidereal_times: Array<'py>,
-    place: Place,
+    place: PlaceRow,
     tau: Array<'py>,
 ) -> PyResult<Matrix<'py>> {
     let (station, tau) = (station(place), fixed_size("tau", &tau)?);
@@ -117,7 +117,7 @@ pub fn star_places<'py>(
     py: Python<'py>,
     standard: Array<'py>,
     sidereal_times: Array<'py>,
-    place: Place,
+    place: PlaceRow,
     tau: Array<'py>,
 ) -> PyResult<Matrix<'py>> {
     let (station, tau) = (station(place), fixed_size("tau", &tau)?);
@@ -189,7 +189,7 @@ impl StellarProblem {
         star_weights, star_fixed, image_stars, image_pointings, image_xy, image_weights, image_times, image_shifts, axis
     ))]
     fn new(
-        station: Place,
+        station: PlaceRow,
         camera: CameraKind,
         pointings: Array<'_>,
         common: Array<'_>,

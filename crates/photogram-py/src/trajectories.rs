@@ -76,10 +76,10 @@ pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
 }
 
 /// Nonzero basis functions per time: index of the first, and their values.
-type Active = Vec<(usize, Vec<f64>)>;
+type ActiveRow = Vec<(usize, Vec<f64>)>;
 
 /// Positions, attitudes row by row, axes of coefficients row by row, right Jacobians row by row; functions of positions, of rotations.
-type FlownRow<'py> = (Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>, Active, Active);
+type FlownRow<'py> = (Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>, ActiveRow, ActiveRow);
 
 #[pyfunction]
 pub fn trajectory_span(trajectory: TrajectoryRow<'_>) -> PyResult<(f64, f64)> {
@@ -106,7 +106,7 @@ pub fn flown<'py>(
     let matrix = |of: &dyn Fn(&Flight) -> Matrix3| -> Vec<[f64; 9]> {
         flights.iter().map(|own| std::array::from_fn(|k| of(own)[(k / 3, k % 3)])).collect()
     };
-    let active = |basis: &Basis| -> Active {
+    let active = |basis: &Basis| -> ActiveRow {
         let of = |&time: &f64| {
             let found = basis.at(time);
             (found.first, found.values.to_vec())

@@ -322,7 +322,7 @@ class Driver:
     def _with_chord(self, up: Up, after: str, change: float) -> str:
         """Return the state after a chord, or after the step if no chord is taken.
 
-        A chord is a second step with the same factors (crates/photocore/src/adjustment/corrected.rs).
+        A chord is a second step with the same factors (crates/photocore/src/adjustment/acceleration.rs).
         """
         walks = self._walks
         # The data are small enough to pass through the driver, so that they survive the loss of a worker.

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::options::{self, Iteration, NEGLIGIBLE, Published, Status, Stop};
 use super::result::AdjustError;
-use super::run::{End, NEAR, Run, State};
+use super::run::{End, Iterate, NEAR, Run};
 
 /// Relative increase of the sum of squares that is accepted as rounding error.
 pub(super) const ROUNDING: f64 = 1e-12;
@@ -60,7 +60,7 @@ pub fn step_rules() -> [(&'static str, f64); 8] {
 }
 
 /// State of the step control between steps.
-struct Control {
+struct StepControl {
     stop: Stop,
     /// Lowest sum of squares.
     best: f64,
@@ -85,16 +85,16 @@ fn relaxed(damping: f64) -> f64 {
 }
 
 /// Next linearization, or the end of the iterations.
-type Next<'a> = Result<ControlFlow<End<'a>, State<'a>>, AdjustError>;
+type Next<'a> = Result<ControlFlow<End<'a>, Iterate<'a>>, AdjustError>;
 
 impl<'a> Run<'a, '_> {
     /// Iterates with damped Gauss-Newton steps.
     ///
     /// For the step dx and normal matrix N, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz). The predicted decrease of the sum of squares is dx^T
     /// N dx. Its root bounds every correction in standard deviations, without an inverse.
-    pub(super) fn damped_steps(&mut self, start: State<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
+    pub(super) fn damped_steps(&mut self, start: Iterate<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let mut state = start;
-        let mut control = Control {
+        let mut control = StepControl {
             stop,
             best: state.linearized.sum_of_squares,
             refused: None,
@@ -146,7 +146,7 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Solves, and applies the step or ends with it.
-    fn step_from(&mut self, state: State<'a>, control: &mut Control) -> Next<'a> {
+    fn step_from(&mut self, state: Iterate<'a>, control: &mut StepControl) -> Next<'a> {
         let damping = state.linearized.damping();
         let Some(step) = self.step(&state)? else {
             return self.refuse(state.recycle(), damping, control, vec![]);
@@ -174,9 +174,9 @@ impl<'a> Run<'a, '_> {
     fn take(
         &mut self,
         iteration: Iteration,
-        state: State<'a>,
+        state: Iterate<'a>,
         step: &[f64],
-        control: &mut Control,
+        control: &mut StepControl,
     ) -> Next<'a> {
         let followed = self.is_followed(&state, &iteration);
         let corrected = self.corrected(&state, step, &iteration, followed);
@@ -233,7 +233,7 @@ impl<'a> Run<'a, '_> {
         iteration: Iteration,
         unknowns: Vec<f64>,
         (step, moved): (&[f64], Vec<usize>),
-        control: &mut Control,
+        control: &mut StepControl,
     ) -> Next<'a> {
         let Iteration { damping, largest_change: change, .. } = iteration;
         if damping == 0.0 {
@@ -264,7 +264,7 @@ impl<'a> Run<'a, '_> {
         &mut self,
         unknowns: Vec<f64>,
         damping: f64,
-        control: &mut Control,
+        control: &mut StepControl,
         moved: Vec<usize>,
     ) -> Next<'a> {
         if damping == 0.0 && self.stands_still(&mut control.refused, control.best, moved) {
@@ -306,7 +306,7 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Whether the step after a full step would be negligible, judged by the sum of squares after the full step.
-    fn is_foreseen(&self, control: &Control, state: &State<'a>, step: &[f64]) -> bool {
+    fn is_foreseen(&self, control: &StepControl, state: &Iterate<'a>, step: &[f64]) -> bool {
         let Stop::Foreseen(limit) = control.stop else { return false };
         let foreseen = control.best - state.linearized.change().powi(2);
         // A smaller difference is a rounding error.
@@ -399,7 +399,7 @@ impl<'a> Run<'a, '_> {
 
 impl<'a> Run<'a, '_> {
     /// Iterates with full steps, without control of the sum of squares.
-    pub(super) fn full_steps(&mut self, start: State<'a>, rule: Published) -> Result<End<'a>, AdjustError> {
+    pub(super) fn full_steps(&mut self, start: Iterate<'a>, rule: Published) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut previous: Option<f64> = None;
         for number in 1..=self.options.max_iterations {

@@ -78,7 +78,7 @@ pub struct Adjusted<'a> {
 
 /// Requested datum of an adjustment, and the values from which its carriers move least.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Target<'a> {
+pub(super) struct DatumTarget<'a> {
     pub datum: &'a Datum,
     pub reference: &'a [f64],
 }

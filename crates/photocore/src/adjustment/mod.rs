@@ -59,9 +59,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod acceleration;
 mod additional;
-mod chords;
-mod corrected;
 mod damped;
 mod datum;
 mod distributions;
@@ -82,7 +81,6 @@ mod result;
 mod run;
 mod secants;
 mod statistics;
-mod term;
 mod terms;
 mod traces;
 mod transformation;
@@ -110,7 +108,7 @@ pub use noncentral::{
 pub use observation_rows::ObservationRows;
 pub use options::{Event, History, Iteration, Method, Options, Phase, Published, Status, Stop};
 pub use part::{PartError, PartOptions};
-pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
+pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem, Term};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
 #[doc(hidden)]
@@ -118,7 +116,6 @@ pub use run::go_on;
 pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum};
 pub(crate) use statistics::weighted;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
-pub use term::Term;
 pub use terms::Terms;
 pub use traces::{EquationGroups, GroupSquares, Probing};
 pub use transformation::DatumOfPart;

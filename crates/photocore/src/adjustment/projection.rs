@@ -14,7 +14,7 @@ use crate::{Threads, parallel};
 const PARTS: usize = 16;
 
 /// Unknowns of an equation with their coefficients.
-type Taken = Vec<(usize, f64)>;
+type ProjectedRow = Vec<(usize, f64)>;
 
 impl<M: ?Sized> Problem<M> {
     /// Number of equations: rows of groups and of ties, then one per unknown as an observation of itself, which is empty unless weighted.
@@ -36,7 +36,7 @@ impl Linearized {
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        let rows = Rows::new(self, problem, threads);
+        let rows = ProjectionRows::new(self, problem, threads);
         let rights = threads.install(|| rows.transposed(&columns));
         let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
         let solutions = self.solve(&rows.equations, &options, threads, between)?;
@@ -54,7 +54,7 @@ impl Linearized {
 }
 
 /// Equations at adjusted values, in unit weight.
-struct Rows<'a> {
+struct ProjectionRows<'a> {
     problem: &'a AnyProblem<'a>,
     equations: ObservationEquations<'a>,
     values: &'a [f64],
@@ -62,7 +62,7 @@ struct Rows<'a> {
     fixed: Vec<bool>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> ProjectionRows<'a> {
     fn new(linearized: &'a Linearized, problem: &'a AnyProblem<'a>, threads: &Threads) -> Self {
         let Linearized { values, held, .. } = linearized;
         let equations = linearized.equations(problem, threads);
@@ -117,8 +117,9 @@ impl<'a> Rows<'a> {
     /// Computes z - A x for every column.
     fn subtract(&self, solutions: &[f64], columns: &mut [f64]) {
         let (unknowns, height) = (self.problem.layout().unknowns().max(1), self.problem.equations());
-        let along =
-            |taken: &Taken, x: &[f64]| taken.iter().map(|&(unknown, value)| value * x[unknown]).sum::<f64>();
+        let along = |taken: &ProjectedRow, x: &[f64]| {
+            taken.iter().map(|&(unknown, value)| value * x[unknown]).sum::<f64>()
+        };
         let part = |part: usize| {
             let mut found = Vec::new();
             self.each_row_of(self.locals(part), |_, taken| {
@@ -142,8 +143,8 @@ impl<'a> Rows<'a> {
     }
 
     /// Calls `take` with the index and the unknowns of each row of some local blocks.
-    fn each_row_of(&self, locals: Range<usize>, mut take: impl FnMut(usize, &Taken)) {
-        let (mut buffers, mut taken) = (Buffers::default(), Taken::new());
+    fn each_row_of(&self, locals: Range<usize>, mut take: impl FnMut(usize, &ProjectedRow)) {
+        let (mut buffers, mut taken) = (Buffers::default(), ProjectedRow::new());
         for local in locals {
             self.equations.each_row(&mut buffers, local, |row| {
                 taken.clear();
@@ -154,7 +155,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Calls `take` with the rows of ties and priors.
-    fn each_other_row(&self, mut take: impl FnMut(usize, &Taken)) {
+    fn each_other_row(&self, mut take: impl FnMut(usize, &ProjectedRow)) {
         self.equations.each_row_of_ties(|_, row| take(row.number, &row.taken().collect()));
         let (problem, first) = (self.problem, self.problem.observation_sd.len());
         problem.terms(self.values).each_row(|unknown, row, _| {

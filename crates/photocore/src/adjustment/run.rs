@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use super::datum::{Adjusted, Basis, Datum, Target, moved};
+use super::datum::{Adjusted, Basis, Datum, DatumTarget, moved};
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
 use super::loss::Reweighting;
@@ -62,7 +62,7 @@ pub fn adjust_in_datum(
     threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, Some(Target { datum, reference }), threads, watch, None)
+    adjusted(problem, options, Some(DatumTarget { datum, reference }), threads, watch, None)
 }
 
 /// Adjusts, and stores the data for tests of groups of observations, which [`Leverages::of`] uses.
@@ -87,7 +87,7 @@ pub fn adjust_by_groups(
 fn adjusted(
     problem: &AnyProblem<'_>,
     options: &Options,
-    target: Option<Target<'_>>,
+    target: Option<DatumTarget<'_>>,
     threads: &Threads,
     watch: Watch<'_>,
     by_groups: Option<(&[usize], Option<usize>)>,
@@ -138,14 +138,14 @@ fn adjusted(
 pub(super) const NEAR: f64 = 1.0;
 
 /// Current linearization of the iterations.
-pub(super) struct State<'a> {
+pub(super) struct Iterate<'a> {
     pub equations: ObservationEquations<'a>,
     pub linearized: Linearized,
     /// Values before the transformation to the datum, if any.
     before: Option<Vec<f64>>,
 }
 
-impl State<'_> {
+impl Iterate<'_> {
     pub fn values(&self) -> &[f64] {
         &self.linearized.values
     }
@@ -171,7 +171,7 @@ pub(super) struct End<'a> {
     pub status: Status,
     pub unknowns: Vec<f64>,
     /// Linearization for the cofactors.
-    pub state: Option<State<'a>>,
+    pub state: Option<Iterate<'a>>,
     /// Reason for a missing linearization.
     pub undetermined: Option<AdjustError>,
     /// Last iteration and its step, not applied yet; cofactors refer to the values before it.
@@ -185,13 +185,13 @@ impl<'a> End<'a> {
     }
 
     /// Ends at the values of a linearization, with cofactors.
-    pub fn with(status: Status, state: State<'a>) -> Self {
+    pub fn with(status: Status, state: Iterate<'a>) -> Self {
         let unknowns = state.values().to_vec();
         Self { state: Some(state), ..Self::at(status, unknowns) }
     }
 
     /// Ends after one more step, with cofactors from the equations before it.
-    pub fn after(status: Status, state: State<'a>, step: Vec<f64>, iteration: Iteration) -> Self {
+    pub fn after(status: Status, state: Iterate<'a>, step: Vec<f64>, iteration: Iteration) -> Self {
         Self { last: Some((iteration, step)), ..Self::with(status, state) }
     }
 }
@@ -202,7 +202,7 @@ pub(super) struct Run<'a, 'w> {
     /// Options for tests of groups: unknowns with mutual cofactors, and the maximum size of these in bytes.
     by_groups: Option<(&'a [usize], Option<usize>)>,
     /// Requested datum.
-    target: Option<Target<'a>>,
+    target: Option<DatumTarget<'a>>,
     /// Whether the next formation is expected to be the last, if a datum is requested.
     is_near: bool,
     /// Whether the network was transformed during the iterations.
@@ -231,7 +231,7 @@ pub(super) struct Run<'a, 'w> {
 impl<'a> Run<'a, '_> {
     /// Ends at the current values without another step. Cofactors belong to the reweighted equations without second-order term, because
     /// their weights can be reported.
-    pub(super) fn stay(&mut self, state: State<'a>, status: Status) -> Result<End<'a>, AdjustError> {
+    pub(super) fn stay(&mut self, state: Iterate<'a>, status: Status) -> Result<End<'a>, AdjustError> {
         let plain = state.linearized.damping() == 0.0 && !state.linearized.is_curved();
         self.curved = false;
         let state = if plain { state } else { self.form(state.recycle(), 0.0)? };
@@ -242,7 +242,7 @@ impl<'a> Run<'a, '_> {
 
     /// Computes the step; None if an earlier step led to values that leave unknowns undetermined. An error if the initial values already
     /// do.
-    pub(super) fn step(&mut self, state: &State<'a>) -> Result<Option<Vec<f64>>, AdjustError> {
+    pub(super) fn step(&mut self, state: &Iterate<'a>) -> Result<Option<Vec<f64>>, AdjustError> {
         match state.linearized.undetermined() {
             Some(_) if !self.iterations.is_empty() => return Ok(None),
             Some(error) => return Err(error),
@@ -257,7 +257,11 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Solves the same equations for another right-hand side.
-    pub(super) fn solve_again(&mut self, state: &State<'a>, right: &[f64]) -> Result<Vec<f64>, AdjustError> {
+    pub(super) fn solve_again(
+        &mut self,
+        state: &Iterate<'a>,
+        right: &[f64],
+    ) -> Result<Vec<f64>, AdjustError> {
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let options = SolveOptions { rights: Some(right), ..SolveOptions::default() };
@@ -276,7 +280,7 @@ impl<'a> Run<'a, '_> {
         self.problem.objective(unknowns, &self.problem.residuals_at(self.threads, at), self.options.loss)
     }
 
-    pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a>, AdjustError> {
+    pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<Iterate<'a>, AdjustError> {
         let near = std::mem::take(&mut self.is_near);
         let (unknowns, basis, before) = match damping == 0.0 && near {
             true => self.at_its_target(unknowns),
@@ -285,7 +289,7 @@ impl<'a> Run<'a, '_> {
         let at = self.threads.install(|| self.problem.model.at(&unknowns));
         let mut state = self.formed(unknowns, at, damping)?;
         state.linearized.basis = basis;
-        Ok(State { before, ..state })
+        Ok(Iterate { before, ..state })
     }
 
     /// Predicts from quadratic convergence of full steps whether the next linearization is the last.
@@ -299,7 +303,7 @@ impl<'a> Run<'a, '_> {
 
     /// Transforms the values to the requested datum if possible. Also returns the values before the transformation.
     fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<Basis>, Option<Vec<f64>>) {
-        let Some(Target { datum, reference }) = self.target else { return (unknowns, None, None) };
+        let Some(DatumTarget { datum, reference }) = self.target else { return (unknowns, None, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
         match moved(self.problem, adjusted, datum, reference, self.threads) {
             Ok((there, basis)) => {
@@ -316,7 +320,7 @@ impl<'a> Run<'a, '_> {
         unknowns: Vec<f64>,
         at: Box<dyn Evaluated + 'a>,
         damping: f64,
-    ) -> Result<State<'a>, AdjustError> {
+    ) -> Result<Iterate<'a>, AdjustError> {
         let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
         let equations = ObservationEquations::evaluated(self.problem, at, &self.datum, reweighting);
         let held = self.datum.clone();
@@ -330,7 +334,7 @@ impl<'a> Run<'a, '_> {
         if self.options.loss.is_some() {
             linearized.sum_of_squares = self.objective(&linearized.values);
         }
-        Ok(State { equations, linearized, before: None })
+        Ok(Iterate { equations, linearized, before: None })
     }
 
     fn finish(mut self, mut end: End<'a>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
@@ -354,7 +358,7 @@ impl<'a> Run<'a, '_> {
         }
         drop(end.unknowns);
         let asked = options.covariance && (self.target.is_none() || is_at_target);
-        if let Some(State { equations, mut linearized, .. }) = end.state.filter(|_| asked) {
+        if let Some(Iterate { equations, mut linearized, .. }) = end.state.filter(|_| asked) {
             let locals = problem.layout().locals();
             {
                 let mut between = between(&mut *self.watch, Phase::Solve, locals);

@@ -3,8 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::problem::{AnyProblem, Model};
-use super::term::{Term, is_weighted};
+use super::problem::{AnyProblem, Model, Term, is_weighted};
 use crate::normals::Prior;
 
 /// All prior terms at given values: terms of the model ([`Model::terms`]), and one term per other weighted unknown.

@@ -50,14 +50,14 @@ const COLUMNS: usize = 64;
 
 /// Column z: unit vectors or random signs on the groups of a class, which have equal remainders of their index.
 #[derive(Clone, Copy)]
-struct Column {
+struct ProbeColumn {
     class: usize,
-    what: Kind,
+    what: Probe,
     weight: f64,
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum Probe {
     /// One at the equation with this index in each group.
     Unit(usize),
     Signs(u64),
@@ -86,17 +86,17 @@ impl<'a> Numbered<'a> {
     }
 
     /// Returns the columns for a number of classes of groups.
-    fn columns(&self, classes: usize, probing: &Probing) -> (Vec<Column>, Vec<bool>) {
+    fn columns(&self, classes: usize, probing: &Probing) -> (Vec<ProbeColumn>, Vec<bool>) {
         let (mut columns, mut exact) = (vec![], vec![]);
         for class in 0..classes {
             let largest = self.equations[..self.groups.count].iter().skip(class).step_by(classes).max();
             let largest = largest.copied().unwrap_or(0);
             exact.push(largest <= probing.exact.max(probing.vectors));
-            let column = |what, weight| Column { class, what, weight };
+            let column = |what, weight| ProbeColumn { class, what, weight };
             if exact[class] {
-                columns.extend((0..largest).map(|k| column(Kind::Unit(k), 1.0)));
+                columns.extend((0..largest).map(|k| column(Probe::Unit(k), 1.0)));
             } else {
-                let signs = |k: usize| Kind::Signs(mixed(probing.seed ^ mixed(k as u64 + 1)));
+                let signs = |k: usize| Probe::Signs(mixed(probing.seed ^ mixed(k as u64 + 1)));
                 let weight = (probing.vectors.max(1) as f64).recip();
                 columns.extend((0..probing.vectors.max(1)).map(|k| column(signs(k), weight)));
             }
@@ -104,13 +104,13 @@ impl<'a> Numbered<'a> {
         (columns, exact)
     }
 
-    fn write(&self, column: Column, classes: usize, z: &mut [f64]) {
+    fn write(&self, column: ProbeColumn, classes: usize, z: &mut [f64]) {
         for (row, z) in z.iter_mut().enumerate() {
             let (group, number) = (self.groups.of[row], self.number[row]);
             if group < self.groups.count && group % classes == column.class && number != usize::MAX {
                 *z = match column.what {
-                    Kind::Unit(k) => f64::from(u8::from(number == k)),
-                    Kind::Signs(seed) => 1.0 - 2.0 * (mixed(seed ^ row as u64) >> 63) as f64,
+                    Probe::Unit(k) => f64::from(u8::from(number == k)),
+                    Probe::Signs(seed) => 1.0 - 2.0 * (mixed(seed ^ row as u64) >> 63) as f64,
                 };
             }
         }
@@ -191,10 +191,10 @@ impl Linearized {
         &self,
         problem: &AnyProblem<'_>,
         numbered: &Numbered<'_>,
-        (columns, classes): (&[Column], usize),
+        (columns, classes): (&[ProbeColumn], usize),
         threads: &Threads,
         between: Between<'_>,
-        mut tell: impl FnMut(Column, &[f64]),
+        mut tell: impl FnMut(ProbeColumn, &[f64]),
     ) -> Result<(), AdjustError> {
         let height = problem.equations().max(1);
         for together in columns.chunks((TOGETHER / height).clamp(1, COLUMNS)) {

@@ -12,7 +12,7 @@ use super::equations::{GroupStep, ObservationEquations};
 use super::options::{FIRST_DAMPING, Iteration, Status, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;
-use super::run::{End, Run, State};
+use super::run::{End, Iterate, Run};
 use super::statistics::weighted;
 use super::walk::Buffers;
 use crate::normals::Equations;
@@ -59,7 +59,7 @@ struct Damping {
 }
 
 /// Candidate step.
-struct Trial<'a> {
+struct TrialStep<'a> {
     unknowns: Vec<f64>,
     at: Box<dyn Evaluated + 'a>,
     sum_of_squares: f64,
@@ -71,7 +71,7 @@ struct Trial<'a> {
     bend: Option<f64>,
 }
 
-impl Trial<'_> {
+impl TrialStep<'_> {
     /// Gain ratio: actual to predicted decrease of the sum of squares.
     fn gain(&self, lowest: f64) -> f64 {
         (lowest - self.sum_of_squares) / self.predicted
@@ -98,7 +98,7 @@ impl<'a> Run<'a, '_> {
     ///
     /// The stopping rule is applied to steps with at most the initial damping, which are not much shortened. It is applied to any step if
     /// the predicted decrease is a rounding error.
-    pub(super) fn in_trust_region(&mut self, start: State<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
+    pub(super) fn in_trust_region(&mut self, start: Iterate<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut lowest = state.linearized.sum_of_squares;
         let mut damping = Damping { value: state.linearized.damping(), rise: 2.0, bends: false };
@@ -150,11 +150,11 @@ impl<'a> Run<'a, '_> {
     /// In a curved valley the step is accelerated, and compared with the plain step if it gains little.
     fn trial(
         &mut self,
-        state: State<'a>,
+        state: Iterate<'a>,
         step: &[f64],
         lowest: f64,
         bends: bool,
-    ) -> Result<(Vec<f64>, Trial<'a>), AdjustError> {
+    ) -> Result<(Vec<f64>, TrialStep<'a>), AdjustError> {
         let change = state.linearized.change();
         let predicted = state.equations.decrease(self.threads, &state.linearized.prior, step);
         let term = if bends { Some(self.second_order(&state, step)?) } else { None };
@@ -163,7 +163,7 @@ impl<'a> Run<'a, '_> {
             let unknowns = self.problem.advanced(&before, step);
             let at = self.threads.install(|| self.problem.model.at(&unknowns));
             let sum_of_squares = self.objective_at(&unknowns, &*at);
-            Trial { unknowns, at, sum_of_squares, predicted, change, bend }
+            TrialStep { unknowns, at, sum_of_squares, predicted, change, bend }
         };
         let found = match term {
             None => trial(step, None),
@@ -173,7 +173,7 @@ impl<'a> Run<'a, '_> {
                 let accelerated = trial(&along, bend);
                 let good = accelerated.gain(lowest) >= BENDS;
                 let plain = (!good).then(|| trial(step, bend));
-                let lower = |plain: &Trial<'_>| accelerated.sum_of_squares < plain.sum_of_squares;
+                let lower = |plain: &TrialStep<'_>| accelerated.sum_of_squares < plain.sum_of_squares;
                 plain.filter(|plain| !lower(plain)).unwrap_or(accelerated)
             }
         };
@@ -181,7 +181,7 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Returns the second-order term a of a step, and a^T (N + damping) a.
-    fn second_order(&mut self, state: &State<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
+    fn second_order(&mut self, state: &Iterate<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
         let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
         let right = state.equations.bending(self.threads, &ahead, step);
@@ -211,11 +211,11 @@ impl<'a> Run<'a, '_> {
     fn keep(
         &mut self,
         before: &[f64],
-        trial: &Trial<'a>,
+        trial: &TrialStep<'a>,
         damping: f64,
     ) -> Result<Option<End<'a>>, AdjustError> {
         let number = self.iterations.len() + 1;
-        let &Trial { sum_of_squares, change: largest_change, .. } = trial;
+        let &TrialStep { sum_of_squares, change: largest_change, .. } = trial;
         let iteration = Iteration { number, sum_of_squares, largest_change, damping };
         self.accept(iteration, before, &trial.unknowns)?;
         let ends = self.has_collapsed(before, &*trial.at)

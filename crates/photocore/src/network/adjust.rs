@@ -5,11 +5,10 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::error::NetworkError;
-use super::input::{Network, Options};
+use super::input::{InnerConstraints, Network, NetworkDatum, Options, State};
 use super::problem::{Assembled, Reached};
 use super::screens::{Begin, Ended, Screening};
 use super::solution::{Joint, Solution};
-use super::state::{InnerConstraints, NetworkDatum, State};
 use super::trial::Converged;
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
@@ -28,17 +27,11 @@ pub struct NetworkAdjustment<'a> {
     network: &'a Network,
     options: Options,
     state: Option<&'a State>,
-    goal: Goal<'a>,
-    threads: Option<&'a Threads>,
-    watch: Option<Watch<'a>>,
-}
-
-/// Requested results besides the solution.
-#[derive(Debug, Clone, Copy, Default)]
-struct Goal<'a> {
     datum: Option<&'a InnerConstraints>,
     /// Points with joint cofactors; Some if the results for tests are stored.
     keep: Option<&'a [usize]>,
+    threads: Option<&'a Threads>,
+    watch: Option<Watch<'a>>,
 }
 
 impl<'a> NetworkAdjustment<'a> {
@@ -54,7 +47,7 @@ impl<'a> NetworkAdjustment<'a> {
     /// Transforms a free network to the datum of inner constraints.
     #[must_use]
     pub fn in_datum(mut self, datum: &'a InnerConstraints) -> Self {
-        self.goal.datum = Some(datum);
+        self.datum = Some(datum);
         self
     }
 
@@ -62,7 +55,7 @@ impl<'a> NetworkAdjustment<'a> {
     /// % of the time. Joint cofactors of some points ([`Solution::joint`]) are also computed from the last factor.
     #[must_use]
     pub fn kept(mut self, points: &'a [usize]) -> Self {
-        self.goal.keep = Some(points);
+        self.keep = Some(points);
         self
     }
 
@@ -85,17 +78,133 @@ impl<'a> NetworkAdjustment<'a> {
     /// # Errors
     /// An inconsistent or empty network, undetermined parameters, a state of another network. A datum for a network that is not free, or
     /// that its points and photos cannot define. An interruption, threads that cannot be started.
-    pub fn run(self) -> Result<Solution, NetworkError> {
-        let Self { network, options, state, goal, threads, watch } = self;
+    pub fn run(mut self) -> Result<Solution, NetworkError> {
         let own;
-        let threads = match threads {
+        let threads = match self.threads {
             Some(threads) => threads,
             None => {
-                own = Threads::new(options.adjustment.threads)?;
+                own = Threads::new(self.options.adjustment.threads)?;
                 &own
             }
         };
-        network.adjusted(&options, goal, state, threads, watch.unwrap_or(&mut adjustment::go_on))
+        let mut watch: Option<Watch<'_>> = self.watch.take();
+        self.adjusted(threads, watch.as_deref_mut().unwrap_or(&mut adjustment::go_on))
+    }
+
+    fn adjusted(&self, threads: &Threads, watch: Watch<'_>) -> Result<Solution, NetworkError> {
+        let Self { network, options, datum, .. } = self;
+        network.check()?;
+        let mut start = self.state;
+        let mut screening = Screening::new(network.left_out(network.untouched_photos(), start)?);
+        let mut before: Option<(Adjustment, Reached)> = None;
+        loop {
+            let reached = before.as_ref().map(|(_, reached)| reached);
+            let mut assembled = network.assembled(options, &screening.leaving.left_out, reached, threads)?;
+            if let Some(state) = start.take() {
+                assembled.go_on_from(state)?;
+            }
+            datum.map_or(Ok(()), |inner| network.check_carriers(inner, &assembled))?;
+            let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
+            let joint = self.keep.map(|points| assembled.taking_part(points));
+            let ended = self.iterated(&assembled, joint.as_deref(), done, threads, watch);
+            let reopened = ended.as_ref().ok().and_then(|ended| reopened(&assembled, ended));
+            let look = || screening.look(&Ended { adjusted: &ended, assembled: &assembled, options });
+            let begin = reopened.or_else(look);
+            match (begin, ended) {
+                (Some(Begin::FromStart), _) => before = None,
+                (Some(Begin::AsBefore), _) => {}
+                (Some(Begin::FromHere), Ok(mut ended)) => {
+                    ended.go_on_from(before.take().map(|(earlier, _)| earlier));
+                    let reached = assembled.reached(&ended.unknowns, network.points.len());
+                    before = Some((ended, reached));
+                }
+                (None, Ok(mut ended)) => {
+                    ended.go_on_from(before.map(|(earlier, _)| earlier));
+                    return self.solved(joint, assembled, ended, screening, threads, watch);
+                }
+                (_, Err(error)) => {
+                    let error = NetworkError::new(error, &assembled);
+                    return Err(network.name(error, &assembled, &assembled.problem.initial, threads));
+                }
+            }
+        }
+    }
+
+    /// Iterates; `done` is the number of preceding iterations.
+    fn iterated(
+        &self,
+        assembled: &Assembled,
+        joint: Option<&[(usize, usize)]>,
+        done: usize,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Adjustment, AdjustError> {
+        let (problem, mut own) = (&assembled.problem, self.options.adjustment);
+        own.max_iterations = own.max_iterations.saturating_sub(done);
+        let plain = own.covariance && own.loss.is_none();
+        match self.datum {
+            // The adjustment runs in the requested datum. Exceptions: weights of a loss are known only at the end; trajectories follow a
+            // transformation only approximately, so that steps after it would not be short.
+            Some(inner)
+                if plain
+                    && matches!(own.method, Method::Damped(_))
+                    && problem.model.mounts.trajectories().is_empty() =>
+            {
+                let (datum, reference) = assembled.datum(inner);
+                return adjustment::adjust_in_datum(problem, &own, &datum, &reference, threads, watch);
+            }
+            Some(_) => own.covariance = false,
+            None => {}
+        }
+        let by_groups = self.datum.is_none() && plain && !matches!(own.method, Method::Full(_));
+        match joint.filter(|_| by_groups && assembled.may_keep(&self.options)) {
+            Some(points) => {
+                let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
+                let joint: Vec<usize> = points.iter().flat_map(unknowns).collect();
+                adjustment::adjust_by_groups(problem, &own, (&joint, self.options.memory), threads, watch)
+            }
+            None => adjustment::adjust(problem, &own, threads, watch),
+        }
+    }
+
+    /// Returns the solution in the requested datum.
+    fn solved(
+        &self,
+        joint: Option<Vec<(usize, usize)>>,
+        assembled: Assembled,
+        mut ended: Adjustment,
+        Screening { leaving, .. }: Screening,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Solution, NetworkError> {
+        let Self { network, options, datum, .. } = self;
+        let lost = match (ended.lost, datum) {
+            (None, Some(inner)) => {
+                take_to(inner, &options.adjustment, &assembled, &mut ended, threads, watch)?
+            }
+            (lost, _) => lost.unwrap_or(0.0),
+        };
+        let joint = joint.zip(ended.joint.take()).map(|(points, found)| {
+            let (points, size) = (points.into_iter().map(|(point, _)| point).collect(), found.len().isqrt());
+            Joint { points, cofactors: DMatrix::from_vec(size, size, found) }
+        });
+        let left_out = &leaving.left_out.points;
+        let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
+        let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, threads);
+        let (mut solution, found) =
+            threads.install(|| Solution::with_leverages(network, options, &assembled, ended, collapsed));
+        let undetermined = solution.undetermined.take();
+        solution.undetermined =
+            undetermined.map(|error| network.name(error, &assembled, &solution.state.unknowns, threads));
+        solution.datum.minimal_control = minimal;
+        solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
+        solution.datum.relative_error = lost;
+        solution.dropped.extend(leaving.harmful);
+        sort_by(&mut solution.dropped, &|a, b| a.point.cmp(&b.point));
+        solution.joint = joint.filter(|_| found.is_some()).map(Arc::new);
+        solution.converged =
+            found.map(|found| Box::new(Converged::new(assembled, options.adjustment, found)));
+        Ok(solution)
     }
 }
 
@@ -117,140 +226,17 @@ impl Network {
             network: self,
             options: *options,
             state: None,
-            goal: Goal::default(),
+            datum: None,
+            keep: None,
             threads: None,
             watch: None,
         }
-    }
-
-    fn adjusted(
-        &self,
-        options: &Options,
-        goal: Goal<'_>,
-        mut start: Option<&State>,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<Solution, NetworkError> {
-        self.check()?;
-        let mut screening = Screening::new(self.left_out(self.untouched_photos(), start)?);
-        let mut before: Option<(Adjustment, Reached)> = None;
-        loop {
-            let reached = before.as_ref().map(|(_, reached)| reached);
-            let mut assembled = self.assembled(options, &screening.leaving.left_out, reached, threads)?;
-            if let Some(state) = start.take() {
-                assembled.go_on_from(state)?;
-            }
-            goal.datum.map_or(Ok(()), |inner| self.check_carriers(inner, &assembled))?;
-            let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
-            let joint = goal.keep.map(|points| assembled.taking_part(points));
-            let ended = iterated(&assembled, options, goal.datum, joint.as_deref(), done, threads, watch);
-            let reopened = ended.as_ref().ok().and_then(|ended| reopened(&assembled, ended));
-            let look = || screening.look(&Ended { adjusted: &ended, assembled: &assembled, options });
-            let begin = reopened.or_else(look);
-            match (begin, ended) {
-                (Some(Begin::FromStart), _) => before = None,
-                (Some(Begin::AsBefore), _) => {}
-                (Some(Begin::FromHere), Ok(mut ended)) => {
-                    ended.go_on_from(before.take().map(|(earlier, _)| earlier));
-                    let reached = assembled.reached(&ended.unknowns, self.points.len());
-                    before = Some((ended, reached));
-                }
-                (None, Ok(mut ended)) => {
-                    ended.go_on_from(before.map(|(earlier, _)| earlier));
-                    return self
-                        .solved(options, goal.datum, joint, assembled, ended, screening, threads, watch);
-                }
-                (_, Err(error)) => {
-                    let error = NetworkError::new(error, &assembled);
-                    return Err(self.name(error, &assembled, &assembled.problem.initial, threads));
-                }
-            }
-        }
-    }
-
-    /// Returns the solution in the requested datum.
-    fn solved(
-        &self,
-        options: &Options,
-        datum: Option<&InnerConstraints>,
-        joint: Option<Vec<(usize, usize)>>,
-        assembled: Assembled,
-        mut ended: Adjustment,
-        Screening { leaving, .. }: Screening,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<Solution, NetworkError> {
-        let lost = match (ended.lost, datum) {
-            (None, Some(inner)) => {
-                take_to(inner, &options.adjustment, &assembled, &mut ended, threads, watch)?
-            }
-            (lost, _) => lost.unwrap_or(0.0),
-        };
-        let joint = joint.zip(ended.joint.take()).map(|(points, found)| {
-            let (points, size) = (points.into_iter().map(|(point, _)| point).collect(), found.len().isqrt());
-            Joint { points, cofactors: DMatrix::from_vec(size, size, found) }
-        });
-        let left_out = &leaving.left_out.points;
-        let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
-        let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, threads);
-        let (mut solution, found) =
-            threads.install(|| Solution::with_leverages(self, options, &assembled, ended, collapsed));
-        let undetermined = solution.undetermined.take();
-        solution.undetermined =
-            undetermined.map(|error| self.name(error, &assembled, &solution.state.unknowns, threads));
-        solution.datum.minimal_control = minimal;
-        solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
-        solution.datum.relative_error = lost;
-        solution.dropped.extend(leaving.harmful);
-        sort_by(&mut solution.dropped, &|a, b| a.point.cmp(&b.point));
-        solution.joint = joint.filter(|_| found.is_some()).map(Arc::new);
-        solution.converged =
-            found.map(|found| Box::new(Converged::new(assembled, options.adjustment, found)));
-        Ok(solution)
     }
 }
 
 /// Returns a restart if images have moved beyond the active knots of their lens spline.
 fn reopened(assembled: &Assembled, ended: &Adjustment) -> Option<Begin> {
     (assembled.problem.model.beyond_windows(&ended.unknowns) > 0).then_some(Begin::FromHere)
-}
-
-/// Iterates; `done` is the number of preceding iterations.
-fn iterated(
-    assembled: &Assembled,
-    options: &Options,
-    datum: Option<&InnerConstraints>,
-    joint: Option<&[(usize, usize)]>,
-    done: usize,
-    threads: &Threads,
-    watch: Watch<'_>,
-) -> Result<Adjustment, AdjustError> {
-    let (problem, mut own) = (&assembled.problem, options.adjustment);
-    own.max_iterations = own.max_iterations.saturating_sub(done);
-    let plain = own.covariance && own.loss.is_none();
-    match datum {
-        // The adjustment runs in the requested datum. Exceptions: weights of a loss are known only at the end; trajectories follow a
-        // transformation only approximately, so that steps after it would not be short.
-        Some(inner)
-            if plain
-                && matches!(own.method, Method::Damped(_))
-                && problem.model.mounts.trajectories().is_empty() =>
-        {
-            let (datum, reference) = assembled.datum(inner);
-            return adjustment::adjust_in_datum(problem, &own, &datum, &reference, threads, watch);
-        }
-        Some(_) => own.covariance = false,
-        None => {}
-    }
-    let by_groups = datum.is_none() && plain && !matches!(own.method, Method::Full(_));
-    match joint.filter(|_| by_groups && assembled.may_keep(options)) {
-        Some(points) => {
-            let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
-            let joint: Vec<usize> = points.iter().flat_map(unknowns).collect();
-            adjustment::adjust_by_groups(problem, &own, (&joint, options.memory), threads, watch)
-        }
-        None => adjustment::adjust(problem, &own, threads, watch),
-    }
 }
 
 /// Transforms an adjusted network to the datum of inner constraints; returns the relative rounding error of its variances.

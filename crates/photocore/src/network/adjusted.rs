@@ -1,13 +1,15 @@
-//! Adjusted photos, points and shared parameters.
+//! Adjusted photos, cameras, points and shared parameters.
+
+use std::ops::Range;
 
 use nalgebra::DMatrix;
 
 use super::commons::Common;
-use super::input::{Network, Point};
+use super::input::{Camera, Network, Point};
 use super::model::Bundle;
+use super::neighbourhood::TOGETHER;
 use super::problem::Assembled;
-use super::selection::TOGETHER;
-use super::stations::Placed;
+use super::stations::Stations;
 use crate::adjustment::{Adjustment, Problem};
 use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Cofactors;
@@ -56,7 +58,7 @@ pub(super) fn adjusted_photos(
     let model = &problem.model;
     let origin = model.origin;
     let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
-    let placed = model.placed(&unknowns[model.of_stations()]);
+    let stations = model.without_points(&unknowns[model.of_stations()]);
     let photo = |index: usize| {
         let photo = &network.photos[index];
         let range = model.of_photo(index);
@@ -82,7 +84,7 @@ pub(super) fn adjusted_photos(
             // In a node of a larger network, its images may belong to child nodes.
             let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
             let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
-            let (pose, cofactors) = mounted_pose(network, problem, &placed, index, cofactors);
+            let (pose, cofactors) = mounted_pose(network, problem, &stations, index, cofactors);
             let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; POSE];
             return AdjustedPhoto { pose, camera, cofactors, redundancy, images: model.images_on[index] };
         }
@@ -109,7 +111,7 @@ pub(super) fn adjusted_photos(
 fn mounted_pose(
     network: &Network,
     problem: &Problem<Bundle>,
-    Placed { photos, mounted, .. }: &Placed,
+    Stations { photos, mounted, .. }: &Stations,
     photo: usize,
     cofactors: Option<&Cofactors>,
 ) -> ([f64; POSE], DMatrix<f64>) {
@@ -277,5 +279,105 @@ impl Network {
             found
         };
         self.commons.iter().enumerate().map(each).collect()
+    }
+}
+
+/// An adjusted camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdjustedCamera {
+    /// Adjusted parameters.
+    pub parameters: Vec<f64>,
+    /// Cofactors of the parameters (a priori unit weight): zero for fixed ones, NaN without cofactors.
+    pub cofactors: DMatrix<f64>,
+    /// Redundancy numbers of the parameters as their own observations; zero unless weighted, NaN without cofactors.
+    pub redundancy: Vec<f64>,
+    /// Diagonal of the normal equations including weights: the reciprocal cofactors if all other parameters were fixed. Zero for fixed
+    /// parameters, NaN without cofactors.
+    pub information: Vec<f64>,
+    /// Number of photos.
+    pub photos: usize,
+    /// Number of active images of these photos.
+    pub images: usize,
+}
+
+impl Network {
+    /// Returns the adjusted cameras, in the order of the network; `photos` are the adjusted photos.
+    pub(super) fn adjusted_cameras(
+        &self,
+        Assembled { problem, .. }: &Assembled,
+        adjustment: &Adjustment,
+        unknowns: &[f64],
+        photos: &[AdjustedPhoto],
+    ) -> Vec<AdjustedCamera> {
+        let model = &problem.model;
+        let given = |camera: &Camera| {
+            let parameters = camera.camera.parameters();
+            let count = parameters.len();
+            // Results of a camera without photos are undefined.
+            let missing = if adjustment.cofactors.is_some() && camera.is_held() { 0.0 } else { f64::NAN };
+            AdjustedCamera {
+                parameters,
+                cofactors: DMatrix::repeat(count, count, missing),
+                redundancy: vec![missing; count],
+                information: vec![missing; count],
+                photos: 0,
+                images: 0,
+            }
+        };
+        let mut cameras: Vec<AdjustedCamera> = self.cameras.iter().map(given).collect();
+        for (index, (given, photo)) in self.photos.iter().zip(photos).enumerate() {
+            let camera = &mut cameras[given.camera];
+            camera.photos += 1;
+            camera.images += photo.images;
+            if model.has_own_camera(index) {
+                camera.take_over(photo);
+                let own = model.of_photo(index);
+                camera.inform(problem, own.start + 6..own.end, adjustment);
+            }
+        }
+        for (shared, &index) in model.blocks.shared.iter().enumerate() {
+            let block = model.cameras.len() + shared;
+            cameras[index].take_block(model, block, adjustment, unknowns);
+            cameras[index].inform(problem, model.of_block(block), adjustment);
+        }
+        for (camera, given) in cameras.iter_mut().zip(&self.cameras) {
+            if let Some(redundancy) = given.redundancy(&camera.cofactors) {
+                camera.redundancy = redundancy;
+            }
+        }
+        cameras
+    }
+}
+
+impl AdjustedCamera {
+    /// Copies the results of the camera of one photo, the last parameters of its block.
+    fn take_over(&mut self, photo: &AdjustedPhoto) {
+        let own = photo.camera.len();
+        self.parameters.clone_from(&photo.camera);
+        self.redundancy = photo.redundancy[6..].to_vec();
+        self.cofactors = photo.cofactors.view((6, 6), (own, own)).into_owned();
+    }
+
+    /// Copies the diagonal of the normal equations; zero for fixed parameters.
+    fn inform(&mut self, problem: &Problem<Bundle>, unknowns: Range<usize>, adjustment: &Adjustment) {
+        let Some(all) = &adjustment.cofactors else { return };
+        let first = problem.layout().all_retained().start;
+        let of = |unknown: usize| {
+            if problem.sd[unknown] == 0.0 { 0.0 } else { all.information[unknown - first] }
+        };
+        self.information = unknowns.map(of).collect();
+    }
+
+    /// Copies the results of a retained block.
+    fn take_block(&mut self, model: &Bundle, block: usize, adjustment: &Adjustment, unknowns: &[f64]) {
+        let own = model.of_block(block);
+        self.parameters = unknowns[own.clone()].to_vec();
+        if let Some(all) = &adjustment.cofactors {
+            self.cofactors =
+                DMatrix::from_row_slice(own.len(), own.len(), model.cofactors_of_block(all, block));
+        }
+        if let Some(all) = &adjustment.prior_redundancy {
+            self.redundancy = all[own].to_vec();
+        }
     }
 }

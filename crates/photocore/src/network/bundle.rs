@@ -10,9 +10,10 @@ use super::error::NetworkError;
 use super::input::{Camera, Image, Network, Photo, Point, Screens};
 use super::model::{Bundle, GivenDatum};
 use super::mounts::{AT_PHOTO, Mounts};
+use super::neighbourhood::TOGETHER;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::passages::Passages;
-use super::selection::{Selected, TOGETHER};
+use super::selection::Selected;
 use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
 use crate::parallel;
 
@@ -81,7 +82,7 @@ impl Network {
     }
 
     /// Returns the mounts with trajectories relative to an origin.
-    pub(super) fn placed_mounts(&self, origin: [f64; 3]) -> Mounts {
+    fn placed_mounts(&self, origin: [f64; 3]) -> Mounts {
         Mounts::new((&self.mounts, self.photos.len()), (&self.trajectories, origin), &self.commons)
     }
 

@@ -5,7 +5,7 @@ use std::mem::discriminant;
 use super::commons::CommonKind;
 use super::error::NetworkError;
 use super::input::{Image, Network};
-use super::mounts::{AT_PHOTO, Mount, Trajectory};
+use super::mounts::{AT_PHOTO, Mount, Mounts, Trajectory};
 use super::observations::{Fault, Observation};
 use super::passages::{Passage, Requirements};
 use super::surroundings::{BlockOf, Surroundings};
@@ -138,7 +138,8 @@ impl Network {
         if self.trajectories.is_empty() {
             return Ok(());
         }
-        let known = self.placed_mounts([0.0; 3]);
+        let known =
+            Mounts::new((&self.mounts, self.photos.len()), (&self.trajectories, [0.0; 3]), &self.commons);
         let spans: Vec<(f64, f64)> = self.trajectories.iter().map(|own| own.course.span()).collect();
         let reach = |photo: usize, point: Option<usize>, at: f64| {
             let Some((trajectory, time)) = known.flight(photo, at) else { return Ok(()) };

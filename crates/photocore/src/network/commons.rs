@@ -231,7 +231,7 @@ pub(super) struct PlacedCommon {
 }
 
 /// A similarity transformation: displacement of a position, rotation vector and scale factor.
-pub(super) struct Motion<'a> {
+pub(super) struct SimilarityMotion<'a> {
     /// Displacement of a position.
     pub displacement: &'a dyn Fn(&Vector3) -> Vector3,
     /// Rotation vector.
@@ -319,7 +319,7 @@ impl PlacedCommon {
 
     /// Returns the change of the parameters under a small transformation with a scale near 1; zero for static and absorbing parameters and
     /// coefficients of trajectories.
-    pub(super) fn change(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
+    pub(super) fn change(&self, state: &CommonState, motion: &SimilarityMotion<'_>) -> Vec<f64> {
         let growth = motion.scale - 1.0;
         let (offset, turn) = match self.kind.moves() {
             Moves::Stays | Moves::Against | Moves::Follows => (Vector3::zeros(), Vector3::zeros()),
@@ -353,7 +353,7 @@ impl PlacedCommon {
     }
 
     /// Returns the parameters after a finite transformation; unchanged for static and absorbing ones and coefficients of trajectories.
-    pub(super) fn moved(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
+    pub(super) fn moved(&self, state: &CommonState, motion: &SimilarityMotion<'_>) -> Vec<f64> {
         match self.kind.moves() {
             Moves::Stays | Moves::Against | Moves::Follows => self.unknowns(&state.offset, &state.attitude),
             Moves::Scales => {

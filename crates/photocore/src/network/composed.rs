@@ -8,7 +8,7 @@ use smallvec::{SmallVec, smallvec};
 use super::commons::{CommonState, InBlock};
 use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
-use super::stations::{Bent, Mounted, Station, Stations};
+use super::stations::{Mounted, Station, Stations};
 use crate::geometry::{Orientation, POSE, Vector3};
 use crate::normals::{Cofactors, GroupRows, Layout};
 use crate::sorting::sort_by;
@@ -86,40 +86,30 @@ impl Bundle {
     #[inline(never)]
     pub(super) fn observe_bent(
         &self,
-        (stations, bent): (&Stations, &Bent),
+        stations: &Stations,
         group: usize,
         local: usize,
         rows: &mut GroupRows<'_>,
         own: &mut Composed,
     ) {
         if !self.passages.is_empty() {
-            return self.observe_passing((stations, bent), group, local, rows, own);
+            return self.observe_passing(stations, group, local, rows, own);
         }
-        let timed = self.compose_timed((stations, bent), group, own);
-        bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, rows);
+        let timed = self.compose_timed(stations, group, own);
+        stations.write(self.space, timed.then_some(&*own), &self.images[group], local, rows);
     }
 
     /// Returns the point of an image with corrections, in the axes of its photo.
     #[inline(never)]
-    pub(super) fn sight_bent(
-        &self,
-        (stations, bent): (&Stations, &Bent),
-        group: usize,
-        local: usize,
-    ) -> Vector3 {
+    pub(super) fn sight_bent(&self, stations: &Stations, group: usize, local: usize) -> Vector3 {
         let mut own = Composed::new(false);
-        let timed = self.compose_timed((stations, bent), group, &mut own);
+        let timed = self.compose_timed(stations, group, &mut own);
         let (timed, photo) = (timed.then_some(&own.orientation), self.images[group].photo);
-        bent.seen(self.space, stations, timed, photo, local, |orientation, point| orientation.sight(point))
+        stations.seen(self.space, timed, photo, local, |orientation, point| orientation.sight(point))
     }
 
-    pub(super) fn compose_timed(
-        &self,
-        (stations, bent): (&Stations, &Bent),
-        image: usize,
-        own: &mut Composed,
-    ) -> bool {
-        bent.mounted.as_ref().is_some_and(|mounted| self.compose(mounted, &stations.commons, image, own))
+    pub(super) fn compose_timed(&self, stations: &Stations, image: usize, own: &mut Composed) -> bool {
+        stations.mounted.as_ref().is_some_and(|mounted| self.compose(mounted, &stations.commons, image, own))
     }
 
     /// Composes the individual pose of an image into existing storage; returns false if it shares the pose of its photo.

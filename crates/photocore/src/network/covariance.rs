@@ -6,11 +6,10 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{DMatrix, Matrix6, Matrix6xX};
 
 use super::error::NetworkError;
-use super::input::{Network, Options};
+use super::input::{InnerConstraints, Network, NetworkDatum, Options, State};
 use super::model::Owner;
 use super::problem::Assembled;
 use super::solution::Solution;
-use super::state::{InnerConstraints, NetworkDatum, State};
 use super::suspects::Suspects;
 use crate::Threads;
 use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};

@@ -20,15 +20,13 @@ pub(super) struct At<'a> {
 
 impl Bundle {
     pub(super) fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        match &stations.bent {
-            None => {
-                let image = &self.images[group];
-                let Station { orientation, camera } = &stations.photos[image.photo];
-                let point = &stations.points[local];
-                each_camera!(camera, camera => write(orientation, camera, point, Some(image.xy), rows));
-            }
-            Some(bent) => self.observe_bent((stations, bent), group, local, rows, &mut Composed::new(true)),
+        if !stations.plain {
+            return self.observe_bent(stations, group, local, rows, &mut Composed::new(true));
         }
+        let image = &self.images[group];
+        let Station { orientation, camera } = &stations.photos[image.photo];
+        let point = &stations.points[local];
+        each_camera!(camera, camera => write(orientation, camera, point, Some(image.xy), rows));
     }
 
     pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
@@ -87,7 +85,9 @@ impl Model for Bundle {
     /// Intersects the points again.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
         let photos = self.of_stations();
-        let Ok(coordinates) = self.intersect(&self.placed(&unknowns[photos.clone()])) else { return false };
+        let Ok(coordinates) = self.intersect(&self.without_points(&unknowns[photos.clone()])) else {
+            return false;
+        };
         let (local, tied) = coordinates.split_at(self.locals);
         unknowns[..photos.start].copy_from_slice(local.as_flattened());
         unknowns[photos.end..].copy_from_slice(tied.as_flattened());
@@ -138,14 +138,14 @@ impl Evaluated for At<'_> {
             let (image, sd) = (&bundle.images[group], [sd[2 * group], sd[2 * group + 1]]);
             Sight { point: &stations.points[locals[t] as usize], image, sd }
         };
-        if let Some(bent) = &stations.bent {
-            let together = bundle.observe_all_passing((stations, bent), locals, groups, rows);
+        if !stations.plain {
+            let together = bundle.observe_all_passing(stations, locals, groups, rows);
             let mut pose = Composed::new(true);
             for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
                 let mut own = rows.part(t, locals.len());
                 if !together {
                     let image = (group as usize, local as usize);
-                    bundle.observe_bent((stations, bent), image.0, image.1, &mut own, &mut pose);
+                    bundle.observe_bent(stations, image.0, image.1, &mut own, &mut pose);
                 }
                 own.weigh(&sd[2 * group as usize..][..2]);
             }
@@ -162,12 +162,11 @@ impl Evaluated for At<'_> {
         let Self { bundle, stations } = self;
         let image = &bundle.images[group];
         let Station { orientation, camera } = &stations.photos[image.photo];
-        let u = match &stations.bent {
-            None => orientation.sight(&stations.points[local]),
-            Some(bent) => bundle.sight_bent((stations, bent), group, local),
+        let u = match stations.plain {
+            true => orientation.sight(&stations.points[local]),
+            false => bundle.sight_bent(stations, group, local),
         };
-        let film = stations.bent.as_ref().and_then(|bent| bent.film(image.photo));
-        let missing = each_camera!(camera, camera => match film {
+        let missing = each_camera!(camera, camera => match stations.film(image.photo) {
             None => camera.compare(&u, image.xy).0,
             Some(film) => film.missing(camera.image(&u), bundle.passages.cell(group), image.xy),
         });

@@ -72,14 +72,14 @@ impl Input {
 }
 
 /// Equations of x or y by column.
-struct Columns {
+struct LaneColumns {
     constant: Lanes,
     point: [Lanes; 3],
     photo: [Lanes; POSE],
     camera: [Lanes; PARAMETERS],
 }
 
-impl Columns {
+impl LaneColumns {
     const ZERO: Self = Self {
         constant: [0.0; LANES],
         point: [[0.0; LANES]; 3],
@@ -142,7 +142,7 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
         // Copies without aliases, so that the compiler vectorizes the lanes.
         let (pose, camera) = (*self.pose, self.camera.clone());
         let Input { point, image, sd } = *input;
-        let (mut x, mut y) = (Columns::ZERO, Columns::ZERO);
+        let (mut x, mut y) = (LaneColumns::ZERO, LaneColumns::ZERO);
         for t in 0..LANES {
             let u = pose.sight(&Vector3::new(point[0][t], point[1][t], point[2][t]));
             let (residual, computed) = camera.compare(&u, [image[0][t], image[1][t]]);

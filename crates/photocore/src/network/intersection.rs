@@ -2,7 +2,7 @@
 
 use super::model::Bundle;
 use super::mounts::Composed;
-use super::stations::{Mounted, Placed, Station};
+use super::stations::{Mounted, Station, Stations};
 use crate::geometry::axes::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
 use crate::parallel;
@@ -23,7 +23,7 @@ impl Bundle {
     ///
     /// # Errors
     /// The index of a point without usable rays.
-    pub fn intersect(&self, placed: &Placed) -> Result<Vec<[f64; 3]>, usize> {
+    pub fn intersect(&self, placed: &Stations) -> Result<Vec<[f64; 3]>, usize> {
         let met: Vec<Option<Vector3>> = parallel::by_parts(self.points.len(), TOGETHER, &|points| {
             let mut rays = Vec::new();
             let meeting = |point: usize| {
@@ -50,8 +50,8 @@ impl Bundle {
     }
 
     /// Returns the rays of a point, each from the pose of its image.
-    fn rays(&self, placed: &Placed, point: usize) -> impl Iterator<Item = Ray> {
-        let Placed { photos, commons, mounted, films } = placed;
+    fn rays(&self, placed: &Stations, point: usize) -> impl Iterator<Item = Ray> {
+        let Stations { photos, commons, mounted, films, .. } = placed;
         let ray = move |image: usize| {
             let (own, photo) = (&self.images[image], &photos[self.images[image].photo]);
             let xy = match films.get(own.photo) {
@@ -77,7 +77,7 @@ impl Bundle {
 
     /// Sets the fixed and weighted components and computes the others by least squares of the distances from the rays. The problem is
     /// linear in rectangular space, and nearly linear in geographic space.
-    fn hold(&self, placed: &Placed, point: usize, start: [f64; 3]) -> [f64; 3] {
+    fn hold(&self, placed: &Stations, point: usize, start: [f64; 3]) -> [f64; 3] {
         let (held, given) = (self.points[point].held(), self.points[point].coordinates);
         // One ray and two given components determine the third without an initial value.
         let unknown = if held.contains(&true) { 0.0 } else { f64::NAN };

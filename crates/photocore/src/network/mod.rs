@@ -11,16 +11,16 @@
 //! | part | files and folders |
 //! | --- | --- |
 //! | nodes | `node_chord`, `node_datum`, `node` |
-//! | tests of observations | `snooping`, `responses`, `predictions`, `group_tests`, `hypotheses` |
+//! | tests of observations | `snooping`, `hypotheses`, `responses`, `predictions`, `group_tests` |
 //! | adjustment | `adjust` |
-//! | results | `groups`, `covariance`, `visibility`, `solution`, `cameras`, `weak_points`, `adjusted` |
+//! | results | `groups`, `covariance`, `solution`, `visibility`, `weak_points`, `adjusted` |
 //! | trials without some observations | `trial`, `suspects` |
 //! | exclusion of points and photos | `screens` |
-//! | problem of least squares | `naming`, `datum`, `problem` |
-//! | values and equations at given parameters | `evaluated`, `diverging`, `composed`, `passing`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
-//! | unknowns and observations | `station_values`, `layout`, `bundle`, `model`, `camera_priors`, `blocks`, `stations` |
-//! | selection of the input | `check`, `neighbourhood`, `selection` |
-//! | input and errors | `error`, `surroundings`, `state`, `input` |
+//! | problem of least squares | `naming`, `datum`, `problem`, `layout`, `bundle`, `cameras`, `station_values` |
+//! | values and equations at given parameters | `evaluated`, `rigid_motions`, `diverging`, `passing`, `composed`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
+//! | unknowns | `model`, `blocks`, `stations` |
+//! | selection of the input | `check`, `selection`, `neighbourhood` |
+//! | input and errors | `error`, `surroundings`, `camera_priors`, `input` |
 //! | types of observations and parameters | `passages`, `observations`, `mounts`, `film`, `commons` |
 //! | numbers | `parts` |
 //!
@@ -96,11 +96,11 @@ mod precision;
 mod predictions;
 mod problem;
 mod responses;
+mod rigid_motions;
 mod screens;
 mod selection;
 pub mod snooping;
 mod solution;
-mod state;
 mod station_values;
 mod stations;
 mod surroundings;
@@ -111,14 +111,16 @@ mod weak_points;
 mod weighted_angles;
 
 pub use adjust::NetworkAdjustment;
-pub use adjusted::{AdjustedCommon, AdjustedPhoto, AdjustedPoint};
-pub use cameras::AdjustedCamera;
+pub use adjusted::{AdjustedCamera, AdjustedCommon, AdjustedPhoto, AdjustedPoint};
 pub use commons::{Common, CommonKind};
 pub use covariance::{Covariances, Of};
 pub use error::{Coarse, Combination, NetworkError, PosePart};
 pub use group_tests::Tests;
 pub use groups::Groups;
-pub use input::{Camera, Image, Minimum, Network, Options, Photo, Point, Screens, Start, UnitVariance};
+pub use input::{
+    Camera, Image, InnerConstraints, Minimum, Network, NetworkDatum, Options, Photo, Point, Screens, Start,
+    State, UnitVariance,
+};
 #[doc(hidden)]
 pub use intersection::meet;
 pub use mounts::{Mount, Trajectory};
@@ -129,11 +131,9 @@ pub use passages::Passage;
 pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
 pub use selection::{Dropped, Reason};
-pub use solution::{
-    DatumInForce, Joint, LEAST_REDUNDANCY, Redundancies, Solution, SumsOfSquares, Unseen, Weak,
-};
-pub use state::{InnerConstraints, NetworkDatum, State};
+pub use solution::{DatumInForce, Joint, LEAST_REDUNDANCY, Solution, SumsByType, Weak};
 pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::{Subject, Suspects};
 pub use trial::{Converged, Out, Outcome, Trial};
+pub use visibility::Unseen;
 pub use weak_points::WeakPoint;

@@ -10,11 +10,11 @@ use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, InBlock, PlacedCommon};
 use super::input::{Image, Minimum, Point, Screens};
 use super::mounts::{AT_PHOTO, Mounts};
+use super::neighbourhood::PointImages;
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
-use super::parts::Parts;
+use super::parts::Components;
 use super::passages::Passages;
-use super::selection::PointImages;
-use super::stations::{Bent, Placed, Refracted, Station, Stations};
+use super::stations::{Refracted, Station, Stations};
 use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,
     Vector3, Vertical,
@@ -63,7 +63,7 @@ pub struct Bundle {
     pub datum: GivenDatum,
     pub screens: Screens,
     /// Connected components, computed at first use from all fields above.
-    pub parts: OnceLock<Parts>,
+    pub parts: OnceLock<Components>,
 }
 
 /// Datum information that is available before any computation.
@@ -83,6 +83,20 @@ pub enum Owner {
     Photo(usize),
     Camera(usize),
     Common(usize),
+}
+
+impl Owner {
+    pub fn photo(self) -> Option<usize> {
+        if let Self::Photo(photo) = self { Some(photo) } else { None }
+    }
+
+    pub fn camera(self) -> Option<usize> {
+        if let Self::Camera(camera) = self { Some(camera) } else { None }
+    }
+
+    pub fn common(self) -> Option<usize> {
+        if let Self::Common(common) = self { Some(common) } else { None }
+    }
 }
 
 impl Bundle {
@@ -222,7 +236,7 @@ impl Bundle {
             coordinates: stations.tied[point - self.locals],
             block: self.block_of_point(point),
         };
-        let mounted = stations.bent.as_ref().and_then(|bent| bent.mounted.as_ref());
+        let mounted = stations.mounted.as_ref();
         let photo = |photo: usize| match mounted.and_then(|mounted| mounted.of(photo)) {
             None => {
                 PhotoSite { orientation: &stations.photos[photo].orientation, block: photo, made_of: None }
@@ -236,8 +250,7 @@ impl Bundle {
             state: &stations.commons[common],
             place: self.blocks.of_common[common],
         };
-        let moving =
-            |photo: usize| self.moving(stations.bent.as_ref()?.mounted.as_ref()?, &stations.commons, photo);
+        let moving = |photo: usize| self.moving(stations.mounted.as_ref()?, &stations.commons, photo);
         take(&TiedModel {
             space: self.space,
             origin: self.origin,
@@ -249,8 +262,8 @@ impl Bundle {
         })
     }
 
-    /// Returns photos and shared parameters at given values of the parameters of [`Bundle::of_stations`].
-    pub fn placed(&self, unknowns: &[f64]) -> Placed {
+    /// Returns photos and shared parameters, without points, at given values of the parameters of [`Bundle::of_stations`].
+    pub fn without_points(&self, unknowns: &[f64]) -> Stations {
         let commons = self.common_states(unknowns);
         let lenses = self.passages.lenses().iter().map(|own| own.commons.iter());
         let knots: Vec<Arc<[[f64; 2]]>> =
@@ -263,17 +276,18 @@ impl Bundle {
                 .map(|block| self.blocks.first[block]..self.blocks.first[block + 1]);
             let (own, camera) = (&self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
             let camera = own.with_parameters(camera).unwrap_or_else(|| own.clone());
-            let bent = self.passages.lens(photo).and_then(|lens| camera.with_knots(knots[lens].clone()));
-            Station { orientation: self.orientation(photo, &pose), camera: bent.unwrap_or(camera) }
+            let lens = self.passages.lens(photo).and_then(|lens| camera.with_knots(knots[lens].clone()));
+            Station { orientation: self.orientation(photo, &pose), camera: lens.unwrap_or(camera) }
         };
         let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
         let mounted = self.mount_all(&mut photos, &commons);
         let films = self.passages.films(&commons);
-        Placed { photos, commons, mounted, films }
+        let plain = self.refraction.is_none() && mounted.is_none() && self.passages.is_empty();
+        Stations { photos, commons, mounted, films, refracted: None, points: vec![], tied: vec![], plain }
     }
 
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
-        self.placed(unknowns).photos
+        self.without_points(unknowns).photos
     }
 
     pub fn common_states(&self, unknowns: &[f64]) -> Vec<CommonState> {
@@ -390,29 +404,29 @@ impl Bundle {
         let photos = &unknowns[self.of_stations()];
         let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
         let tied = tied.as_chunks().0.to_vec();
-        let Placed { photos: stations, commons, mounted, films } = self.placed(photos);
-        let refracted = self.refraction.map(|refraction| Refracted {
+        let mut stations = self.without_points(photos);
+        stations.refracted = self.refraction.map(|refraction| Refracted {
             refraction,
-            at_photos: self.verticals_at_photos(&refraction, photos, &stations),
+            at_photos: self.verticals_at_photos(&refraction, photos, &stations.photos),
             at_points: verticals(
                 &refraction,
                 self.space,
                 local.chunks(3).chain(tied.as_flattened().chunks(3)),
             ),
         });
-        let plain = refracted.is_none() && mounted.is_none() && self.passages.is_empty();
-        let bent = (!plain).then_some(Bent { refracted, mounted, films });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         let local: &[[f64; 3]] = local.as_chunks().0;
-        let mut points = if self.passages.have_figures() {
+        stations.points = if self.passages.have_figures() {
+            let commons = &stations.commons;
             let shift = |point| self.passages.shift(point, |common| commons[common].vector());
             let shifted = |point| place(&(Vector3::from(local[point]) + shift(point)).into());
             parallel::map_in_place(local.len(), 1024, &shifted)
         } else {
             parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]))
         };
-        points.extend(tied.iter().map(place));
-        Stations { photos: stations, points, tied, commons, bent }
+        stations.points.extend(tied.iter().map(place));
+        stations.tied = tied;
+        stations
     }
 }
 

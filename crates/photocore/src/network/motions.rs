@@ -6,12 +6,12 @@
 
 use std::collections::BTreeMap;
 
-use super::commons::{CommonState, Motion, PlacedCommon};
+use super::commons::{CommonState, PlacedCommon, SimilarityMotion};
 use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Trajectory};
 use super::observations::Observation;
-use super::parts::Parts;
-use super::stations::Placed;
+use super::parts::Components;
+use super::stations::Stations;
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::trajectory::{Active, Flight};
 use crate::geometry::{Matrix3, Pose, Vector3};
@@ -29,7 +29,7 @@ const MOST_TURNS: usize = 20;
 const TURNED: f64 = 1e-13;
 
 /// Changes of the coefficients of positions, and of rotations.
-pub(super) type Changes = [Vec<Vector3>; 2];
+pub(super) type CoefficientChanges = [Vec<Vector3>; 2];
 
 /// Factored band normal matrix of functions with local support: rows of L within the band.
 struct Band {
@@ -131,7 +131,7 @@ pub(super) struct Following<'a> {
 }
 
 impl<'a> Following<'a> {
-    fn new(own: &'a Trajectory, times: &[(f64, f64)], [c, r]: &Changes) -> Self {
+    fn new(own: &'a Trajectory, times: &[(f64, f64)], [c, r]: &CoefficientChanges) -> Self {
         let at = |&(weight, time): &(f64, f64)| (weight, own.course.at(time, &|k| c[k], &|k| r[k]));
         let flights: Vec<(f64, Flight)> = times.iter().map(at).collect();
         let inverse = |(_, flight): &(f64, Flight)| flight.jacobian.try_inverse().unwrap_or_default();
@@ -145,7 +145,7 @@ impl<'a> Following<'a> {
     }
 
     /// Returns the changes of the coefficients for small displacements and rotations (about the own axes) at each time.
-    pub fn changes(&self, motion: &dyn Fn(usize, &Pose) -> [Vector3; 2]) -> Changes {
+    pub fn changes(&self, motion: &dyn Fn(usize, &Pose) -> [Vector3; 2]) -> CoefficientChanges {
         let moved = |(k, (_, flight)): (usize, &(f64, Flight))| motion(k, &flight.motion.pose);
         let moved: Vec<[Vector3; 2]> = self.flights.iter().enumerate().map(moved).collect();
         let all = self.flights.iter().zip(&moved);
@@ -164,7 +164,7 @@ impl Bundle {
     /// Returns the trajectories, each with its connected component.
     fn trajectories_in<'a>(
         &'a self,
-        parts: &'a Parts,
+        parts: &'a Components,
     ) -> impl Iterator<Item = (usize, usize, &'a Trajectory)> {
         let of = |(number, own): (usize, &'a Trajectory)| {
             let part = own.coefficients().find_map(|common| parts.of_common[common]);
@@ -176,7 +176,7 @@ impl Bundle {
     /// Returns the component of each active trajectory, and its linearization at the current coefficients.
     pub(super) fn following<'a>(
         &'a self,
-        parts: &'a Parts,
+        parts: &'a Components,
         commons: &[CommonState],
     ) -> Vec<(usize, Following<'a>)> {
         let times = self.times_of_trajectories();
@@ -187,7 +187,12 @@ impl Bundle {
     }
 
     /// Writes the changes of the free coefficients.
-    pub(super) fn put_changes(&self, following: &Following<'_>, changes: &Changes, unknowns: &mut [f64]) {
+    pub(super) fn put_changes(
+        &self,
+        following: &Following<'_>,
+        changes: &CoefficientChanges,
+        unknowns: &mut [f64],
+    ) {
         for (common, change) in following.own.coefficients().zip(changes.iter().flatten()) {
             if let Some(range) = self.of_common(common) {
                 unknowns[range].copy_from_slice(change.as_slice());
@@ -198,7 +203,7 @@ impl Bundle {
     /// Transforms the trajectories of a component by a finite transformation.
     pub(super) fn move_trajectories(
         &self,
-        (parts, part): (&Parts, usize),
+        (parts, part): (&Components, usize),
         commons: &[CommonState],
         motion: &dyn Fn(&Pose) -> Pose,
         unknowns: &mut [f64],
@@ -269,7 +274,7 @@ impl Bundle {
     }
 
     /// Returns the free coefficients of positions in a component.
-    pub(super) fn position_coefficients(&self, parts: &Parts, part: usize) -> Vec<usize> {
+    pub(super) fn position_coefficients(&self, parts: &Components, part: usize) -> Vec<usize> {
         let all = self.mounts.trajectories().iter().flat_map(|own| &own.position);
         let own = all.filter(|&&common| parts.of_common[common] == Some(part));
         own.filter_map(|&common| self.of_common(common)).flatten().collect()
@@ -277,7 +282,7 @@ impl Bundle {
 }
 
 /// Returns the values of the coefficients of a trajectory.
-fn coefficients(own: &Trajectory, commons: &[CommonState]) -> Changes {
+fn coefficients(own: &Trajectory, commons: &[CommonState]) -> CoefficientChanges {
     [&own.position, &own.rotation].map(|all| all.iter().map(|&common| commons[common].vector()).collect())
 }
 
@@ -289,8 +294,8 @@ impl Bundle {
     /// mean displacement of their antennas.
     pub(super) fn move_commons(
         &self,
-        placed: &Placed,
-        motion: &Motion<'_>,
+        placed: &Stations,
+        motion: &SimilarityMotion<'_>,
         each: impl Fn(&PlacedCommon, &CommonState) -> Vec<f64>,
         unknowns: &mut [f64],
     ) {
@@ -314,7 +319,7 @@ impl Bundle {
     }
 
     /// Returns the antennas of each pair of shift and drift that no other pair shares.
-    fn antennas(&self, placed: &Placed) -> Antennas {
+    fn antennas(&self, placed: &Stations) -> Antennas {
         let mut all = Antennas::new();
         for tied in &self.observations {
             let Observation::Position(own) = &tied.observation else { continue };

@@ -5,12 +5,26 @@
 use rayon::prelude::*;
 
 use super::input::Network;
-use super::selection::{PointImages, TOGETHER};
 use crate::geometry::Vector3;
 use crate::parallel;
 
+/// Minimum number of points per thread.
+pub(super) const TOGETHER: usize = 1024;
 /// Number of cells of the curve along each axis.
 const CELLS: f64 = (1_u32 << 20) as f64;
+
+/// Images of the active points, sorted by point: `order[start[i]..start[i + 1]]` lists the images of point i.
+#[derive(Debug, Default)]
+pub(super) struct PointImages {
+    pub start: Vec<usize>,
+    pub order: Vec<usize>,
+}
+
+impl PointImages {
+    pub fn of(&self, i: usize) -> &[usize] {
+        &self.order[self.start[i]..self.start[i + 1]]
+    }
+}
 
 impl Network {
     /// Returns the points along a Morton curve through the mean positions of their photos; `images_of` lists the images of each point.

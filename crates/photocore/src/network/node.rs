@@ -6,9 +6,10 @@
 
 use super::error::NetworkError;
 use super::input::{Image, Network, Options, Point};
+use super::model::Owner;
 use super::problem::Assembled;
-use super::selection::Dropped;
-use super::solution::{Solution, SumsOfSquares, observations, of_photo, sums_of_squares};
+use super::selection::{Dropped, Selected};
+use super::solution::{Solution, SumsByType, observations, owned, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
 use crate::Threads;
 use crate::adjustment::{Adjustment, Counts, DatumOfPart, Linearized, Model, PartError, PartOptions, Watch};
@@ -64,6 +65,18 @@ pub struct NodePrediction {
 const FOUND: usize = 7;
 
 impl Network {
+    /// Returns the active parts of the whole network.
+    pub(super) fn select_whole(
+        &self,
+        middle: Option<[f64; 3]>,
+        threads: &Threads,
+    ) -> Result<Selected, NetworkError> {
+        self.check()?;
+        let left_out = self.left_out(self.untouched_photos(), None)?;
+        let surroundings = Surroundings { middle, ..Surroundings::default() };
+        Ok(threads.install(|| self.select(&left_out, surroundings)))
+    }
+
     /// Returns the parameters that an adjustment of the whole network fixes as its datum: photo and number of the pose parameter (see
     /// [`Surroundings::held`]). The list is empty if the network defines a datum.
     ///
@@ -81,8 +94,8 @@ impl Network {
         let assembled = threads.install(|| self.assemble(options, selected, None))?;
         let problem = &assembled.problem;
         let held = problem.any().to_hold(&problem.initial, threads);
-        let in_photos = held.iter().map(|&unknown| of_photo(problem, unknown)).collect::<Option<Vec<_>>>();
-        in_photos.ok_or(NetworkError::Node(
+        let in_photos = owned(problem, &held, Owner::photo);
+        (in_photos.len() == held.len()).then_some(in_photos).ok_or(NetworkError::Node(
             "in parts trajectories take no datum: it would be held by their coefficients",
         ))
     }
@@ -249,7 +262,7 @@ impl Node {
     /// is their sum.
     /// # Errors
     /// The state has a wrong length.
-    pub fn objective(&self, state: &[f64], threads: &Threads) -> Result<(SumsOfSquares, f64), NetworkError> {
+    pub fn objective(&self, state: &[f64], threads: &Threads) -> Result<(SumsByType, f64), NetworkError> {
         self.check(&[state])?;
         let (problem, loss) = (&self.assembled.problem, self.options.adjustment.loss);
         let reached = Adjustment::between(problem, loss, &self.held, state, state.to_vec(), threads);

@@ -4,13 +4,10 @@
 //! Then W = Q B and the cofactors of outer parameters are passed from parents to children, and each node transforms its own cofactors.
 
 use super::error::NetworkError;
-use super::input::{Network, Options};
+use super::input::{InnerConstraints, Network, Options};
 use super::model::Owner;
 use super::node::{FormedNode, Node};
 use super::problem::Assembled;
-use super::selection::Selected;
-use super::state::InnerConstraints;
-use super::surroundings::Surroundings;
 use crate::Threads;
 use crate::adjustment::{Adjusted, DatumColumns, Watch, moved_with_columns};
 use crate::sorting::order;
@@ -22,7 +19,7 @@ pub type UnknownName = [usize; 3];
 /// Results of a network that was adjusted in parts.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedInParts<'a> {
-    /// Centre that was passed to all nodes ([`Surroundings::middle`]).
+    /// Centre that was passed to all nodes ([`super::Surroundings::middle`]).
     pub middle: Option<[f64; 3]>,
     /// Photos with the numbers of their fixed parameters.
     pub held: &'a [(usize, usize)],
@@ -68,18 +65,6 @@ impl Network {
         };
         let (b, t) = (named(&columns.b), named(&columns.t));
         Ok((named(&moved), DatumColumns { b, t, ..columns }))
-    }
-
-    /// Returns the active parts of the whole network.
-    pub(super) fn select_whole(
-        &self,
-        middle: Option<[f64; 3]>,
-        threads: &Threads,
-    ) -> Result<Selected, NetworkError> {
-        self.check()?;
-        let left_out = self.left_out(self.untouched_photos(), None)?;
-        let surroundings = Surroundings { middle, ..Surroundings::default() };
-        Ok(threads.install(|| self.select(&left_out, surroundings)))
     }
 }
 

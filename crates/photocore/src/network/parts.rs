@@ -2,7 +2,7 @@
 
 /// Photos connected by points and observations; a shared camera does not connect them.
 #[derive(Debug)]
-pub(super) struct Part {
+pub(super) struct Component {
     pub photos: Vec<usize>,
     /// Photo of the preferred datum: chosen by the user or by fixed positions, else the one with most images.
     pub central: usize,
@@ -10,8 +10,8 @@ pub(super) struct Part {
 
 /// Components of a network that contain images, the largest first, and the component of each photo, point and shared parameter.
 #[derive(Debug)]
-pub(super) struct Parts {
-    pub all: Vec<Part>,
+pub(super) struct Components {
+    pub all: Vec<Component>,
     pub of_photo: Vec<Option<usize>>,
     pub of_point: Vec<Option<usize>>,
     pub of_common: Vec<Option<usize>>,

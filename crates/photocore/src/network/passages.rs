@@ -155,7 +155,7 @@ impl Scan {
 }
 
 /// Distinct shared parameters of an image.
-pub(super) type Own = SmallVec<[usize; 32]>;
+pub(super) type ImageCommons = SmallVec<[usize; 32]>;
 
 /// Corrections of a model, indexed by their objects; empty without corrections.
 #[derive(Debug, Default)]
@@ -270,8 +270,8 @@ impl Passages {
     }
 
     /// Returns the shared parameters of an image; `columns` is the number of knots per row of its camera.
-    pub fn commons(&self, (image, photo, point): (usize, usize, usize), columns: usize) -> Own {
-        let mut all: Own = self.figure(point).map(|(own, _)| own.common).into_iter().collect();
+    pub fn commons(&self, (image, photo, point): (usize, usize, usize), columns: usize) -> ImageCommons {
+        let mut all: ImageCommons = self.figure(point).map(|(own, _)| own.common).into_iter().collect();
         if let (Some(lens), Some(window)) = (self.lens(photo), self.window(image)) {
             all.extend(window.knots(columns).map(|knot| self.lenses[lens].commons[knot]));
         }

@@ -10,8 +10,8 @@ use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::input::Image;
 use super::model::Bundle;
 use super::mounts::Composed;
-use super::passages::Own;
-use super::stations::{Bent, Station, Stations};
+use super::passages::ImageCommons;
+use super::stations::{Station, Stations};
 use crate::geometry::camera::{LensDirection, Matrix2, SplinedStereographic, each_camera};
 use crate::geometry::{Camera, CameraModel, Matrix3, Vector3};
 use crate::normals::{Cofactors, GroupRows};
@@ -26,15 +26,15 @@ const NOWHERE: Image = Image { photo: 0, point: 0, xy: [0.0; 2], sd: [1.0; 2] };
 
 /// First column of a block among the shared columns of an image; None for the main block.
 #[derive(Debug, Clone, Copy)]
-struct Slot {
+struct ColumnRange {
     block: usize,
     first: Option<usize>,
 }
 
 /// Column layout of an image with corrections. The main block begins with pose and camera. The shared columns are other blocks of the pose,
 /// blocks of the corrections, and the camera.
-pub(super) struct Columns {
-    slots: SmallVec<[Slot; 32]>,
+pub(super) struct ImageColumns {
+    slots: SmallVec<[ColumnRange; 32]>,
     /// Number of columns of pose and camera in the main block.
     main: usize,
     /// Number of columns of other pose blocks, first column of the camera, and total number.
@@ -43,7 +43,7 @@ pub(super) struct Columns {
     all: usize,
 }
 
-impl Columns {
+impl ImageColumns {
     /// Adds the partials of the computed position by one parameter.
     #[inline]
     fn add(&self, rows: &mut GroupRows<'_>, place: InBlock, k: usize, by: [f64; 2]) {
@@ -55,7 +55,7 @@ impl Columns {
     /// Returns the slot of a block, searching from slot `from` on.
     #[inline]
     fn slot(&self, block: usize, from: usize) -> Option<usize> {
-        let is_it = |slot: &Slot| slot.block == block;
+        let is_it = |slot: &ColumnRange| slot.block == block;
         let (before, after) = self.slots.split_at(from);
         after.iter().position(is_it).map(|place| from + place).or_else(|| before.iter().position(is_it))
     }
@@ -107,7 +107,7 @@ fn lead(by: &Matrix2, (from, columns): (&[f64], Range<usize>), (to, first): (&mu
 
 impl Bundle {
     /// Returns the shared parameters of the corrections of an image.
-    fn passed_by(&self, image: usize) -> Own {
+    fn passed_by(&self, image: usize) -> ImageCommons {
         let photo = self.images[image].photo;
         let columns = splined(&self.cameras[photo]).map_or(0, SplinedStereographic::columns);
         self.passages.commons((image, photo, self.point_of(image)), columns)
@@ -164,14 +164,13 @@ impl Bundle {
         take: impl Fn(&SplinedStereographic, &Vector3) -> Option<T> + Sync,
     ) -> Vec<Option<T>> {
         let stations = self.evaluated(unknowns);
-        let Some(bent) = &stations.bent else { return vec![] };
         let of_point = |point: usize| {
             let images = self.point_images.start[point]..self.point_images.start[point + 1];
             let of_image = |image: usize| {
                 let photo = self.images[image].photo;
                 self.passages.lens(photo)?;
                 let camera = splined(&stations.photos[photo].camera)?;
-                take(camera, &self.sight_bent((&stations, bent), image, point))
+                take(camera, &self.sight_bent(&stations, image, point))
             };
             images.map(of_image).collect::<Vec<_>>()
         };
@@ -197,12 +196,12 @@ impl Bundle {
     }
 
     /// Returns the column layout of an image with `all` shared columns.
-    fn columns(&self, image: usize, all: usize) -> Columns {
+    fn columns(&self, image: usize, all: usize) -> ImageColumns {
         let (photo, block) = (self.images[image].photo, self.main_block(image));
-        let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block, first: None }];
+        let mut slots: SmallVec<[ColumnRange; 32]> = smallvec![ColumnRange { block, first: None }];
         let mut place = |blocks: &mut dyn Iterator<Item = usize>, mut first: usize| {
             for block in blocks {
-                slots.push(Slot { block, first: Some(first) });
+                slots.push(ColumnRange { block, first: Some(first) });
                 first += self.of_block(block).len();
             }
             first
@@ -210,13 +209,13 @@ impl Bundle {
         let poses = place(&mut self.blocks_of_pose(photo, self.time_of(image)).skip(1), 0);
         let camera = place(&mut self.blocks_of_passages(image).into_iter(), poses);
         let main = if block == photo { self.of_photo(photo) } else { self.of_block(block) }.len();
-        Columns { slots, main, poses, camera, all }
+        ImageColumns { slots, main, poses, camera, all }
     }
 
     /// Writes the equations of an image with corrections, starting from the equations of pose, point and camera.
     pub(super) fn observe_passing(
         &self,
-        at: (&Stations, &Bent),
+        stations: &Stations,
         group: usize,
         local: usize,
         rows: &mut GroupRows<'_>,
@@ -224,37 +223,36 @@ impl Bundle {
     ) {
         let columns = self.columns(group, rows.shared.len() / 2);
         columns.with_plain(1, |plain| {
-            let timed = self.compose_timed(at, group, own).then_some(&*own);
-            at.1.write(self.space, at.0, timed, &self.images[group], local, plain);
-            self.pass(at, (group, local), &columns, plain, rows, &mut Read::default());
+            let timed = self.compose_timed(stations, group, own).then_some(&*own);
+            stations.write(self.space, timed, &self.images[group], local, plain);
+            self.pass(stations, (group, local), &columns, plain, rows, &mut Read::default());
         });
     }
 
     /// Writes the equations of images of one photo with equal blocks in one batch; returns false if this is impossible.
     pub(super) fn observe_all_passing(
         &self,
-        at: (&Stations, &Bent),
+        stations: &Stations,
         locals: &[u32],
         groups: &[u32],
         rows: &mut GroupRows<'_>,
     ) -> bool {
-        let (stations, bent) = at;
         let (first, count) = (groups[0] as usize, groups.len());
-        if self.passages.is_empty() || bent.mounted.is_some() || count < FEWEST {
+        if self.passages.is_empty() || stations.mounted.is_some() || count < FEWEST {
             return false;
         }
         let columns = self.columns(first, rows.shared.len() / (2 * count));
         columns.with_plain(count, |plain| {
-            if !self.place_in_lanes(at, locals, groups, plain) {
+            if !self.place_in_lanes(stations, locals, groups, plain) {
                 for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
                     let image = &self.images[group as usize];
-                    bent.write(self.space, stations, None, image, local as usize, &mut plain.part(t, count));
+                    stations.write(self.space, None, image, local as usize, &mut plain.part(t, count));
                 }
             }
             let mut read = Read::default();
             for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
                 let (image, own) = ((group as usize, local as usize), &mut rows.part(t, count));
-                self.pass(at, image, &columns, &plain.part(t, count), own, &mut read);
+                self.pass(stations, image, &columns, &plain.part(t, count), own, &mut read);
             }
         });
         true
@@ -263,19 +261,19 @@ impl Bundle {
     /// Writes the equations of pose, point and camera of images of one photo by SIMD; returns false if this is impossible.
     fn place_in_lanes(
         &self,
-        (stations, bent): (&Stations, &Bent),
+        stations: &Stations,
         locals: &[u32],
         groups: &[u32],
         plain: &mut GroupRows<'_>,
     ) -> bool {
         let photo = self.images[groups[0] as usize].photo;
         let Station { orientation, camera } = &stations.photos[photo];
-        let scanned = bent.film(photo).is_some();
+        let scanned = stations.film(photo).is_some();
         let sight = |t: usize| {
             let image = if scanned { &NOWHERE } else { &self.images[groups[t] as usize] };
             Sight { point: &stations.points[locals[t] as usize], image, sd: [1.0; 2] }
         };
-        bent.refracted.is_none()
+        stations.refracted.is_none()
             && each_camera!(camera, camera => {
                 (!scanned || is_forward(camera))
                     && write_in_lanes(orientation, camera, groups.len(), &sight, plain)
@@ -285,19 +283,19 @@ impl Bundle {
     /// Writes the equations of an image, given the equations of pose, point and camera.
     fn pass(
         &self,
-        (stations, bent): (&Stations, &Bent),
+        stations: &Stations,
         (group, local): (usize, usize),
-        columns: &Columns,
+        columns: &ImageColumns,
         plain: &GroupRows<'_>,
         rows: &mut GroupRows<'_>,
         read: &mut Read,
     ) {
         let photo = self.images[group].photo;
-        let (Some(film), Some(at)) = (self.passages.film(photo), bent.film(photo)) else {
+        let (Some(film), Some(at)) = (self.passages.film(photo), stations.film(photo)) else {
             columns.spread(plain, &UNIT, rows);
             rows.constant.copy_from_slice(plain.constant);
             self.step_figure(local, columns, rows);
-            return self.step_knots((stations, bent), group, local, columns, rows);
+            return self.step_knots(stations, group, local, columns, rows);
         };
         let cell = self.passages.cell(group);
         at.read([-plain.constant[0], -plain.constant[1]], cell, read);
@@ -331,16 +329,16 @@ impl Bundle {
     /// Adds the partials by the knots of a lens.
     fn step_knots(
         &self,
-        (stations, bent): (&Stations, &Bent),
+        stations: &Stations,
         group: usize,
         local: usize,
-        columns: &Columns,
+        columns: &ImageColumns,
         rows: &mut GroupRows<'_>,
     ) {
         let photo = self.images[group].photo;
         let (lens, camera) = (self.passages.lens(photo), splined(&stations.photos[photo].camera));
         let (Some(lens), Some(camera)) = (lens, camera) else { return };
-        let Some(patch) = camera.patch(&self.sight_bent((stations, bent), group, local)) else { return };
+        let Some(patch) = camera.patch(&self.sight_bent(stations, group, local)) else { return };
         let [fx, fy, ..] = camera.parameters();
         let mut last = 0;
         for (knot, weight) in patch.knots(camera.columns()) {
@@ -356,7 +354,7 @@ impl Bundle {
     }
 
     /// Adds the partials by the parameters of a figure: the partials by the point times its displacement vectors.
-    fn step_figure(&self, local: usize, columns: &Columns, rows: &mut GroupRows<'_>) {
+    fn step_figure(&self, local: usize, columns: &ImageColumns, rows: &mut GroupRows<'_>) {
         let Some((figure, k)) = self.passages.figure(local) else { return };
         let Some(place) = self.blocks.of_common[figure.common] else { return };
         let by_point: [f64; 2 * 3] = std::array::from_fn(|i| rows.local[i]);

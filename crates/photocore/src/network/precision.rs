@@ -3,7 +3,8 @@
 use super::error::Coarse;
 use super::input::{Network, Start};
 use super::model::Bundle;
-use super::selection::{Selected, TOGETHER};
+use super::neighbourhood::TOGETHER;
+use super::selection::Selected;
 use super::stations::Station;
 use crate::geometry::PoseNumbers;
 use crate::parallel;

@@ -2,13 +2,13 @@
 //! shared parameters, and points with additional observations.
 
 use super::error::NetworkError;
-use super::input::{Image, Network, Options, Point, Start};
+use super::input::{Image, Network, Options, Point, Start, State};
 use super::layout::layout;
 use super::model::Bundle;
+use super::neighbourhood::TOGETHER;
 use super::observations::{Fault, TiedObservation};
-use super::selection::{Dropped, LeftOut, Selected, TOGETHER};
-use super::state::State;
-use super::stations::{Placed, Station};
+use super::selection::{Dropped, LeftOut, Selected};
+use super::stations::{Station, Stations};
 use super::surroundings::Surroundings;
 use crate::adjustment::{Method, Problem};
 use crate::geometry::{POSE, PoseNumbers};
@@ -186,7 +186,7 @@ impl Network {
             || self.station_values(&model, |photo| local(photo.pose)),
             |reached| reached.stations.clone(),
         );
-        let placed = model.placed(&values);
+        let placed = model.without_points(&values);
         let start = match reached {
             Some(reached) => selected.points.iter().map(|&point| reached.points[point]).collect(),
             None => self.start(options.start, &selected, &model, &placed)?,
@@ -273,7 +273,7 @@ impl Network {
         start: Start,
         selected: &Selected,
         model: &Bundle,
-        placed: &Placed,
+        placed: &Stations,
     ) -> Result<Vec<[f64; 3]>, NetworkError> {
         let given = || model.points.iter().map(|point| point.coordinates);
         if start == Start::Given && given().flatten().all(|value| !value.is_nan()) {

@@ -1,16 +1,14 @@
 //! Selection of the points that take part in the adjustment.
 
 use super::error::NetworkError;
-use super::input::Network;
-use super::state::State;
+use super::input::{Network, State};
+use super::neighbourhood::{PointImages, TOGETHER};
 use super::surroundings::Surroundings;
 use crate::parallel;
 use crate::sorting::sort_by;
 
 /// Minimum ratio of all objects to excluded ones, for which these count as few.
 pub(super) const FEW: usize = 10;
-/// Minimum number of points per thread.
-pub(super) const TOGETHER: usize = 1024;
 
 /// An excluded point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,12 +175,6 @@ impl Network {
     }
 }
 
-impl PointImages {
-    pub fn of(&self, i: usize) -> &[usize] {
-        &self.order[self.start[i]..self.start[i + 1]]
-    }
-}
-
 /// Active objects, with neighbouring points in sequence, and exclusions.
 pub(super) struct Selected {
     pub points: Vec<usize>,
@@ -195,11 +187,4 @@ pub(super) struct Selected {
     pub loose: Vec<usize>,
     /// Interface of the network to a larger one.
     pub surroundings: Surroundings,
-}
-
-/// Images of the active points, sorted by point: `order[start[i]..start[i + 1]]` lists the images of point i.
-#[derive(Debug, Default)]
-pub(super) struct PointImages {
-    pub start: Vec<usize>,
-    pub order: Vec<usize>,
 }

@@ -6,17 +6,16 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::adjusted::{
-    AdjustedCommon, AdjustedPhoto, AdjustedPoint, adjusted_photos, adjusted_points, in_order,
+    AdjustedCamera, AdjustedCommon, AdjustedPhoto, AdjustedPoint, adjusted_photos, adjusted_points, in_order,
 };
-use super::cameras::AdjustedCamera;
 use super::error::NetworkError;
-use super::input::{Network, Options, UnitVariance};
+use super::input::{Network, Options, State, UnitVariance};
 use super::model::{Bundle, Owner};
 use super::observations::{AdjustedObservation, KindSums};
 use super::problem::Assembled;
 use super::selection::Dropped;
-use super::state::State;
 use super::trial::Converged;
+use super::visibility::{Unseen, find_unseen};
 use super::weak_points::WeakPoint;
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
@@ -24,9 +23,9 @@ use crate::geometry::Matrix3;
 /// Smallest redundancy that is not attributed to rounding.
 pub const LEAST_REDUNDANCY: f64 = 1e-9;
 
-/// Weighted sums of squares, weights as modified by the loss.
+/// Sums of a quantity over the types of observations: weighted squares (weights as modified by the loss), or redundancy numbers.
 #[derive(Debug, Clone, Copy)]
-pub struct SumsOfSquares {
+pub struct SumsByType {
     /// Weighted poses, cameras and shared parameters.
     pub camera: f64,
     /// Weighted coordinates of control points.
@@ -37,7 +36,7 @@ pub struct SumsOfSquares {
     pub observations: f64,
 }
 
-impl SumsOfSquares {
+impl SumsByType {
     /// Returns the sum without `camera`.
     pub fn measured(&self) -> f64 {
         self.ground + self.plates + self.observations
@@ -47,35 +46,6 @@ impl SumsOfSquares {
     pub fn total(&self) -> f64 {
         self.camera + self.ground + self.plates + self.observations
     }
-}
-
-/// Sums of redundancy numbers, by the same groups as [`SumsOfSquares`].
-#[derive(Debug, Clone, Copy)]
-pub struct Redundancies {
-    /// Weighted poses, cameras and shared parameters.
-    pub camera: f64,
-    /// Weighted coordinates of control points.
-    pub ground: f64,
-    /// Image coordinates.
-    pub plates: f64,
-    /// Additional observations.
-    pub observations: f64,
-}
-
-impl Redundancies {
-    /// Returns the sum without `camera`.
-    pub fn measured(&self) -> f64 {
-        self.ground + self.plates + self.observations
-    }
-}
-
-/// Physically impossible images, ascending.
-#[derive(Debug, Default)]
-pub struct Unseen {
-    /// Images of points behind the camera.
-    pub behind: Vec<usize>,
-    /// Images outside the invertible area of the lens model: they may belong to another direction.
-    pub folded: Vec<usize>,
 }
 
 /// Weakly determined points, and the parameters of combinations along which the iteration did not converge.
@@ -141,9 +111,9 @@ pub struct Solution {
     /// Points and photos excluded before or during the adjustment.
     pub dropped: Vec<Dropped>,
     /// Weighted sums of squares.
-    pub sums_of_squares: SumsOfSquares,
+    pub sums_of_squares: SumsByType,
     /// Sums of redundancy numbers; None without cofactors.
-    pub redundancies: Option<Redundancies>,
+    pub redundancies: Option<SumsByType>,
     /// Degrees of freedom of the chosen variance of unit weight; not positive without redundancy. With [`UnitVariance::Redundancy`], all
     /// observations count.
     pub degrees_of_freedom: i64,
@@ -213,7 +183,6 @@ impl Solution {
         let observed = |image: usize, group: usize| adjustment.observed(group, network.images[image].sd);
         let images = in_order(network.images.len(), &problem.model.point_images.order, observed);
         let photos_end = problem.model.blocks.first[network.photos.len()];
-        let of_photo = |&unknown: &usize| of_photo(problem, unknown);
         let photos = adjusted_photos(network, assembled, &adjustment, &unknowns);
         let mut solution = Self {
             cameras: network.adjusted_cameras(assembled, &adjustment, &unknowns, &photos),
@@ -226,18 +195,14 @@ impl Solution {
             unseen: Unseen::default(),
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
             weak: Weak {
-                photos: adjustment.weak.iter().filter_map(of_photo).collect(),
-                cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
-                commons: adjustment.weak.iter().filter_map(|&unknown| of_common(problem, unknown)).collect(),
+                photos: owned(problem, &adjustment.weak, Owner::photo),
+                cameras: owned(problem, &adjustment.weak, Owner::camera),
+                commons: owned(problem, &adjustment.weak, Owner::common),
                 points: vec![],
             },
             datum: DatumInForce {
-                held: adjustment.datum.iter().filter_map(of_photo).collect(),
-                held_commons: adjustment
-                    .datum
-                    .iter()
-                    .filter_map(|&unknown| of_common(problem, unknown))
-                    .collect(),
+                held: owned(problem, &adjustment.datum, Owner::photo),
+                held_commons: owned(problem, &adjustment.datum, Owner::common),
                 ..DatumInForce::default()
             },
             dropped: dropped.clone(),
@@ -258,7 +223,8 @@ impl Solution {
             variance_of_unit_weight,
             adjustment,
         };
-        let squares = solution.find_behind(assembled, &unknowns);
+        let (squares, unseen) = find_unseen(assembled, &unknowns, &mut solution.points);
+        solution.unseen = unseen;
         let (model, points) = (&problem.model, &assembled.points[..]);
         solution.weak.points = network.weak_points(model, points, &solution.points, &squares);
         let found = Leverages::of(&mut solution.adjustment, &unknowns);
@@ -275,33 +241,17 @@ fn over(sum: f64, degrees_of_freedom: i64) -> Option<f64> {
     (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64)
 }
 
-/// Returns the photo of a parameter and the number there; None for other parameters.
-pub(super) fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
-    match of_block(problem, unknown)? {
-        (Owner::Photo(photo), number) => Some((photo, number)),
-        _ => None,
-    }
-}
-
-/// Returns the shared camera of a parameter and the number there; None for other parameters.
-fn of_camera(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
-    match of_block(problem, unknown)? {
-        (Owner::Camera(camera), parameter) => Some((camera, parameter)),
-        _ => None,
-    }
-}
-
-/// Returns the shared parameter of an unknown and the number there; None for other unknowns.
-fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
-    match of_block(problem, unknown)? {
-        (Owner::Common(common), number) => Some((common, number)),
-        _ => None,
-    }
-}
-
-/// Returns the owner of a parameter and the number there; None for points.
-fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(Owner, usize)> {
-    model.owner(unknown)
+/// Returns the objects that `select` chooses among the owners of parameters, each with the number of the parameter there.
+pub(super) fn owned(
+    problem: &Problem<Bundle>,
+    unknowns: &[usize],
+    select: impl Fn(Owner) -> Option<usize>,
+) -> Vec<(usize, usize)> {
+    let own = |&unknown: &usize| {
+        let (owner, number) = problem.model.owner(unknown)?;
+        Some((select(owner)?, number))
+    };
+    unknowns.iter().filter_map(own).collect()
 }
 
 pub(super) fn observations(
@@ -329,13 +279,13 @@ pub(super) fn sums_of_squares(
     adjustment: &Adjustment,
     unknowns: &[f64],
     observations: &[Option<AdjustedObservation>],
-) -> SumsOfSquares {
+) -> SumsByType {
     let stations = problem.model.of_stations();
     let terms = problem.any().terms(unknowns);
     let squares = |range: Range<usize>| terms.sum_of_squares(range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
-    SumsOfSquares {
+    SumsByType {
         camera: squares(stations.clone()),
         ground: squares(0..stations.start) + squares(stations.end..unknowns.len()),
         plates: adjustment.reweighted_sum_of_squares(of_images, rows),
@@ -348,13 +298,13 @@ fn redundancies(
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
     observations: &[Option<AdjustedObservation>],
-) -> Option<Redundancies> {
+) -> Option<SumsByType> {
     let of_observations = adjustment.redundancy.as_ref()?;
     let of_unknowns = adjustment.prior_redundancy.as_ref()?;
     let stations = problem.model.of_stations();
     let images = problem.layout().rows() * problem.model.images.len();
     let sum = |values: &[f64]| values.iter().sum::<f64>();
-    Some(Redundancies {
+    Some(SumsByType {
         camera: sum(&of_unknowns[stations.clone()]),
         ground: sum(&of_unknowns[..stations.start]) + sum(&of_unknowns[stations.end..]),
         plates: sum(&of_observations[..images]),

@@ -10,32 +10,23 @@ use crate::geometry::{
 };
 use crate::normals::GroupRows;
 
-/// Photos and points at given parameter values.
+/// Photos, shared parameters and points at given parameter values.
 #[derive(Debug)]
 pub struct Stations {
     pub photos: Vec<Station>,
-    pub points: Vec<geometry::Point>,
-    /// Coordinates of the points that are not local.
-    pub tied: Vec<[f64; 3]>,
     pub commons: Vec<CommonState>,
-    pub bent: Option<Bent>,
-}
-
-impl Stations {
-    /// Returns the approximate standard deviations of an image in the unit of its camera.
-    pub fn sd_in_camera(&self, image: &Image) -> [f64; 2] {
-        let film = self.bent.as_ref().and_then(|bent| bent.film(image.photo));
-        image.sd.map(|sd| film.map_or(sd, |film| sd / film.units()))
-    }
-}
-
-/// Effects that only some images have: refraction, rig or trajectory pose, film.
-#[derive(Debug)]
-pub struct Bent {
-    pub refracted: Option<Refracted>,
+    /// None without mounts.
     pub mounted: Option<Mounted>,
     /// Film of each photo, None without a scan; empty without scans.
     pub films: Vec<Option<FilmAt>>,
+    /// None without refraction, and if points are not evaluated.
+    pub refracted: Option<Refracted>,
+    /// Points; empty if they are not evaluated.
+    pub points: Vec<geometry::Point>,
+    /// Coordinates of the points that are not local.
+    pub tied: Vec<[f64; 3]>,
+    /// Whether the images have neither refraction nor mounts nor corrections.
+    pub plain: bool,
 }
 
 #[derive(Debug)]
@@ -44,15 +35,6 @@ pub struct Mounted {
     pub own: Vec<Orientation>,
     /// Composed pose of each photo at its time; None for photos without mounts.
     pub composed: Vec<Option<Composed>>,
-}
-
-pub struct Placed {
-    pub photos: Vec<Station>,
-    pub commons: Vec<CommonState>,
-    /// None without mounts.
-    pub mounted: Option<Mounted>,
-    /// See [`Bent::films`].
-    pub films: Vec<Option<FilmAt>>,
 }
 
 /// A photo at given parameter values.
@@ -77,7 +59,12 @@ impl Mounted {
     }
 }
 
-impl Bent {
+impl Stations {
+    /// Returns the approximate standard deviations of an image in the unit of its camera.
+    pub fn sd_in_camera(&self, image: &Image) -> [f64; 2] {
+        image.sd.map(|sd| self.film(image.photo).map_or(sd, |film| sd / film.units()))
+    }
+
     pub fn film(&self, photo: usize) -> Option<&FilmAt> {
         self.films.get(photo)?.as_ref()
     }
@@ -86,16 +73,15 @@ impl Bent {
     pub fn write(
         &self,
         space: ObjectSpace,
-        stations: &Stations,
         timed: Option<&Composed>,
         image: &Image,
         local: usize,
         rows: &mut GroupRows<'_>,
     ) {
         let composed = timed.or_else(|| self.mounted.as_ref()?.of(image.photo));
-        let camera = &stations.photos[image.photo].camera;
+        let camera = &self.photos[image.photo].camera;
         let timed = timed.map(|own| &own.orientation);
-        self.seen(space, stations, timed, image.photo, local, |orientation, point| {
+        self.seen(space, timed, image.photo, local, |orientation, point| {
             // The position in the camera is not observed for scans.
             let measured = self.film(image.photo).is_none().then_some(image.xy);
             let write = |rows: &mut GroupRows<'_>| {
@@ -112,15 +98,14 @@ impl Bent {
     pub fn seen<T>(
         &self,
         space: ObjectSpace,
-        stations: &Stations,
         timed: Option<&Orientation>,
         photo: usize,
         local: usize,
         take: impl FnOnce(&Orientation, &geometry::Point) -> T,
     ) -> T {
         let at_photo = || Some(&self.mounted.as_ref()?.of(photo)?.orientation);
-        let orientation = timed.or_else(at_photo).unwrap_or(&stations.photos[photo].orientation);
-        let point = &stations.points[local];
+        let orientation = timed.or_else(at_photo).unwrap_or(&self.photos[photo].orientation);
+        let point = &self.points[local];
         let Some(Refracted { refraction, at_photos, at_points }) = &self.refracted else {
             return take(orientation, point);
         };

@@ -5,9 +5,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::error::NetworkError;
-use super::input::{Network, Options};
+use super::input::{Network, Options, State};
 use super::problem::Assembled;
-use super::state::State;
 use super::suspects::{self, Home, Row, Subject, Suspect, Suspects};
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Terms, Watch};

@@ -3,7 +3,7 @@
 use super::adjusted::AdjustedPoint;
 use super::input::Network;
 use super::model::Bundle;
-use super::selection::TOGETHER;
+use super::neighbourhood::TOGETHER;
 use crate::geometry::{self, Matrix3};
 use crate::parallel;
 use crate::sorting::median;

@@ -4,10 +4,9 @@
 
 use super::eliminated::{Elimination, Reduced};
 use super::equations::{Equations, Prior, TieRows};
-use super::error::SystemError;
 use super::factor::Factor;
 use super::layout::LayoutError;
-use super::system::System;
+use super::system::{System, SystemError};
 use super::vectorised::{LANES, dot};
 use super::watch::{Between, Control, watched};
 use crate::{Threads, parallel};

@@ -9,17 +9,36 @@ use faer::MatMut;
 use super::assembly::{Formation, Sums};
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
-use super::error::SystemError;
 use super::front::Front;
 use super::layout::Layout;
-use super::options::FactorOptions;
 use super::panels::{Handover, Panels};
 use super::symbolic::Supernode;
-use super::system::System;
+use super::system::{System, SystemError};
 use super::watch::{Between, Control, watched};
 use super::workspace::Eliminated;
 use crate::Threads;
 use crate::parallel::lock;
+
+/// Options of the factorisation.
+#[derive(Debug, Clone, Copy)]
+pub struct FactorOptions {
+    /// Fraction of the diagonal of the normal equations that is added to it.
+    pub damping: f64,
+    /// Whether local eliminations are cached for [`System::solve`](super::System::solve), so that equations are not evaluated again.
+    /// Ignored if the cache would exceed the memory of the results.
+    pub cached: bool,
+}
+
+impl FactorOptions {
+    /// No damping and no cache: for a factor without solutions, or with cofactors first.
+    pub const UNCACHED: Self = Self { damping: 0.0, cached: false };
+}
+
+impl Default for FactorOptions {
+    fn default() -> Self {
+        Self { damping: 0.0, cached: true }
+    }
+}
 
 /// Cholesky factor L of the reduced normal equations.
 #[derive(Debug, Clone)]

@@ -12,16 +12,23 @@ use super::cofactors::{AtNode, Cofactors, GroupCofactors};
 use super::contribution::{Contribution, packed, unpack};
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
-use super::error::SystemError;
 use super::factor::Factor;
 use super::layout::LayoutError;
-use super::options::InvertOptions;
 use super::panels::{Handover, Panels, SelectedInverse};
 use super::symbolic::Symbolic;
-use super::system::System;
+use super::system::{System, SystemError};
 use super::watch::{Between, Control, watched};
 use crate::Threads;
 use crate::parallel::lock;
+
+/// Options of the inversion.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct InvertOptions<'a> {
+    /// Inverse over the outer unknowns of a partial system: lower triangle, block by block, column by column.
+    pub outer: &'a [f64],
+    /// Whether to compute the leverage matrix of each group ([`Cofactors::groups`](super::Cofactors::groups)).
+    pub by_groups: bool,
+}
 
 /// Cofactors with the selected inverse.
 #[derive(Debug)]

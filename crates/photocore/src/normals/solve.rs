@@ -9,16 +9,24 @@ use pulp::Simd;
 
 use super::eliminated::Elimination;
 use super::equations::{Equations, Prior};
-use super::error::SystemError;
 use super::factor::Factor;
 use super::layout::{Layout, LayoutError};
-use super::options::SolveOptions;
 use super::panels::Panels;
-use super::system::System;
+use super::system::{System, SystemError};
 use super::vectorised::{Kernel, LANES, dot_in_lanes, run_unsized};
 use super::watch::{Between, Control, watched};
 use super::workspace::{reserved, zeros};
 use crate::{Threads, parallel};
+
+/// Options of the solution.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SolveOptions<'a> {
+    /// Right-hand sides over all unknowns in the order of the layout, one after the other, e.g. for columns of the inverse or other datums.
+    /// None selects the right-hand side of the equations.
+    pub rights: Option<&'a [f64]>,
+    /// Values of the outer unknowns of a partial system, block by block, for the right-hand side of the equations.
+    pub outer: &'a [f64],
+}
 
 /// Number of right-hand sides per multiple solution.
 const TOGETHER: usize = 16;

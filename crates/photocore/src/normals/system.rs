@@ -6,6 +6,8 @@
 
 use std::sync::Arc;
 
+use thiserror::Error;
+
 use super::incidence::Incidence;
 use super::layout::{Layout, LayoutError};
 use super::ordering::Ordering;
@@ -14,7 +16,19 @@ use super::tree::Tree;
 use super::triangle::Triangle;
 use super::watch::Control;
 use super::workspace::Workspace;
+use crate::Stopped;
 use crate::sorting::order;
+
+/// Error of a phase of a system.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum SystemError {
+    /// The work was stopped by the progress callback or for lack of memory.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// The input contradicts the layout.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+}
 
 /// Layout with its elimination order and factor pattern, which are computed once and reused by every formation.
 #[derive(Debug)]

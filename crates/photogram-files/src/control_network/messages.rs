@@ -10,8 +10,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::columns::{Cell, Column, Points, Table, Value};
 use super::fault::{Fault, Reason};
-use super::fields::{Field, Kind, MEASURE};
-use super::values::number_or_absent;
+use super::fields::{Field, Kind, MEASURE, number_or_absent};
 use photocore::Stopped;
 
 /// Encoding of the message lengths.

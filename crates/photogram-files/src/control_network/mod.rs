@@ -11,7 +11,6 @@ mod header;
 mod messages;
 mod scan;
 mod text;
-mod values;
 
 pub use columns::{Column, Names, Points, Rest, Sparse, Table, Texts};
 pub use fault::{Fault, Place, Reason};

@@ -31,13 +31,13 @@ pub struct Statements<'a> {
 
 /// Open quotes and lists at the end of a line.
 #[derive(Debug, Default)]
-struct Open {
+struct OpenMessage {
     quote: Option<u8>,
     lists: usize,
     hyphen: bool,
 }
 
-impl Open {
+impl OpenMessage {
     /// Scans a line; returns whether the statement ends with it.
     fn ends_with(&mut self, line: &[u8]) -> bool {
         let mut before = b' ';
@@ -86,7 +86,7 @@ impl<'a> Statements<'a> {
 
     fn statement(&mut self, first: Range<usize>) -> Result<Statement<'a>, Fault> {
         let (line, start) = (self.line, first.start);
-        let (mut open, mut last) = (Open::default(), first);
+        let (mut open, mut last) = (OpenMessage::default(), first);
         while !open.ends_with(self.text[last.clone()].trim_end().as_bytes()) {
             last = self.next_line().ok_or_else(|| Reason::Ends("a value").on_line(line))?;
         }

@@ -7,10 +7,9 @@ use std::fmt::Write;
 
 use super::columns::{Cell, Column, Points, Table, Value};
 use super::fault::{Fault, Reason};
-use super::fields::{Field, Kind, LOGS};
+use super::fields::{Field, Kind, LOGS, number_or_absent};
 use super::messages::{LARGEST, Message, Packed, Packet, Watch, go_on, put_bytes, put_number, put_whole};
 use super::scan::{Act, Kind as Part, Read, Statement, Statements};
-use super::values::number_or_absent;
 
 /// Field number of unknown text, outside of the range of files.
 pub(super) const UNKNOWN: u64 = LARGEST + 1;

@@ -161,7 +161,7 @@ pub struct Comparison {
 }
 
 /// Points, cases and comparator at given values of the unknowns.
-struct At<'a> {
+struct ReadingsAt<'a> {
     comparison: &'a Comparison,
     points: Vec<[f64; 2]>,
     cases: Vec<Placement>,
@@ -183,7 +183,7 @@ impl Model for Comparison {
     fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
         let cases = unknowns.len() - 3 - 2 * self.basis.functions();
         let points = cases - 3 * self.left_handed.len();
-        Box::new(At {
+        Box::new(ReadingsAt {
             comparison: self,
             points: unknowns[..points].as_chunks().0.to_vec(),
             cases: unknowns[points..cases].as_chunks().0.iter().map(|&case| Placement::from(case)).collect(),
@@ -192,7 +192,7 @@ impl Model for Comparison {
     }
 }
 
-impl Evaluated for At<'_> {
+impl Evaluated for ReadingsAt<'_> {
     fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let Measurement { case, xy, .. } = self.comparison.measurements[group];
         let swap = self.comparison.left_handed[case];

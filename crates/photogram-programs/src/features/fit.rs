@@ -32,7 +32,7 @@ const ROUNDING: f64 = 1e-20;
 const SAME: f64 = 1.0 - 1e-6;
 
 /// Sums over the points.
-struct Sums {
+struct MomentSums {
     gradient: ByMotions,
     gauss: Curvature,
     newton: Curvature,
@@ -117,9 +117,9 @@ pub fn by_points(form: Form, placed: &Placed, points: &[Vector3]) -> Result<DMat
     Ok(all)
 }
 
-fn sums(partials: &[Partials]) -> Sums {
+fn sums(partials: &[Partials]) -> MomentSums {
     let mut sums =
-        Sums { gradient: ByMotions::zeros(), gauss: Curvature::zeros(), newton: Curvature::zeros() };
+        MomentSums { gradient: ByMotions::zeros(), gauss: Curvature::zeros(), newton: Curvature::zeros() };
     for each in partials {
         let square = each.motions * each.motions.transpose();
         sums.gradient += each.value * each.motions;

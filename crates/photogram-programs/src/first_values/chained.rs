@@ -21,7 +21,7 @@ const WIDE: f64 = 0.5;
 /// Angle, radians, within which two fifths of the points of a valid pair fit.
 const LIMIT: f64 = 0.01;
 
-struct Pair {
+struct PhotoPair {
     photos: [usize; 2],
     candidates: Vec<Candidate>,
     merit: f64,
@@ -30,7 +30,7 @@ struct Pair {
 impl Search<'_> {
     /// Returns a model of some of the free photos; None if no pair can be oriented.
     pub fn relative_model(&mut self, free: &[bool]) -> Result<Option<Model>, FirstValuesError> {
-        let mut pairs: Vec<Pair> =
+        let mut pairs: Vec<PhotoPair> =
             self.pairs(free).into_iter().filter_map(|photos| self.oriented(photos)).collect();
         sort_by(&mut pairs, &|a, b| b.merit.total_cmp(&a.merit));
         let mut best: Option<Model> = None;
@@ -82,13 +82,13 @@ impl Search<'_> {
         self.of_photo[second].iter().filter_map(both).collect()
     }
 
-    fn oriented(&self, photos: [usize; 2]) -> Option<Pair> {
+    fn oriented(&self, photos: [usize; 2]) -> Option<PhotoPair> {
         let rays = self.common_rays(photos);
         let candidates = relative_orientation(&rays);
         let best = candidates.first().filter(|best| best.misfit <= LIMIT)?;
         let angle = median(rays.iter().map(|pair| best.oriented.angle(pair)).collect())?;
         let merit = rays.len() as f64 * angle.min(WIDE);
-        Some(Pair { photos, candidates, merit })
+        Some(PhotoPair { photos, candidates, merit })
     }
 
     /// Returns the adjusted model of two photos.

@@ -17,7 +17,7 @@ const DEVIATIONS: f64 = 10.0;
 const SPREAD: f64 = 5.0;
 
 /// Pose and its misfit.
-struct Judged {
+struct JudgedPose {
     pose: Pose,
     misfit: f64,
 }
@@ -96,7 +96,7 @@ impl Search<'_> {
 }
 
 /// Returns the pose with the smallest median misfit, among the poses of samples of three points.
-fn consensus(sights: &[(Vector3, Vector3)]) -> Option<Judged> {
+fn consensus(sights: &[(Vector3, Vector3)]) -> Option<JudgedPose> {
     if sights.len() < RESECTED {
         return None;
     }
@@ -108,7 +108,7 @@ fn consensus(sights: &[(Vector3, Vector3)]) -> Option<Judged> {
         };
         area(&|k| sights[k].0) * area(&|k| sights[k].1)
     };
-    let mut best: Option<Judged> = None;
+    let mut best: Option<JudgedPose> = None;
     for _ in 0..SAMPLES {
         let tries: [[usize; 3]; TRIES] = std::array::from_fn(|_| samples.draw::<3>());
         let Some(triple) = tries.into_iter().max_by(|a, b| span(a).total_cmp(&span(b))) else { continue };
@@ -118,7 +118,7 @@ fn consensus(sights: &[(Vector3, Vector3)]) -> Option<Judged> {
             let others = (0..sights.len()).filter(|k| !triple.contains(k));
             let Some(misfit) = median(others.map(|k| miss(&pose, &sights[k])).collect()) else { continue };
             if best.as_ref().is_none_or(|best| misfit < best.misfit) {
-                best = Some(Judged { pose, misfit });
+                best = Some(JudgedPose { pose, misfit });
             }
         }
     }

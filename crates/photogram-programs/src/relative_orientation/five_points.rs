@@ -47,7 +47,7 @@ const EXPONENTS: [[usize; 3]; 20] = [
 const NOT_REAL: f64 = 1e-3;
 
 /// Coefficients of a polynomial of degree three or less.
-type Polynomial = [f64; 20];
+type CubicPolynomial = [f64; 20];
 
 /// Index of the product of two monomials, by its exponents.
 const PLACE: [[[usize; 4]; 4]; 4] = places();
@@ -64,7 +64,7 @@ const fn places() -> [[[usize; 4]; 4]; 4] {
 }
 
 /// Returns the product of two polynomials; the sum of their degrees is at most three.
-fn product(a: &Polynomial, b: &Polynomial) -> Polynomial {
+fn product(a: &CubicPolynomial, b: &CubicPolynomial) -> CubicPolynomial {
     let mut sum = [0.0; 20];
     for (p, left) in EXPONENTS.iter().zip(a).filter(|(_, value)| **value != 0.0) {
         for (q, right) in EXPONENTS.iter().zip(b).filter(|(_, value)| **value != 0.0) {
@@ -75,19 +75,19 @@ fn product(a: &Polynomial, b: &Polynomial) -> Polynomial {
 }
 
 /// Returns a + f b.
-fn plus(a: &Polynomial, f: f64, b: &Polynomial) -> Polynomial {
+fn plus(a: &CubicPolynomial, f: f64, b: &CubicPolynomial) -> CubicPolynomial {
     std::array::from_fn(|k| a[k] + f * b[k])
 }
 
 /// Returns up to ten E with u1^T E u2 = 0 for five pairs of rays, in the axes of the first and of the second photo.
 pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
     let Some(basis) = null_space(pairs) else { return vec![] };
-    let entry = |i: usize, j: usize| -> Polynomial {
+    let entry = |i: usize, j: usize| -> CubicPolynomial {
         let mut linear = [0.0; 20];
         (0..4).for_each(|k| linear[16 + k] = basis[k][(i, j)]);
         linear
     };
-    let e: [[Polynomial; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+    let e: [[CubicPolynomial; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
     let equations = constraints(&e);
     let (left, right) = (equations.fixed_columns::<10>(0), equations.fixed_columns::<10>(10));
     let Some(reduced) = left.into_owned().lu().solve(&right.into_owned()) else { return vec![] };
@@ -104,16 +104,16 @@ pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
 }
 
 /// Up to twelve equations in the nine elements of a matrix; unused rows are zero.
-type Equations = SMatrix<f64, 12, 9>;
+type EpipolarEquations = SMatrix<f64, 12, 9>;
 
 /// Returns the right singular vectors, row by row, largest singular value first.
-fn right_vectors(equations: Equations) -> Option<SMatrix<f64, 9, 9>> {
+fn right_vectors(equations: EpipolarEquations) -> Option<SMatrix<f64, 9, 9>> {
     equations.try_svd(false, true, f64::EPSILON, STEPS)?.v_t
 }
 
 /// Returns four matrices that span the null space of the five equations.
 fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
-    let mut equations = Equations::zeros();
+    let mut equations = EpipolarEquations::zeros();
     for (row, [first, second]) in pairs.iter().enumerate() {
         (0..9).for_each(|k| equations[(row, k)] = first[k / 3] * second[k % 3]);
     }
@@ -122,10 +122,11 @@ fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
 }
 
 /// Returns the coefficients of det E = 0 and E E^T E - 1/2 tr(E E^T) E = 0.
-fn constraints(e: &[[Polynomial; 3]; 3]) -> SMatrix<f64, 10, 20> {
-    let sum = |terms: [Polynomial; 3]| plus(&plus(&terms[0], 1.0, &terms[1]), 1.0, &terms[2]);
+fn constraints(e: &[[CubicPolynomial; 3]; 3]) -> SMatrix<f64, 10, 20> {
+    let sum = |terms: [CubicPolynomial; 3]| plus(&plus(&terms[0], 1.0, &terms[1]), 1.0, &terms[2]);
     let square = |i: usize, j: usize| sum(std::array::from_fn(|k| product(&e[i][k], &e[j][k])));
-    let mut squares: [[Polynomial; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
+    let mut squares: [[CubicPolynomial; 3]; 3] =
+        std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
     let trace = sum([squares[0][0], squares[1][1], squares[2][2]]);
     (0..3).for_each(|i| squares[i][i] = plus(&squares[i][i], -0.5, &trace));
     let cubic = |i: usize, j: usize| sum(std::array::from_fn(|k| product(&squares[i][k], &e[k][j])));
@@ -135,7 +136,7 @@ fn constraints(e: &[[Polynomial; 3]; 3]) -> SMatrix<f64, 10, 20> {
         product(&e[0][1], &minor(2, 0)),
         product(&e[0][2], &minor(0, 1)),
     ]);
-    let rows: Vec<Polynomial> =
+    let rows: Vec<CubicPolynomial> =
         (0..9).map(|k| cubic(k / 3, k % 3)).chain(std::iter::once(determinant)).collect();
     SMatrix::from_fn(|row, column| rows[row][column])
 }
@@ -188,7 +189,7 @@ pub fn over_plane(pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
 
 /// Returns H with u2 x (H u1) = 0, unscaled.
 fn homography(pairs: &[[Vector3; 2]; 4]) -> Option<Matrix3> {
-    let mut equations = Equations::zeros();
+    let mut equations = EpipolarEquations::zeros();
     for (pair, [first, second]) in pairs.iter().enumerate() {
         let across = second.cross_matrix();
         for row in 0..3 {

@@ -29,11 +29,11 @@ const TWINS: f64 = 1e-4;
 ///
 /// Near the danger cylinder two solutions may merge, and approximate solutions may be included.
 pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement> {
-    let triangle = Triangle::new(rays, points);
+    let triangle = RayTriangle::new(rays, points);
     let mut candidates = triangle.distances();
     sort_by(&mut candidates, &|a, b| a.misclosure.total_cmp(&b.misclosure));
     let mut found: Vec<Vector3> = Vec::new();
-    for Candidate { distances, .. } in candidates {
+    for PoseCandidate { distances, .. } in candidates {
         let twin = |other: &Vector3| {
             (other - distances).norm_squared() <= (TWINS * TWINS) * distances.norm_squared()
         };
@@ -45,21 +45,21 @@ pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement
 }
 
 /// Distances of three points, with their misclosure.
-struct Candidate {
+struct PoseCandidate {
     distances: Vector3,
     /// Sum of squares of the relative misclosures of the squared sides.
     misclosure: f64,
 }
 
 /// Squared sides and cosines between rays; `[0, 1, 2]` are the pairs 12, 13, 23.
-struct Triangle {
+struct RayTriangle {
     side: [f64; 3],
     cosine: [f64; 3],
 }
 
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
-impl Triangle {
+impl RayTriangle {
     fn new(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Self {
         let side = PAIRS.map(|(i, j)| (points[i] - points[j]).norm_squared());
         Self { side, cosine: PAIRS.map(|(i, j)| rays[i].dot(&rays[j])) }
@@ -75,7 +75,7 @@ impl Triangle {
     }
 
     /// Returns positive distances that satisfy the three equations, possibly with repetitions.
-    fn distances(&self) -> Vec<Candidate> {
+    fn distances(&self) -> Vec<PoseCandidate> {
         let [c12, c13, c23] = [0, 1, 2].map(|pair| self.cone(pair));
         let [a12, a13, a23] = self.side;
         let d1 = a23 * c12 - a12 * c23;
@@ -125,7 +125,7 @@ impl Triangle {
     }
 
     /// Refines distances by a few Newton steps on the three equations; None without convergence.
-    fn polish(&self, start: Vector3) -> Option<Candidate> {
+    fn polish(&self, start: Vector3) -> Option<PoseCandidate> {
         let misclosure = |l: &Vector3| -> Vector3 {
             Vector3::from_fn(|pair, _| self.side[pair] - l.dot(&(self.cone(pair) * l)))
         };
@@ -143,7 +143,7 @@ impl Triangle {
             (l, best) = (next, error);
         }
         let closed = best < NOT_CLOSED * NOT_CLOSED && l.iter().all(|&value| value > 0.0);
-        closed.then_some(Candidate { distances: l, misclosure: best })
+        closed.then_some(PoseCandidate { distances: l, misclosure: best })
     }
 }
 

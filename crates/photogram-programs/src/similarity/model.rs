@@ -22,7 +22,7 @@ pub struct AsControl {
 }
 
 /// Unknowns, and the rotation with its partials.
-struct At<'a> {
+struct StationsAt<'a> {
     model: &'a AsControl,
     control: Vec<Vector3>,
     similarity: Similarity,
@@ -58,7 +58,7 @@ impl Model for AsControl {
     fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
         let (control, changes) = unknowns.split_at(3 * self.observed.len());
         let (_, by_change) = rotation_with_partials([changes[0], changes[1], changes[2]]);
-        Box::new(At {
+        Box::new(StationsAt {
             model: self,
             control: control.as_chunks().0.iter().map(|&x: &[f64; 3]| x.into()).collect(),
             similarity: self.similarity(changes),
@@ -80,7 +80,7 @@ impl Model for AsControl {
     }
 }
 
-impl Evaluated for At<'_> {
+impl Evaluated for StationsAt<'_> {
     fn observe(&self, local: usize, _group: usize, rows: &mut GroupRows<'_>) {
         let Similarity { rotation, scale, shift, .. } = self.similarity;
         let control = &self.control[local];

@@ -43,7 +43,7 @@ fn tested(weight: Matrix2, computed: &Mat<f64>, v: [f64; 2]) -> Tested {
 }
 
 /// Elimination of a star for known parameters: inverse of its normal matrix, H = N_ss^-1 N_sp, and correction.
-struct Eliminated {
+struct EliminatedRows {
     inverse: Matrix2,
     tied: Mat<f64>,
     correction: [f64; 2],
@@ -78,7 +78,7 @@ impl Calibration {
         let places = sight.places.iter().zip(&stars);
         let places = places.map(|(place, star)| [0, 1].map(|k| place[k] + star.correction[k])).collect();
         let corrected = Sight::new(self, places, &sight.parameters);
-        let of_place = |star: &Eliminated| {
+        let of_place = |star: &EliminatedRows| {
             array(&(matrix(&star.inverse) + &star.tied * cofactors * star.tied.transpose()))
         };
         let mut found = self.observations(&corrected, &model, stars.iter().map(of_place).collect())?;
@@ -105,7 +105,7 @@ impl Calibration {
         model: &StarImages<'_>,
         sight: &Sight,
         rows: &[Rows],
-    ) -> Result<Vec<Eliminated>, StellarError> {
+    ) -> Result<Vec<EliminatedRows>, StellarError> {
         let inverses = self.star_inverses(model, rows)?;
         let mut coupling = vec![Mat::<f64>::zeros(2, self.parameters()); self.stars.len()];
         let mut right = vec![Mat::<f64>::zeros(2, 1); self.stars.len()];
@@ -123,7 +123,7 @@ impl Calibration {
         Ok(all
             .map(|((inverse, coupling), right)| {
                 let correction = matrix(&inverse) * right;
-                Eliminated {
+                EliminatedRows {
                     tied: matrix(&inverse) * coupling,
                     correction: [correction[(0, 0)], correction[(1, 0)]],
                     inverse,

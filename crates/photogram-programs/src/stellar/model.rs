@@ -269,7 +269,7 @@ impl Calibration {
 const AT_LEAST: usize = 256;
 
 /// Star images at given values of the unknowns.
-struct At<'a> {
+struct StarsAt<'a> {
     model: &'a StarImages<'a>,
     sight: Sight,
 }
@@ -283,7 +283,7 @@ impl Model for StarImages<'_> {
             let standard = |image: usize| sight.standard(self.calibration, &images[image]);
             sight.seen = internal::map(images.len(), AT_LEAST, standard);
         }
-        Box::new(At { model: self, sight })
+        Box::new(StarsAt { model: self, sight })
     }
 
     /// Recomputes unknown directions from their first images.
@@ -300,7 +300,7 @@ impl Model for StarImages<'_> {
     }
 }
 
-impl Evaluated for At<'_> {
+impl Evaluated for StarsAt<'_> {
     fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let Self { model, sight } = self;
         let found = model.image(sight, model.images[group]);

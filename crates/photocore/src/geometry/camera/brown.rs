@@ -3,7 +3,7 @@
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
 use super::model::{Unit, parameters};
-use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};
+use super::radial_tangential::{Distorted, DistortionTerms, RadialTangential, power_of};
 
 /// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, to which they are added.
 ///
@@ -65,7 +65,7 @@ pub struct BrownTerms {
 
 impl BrownTerms {
     /// Nonzero terms of the lens.
-    pub(super) const TERMS: Terms = Terms { powers: [3, 0], prism: false };
+    pub(super) const TERMS: DistortionTerms = DistortionTerms { powers: [3, 0], prism: false };
 
     /// Returns the lens with the radial factor 1 + R.
     #[inline(always)]
@@ -79,7 +79,7 @@ impl BrownTerms {
 
     /// Returns the partials of the distorted position with respect to K1, K2, K3, P1, P2.
     #[inline(always)]
-    pub(super) fn partials(&self, bent: &Bent, place: [f64; 2]) -> [[f64; 2]; 5] {
+    pub(super) fn partials(&self, bent: &Distorted, place: [f64; 2]) -> [[f64; 2]; 5] {
         let square = self.balance * self.balance;
         let radial = |power: i32| {
             let (free, whole) = (power_of(square, power), bent.by_numerator(power));
@@ -153,7 +153,7 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
         let ([a1, a2], [b1, b2]) = self.affine();
         let lens = self.terms.lens();
         let [x, y] = from_radial(&lens.radial, BrownTerms::TERMS.powers, corrected, |[x, y]| {
-            let Bent { xy, by_place: [by_x, by_y], .. } = lens.bend([x, y]);
+            let Distorted { xy, by_place: [by_x, by_y], .. } = lens.bend([x, y]);
             ([xy[0] + b1 * x + b2 * y, xy[1]], [[by_x[0] + b1, by_x[1] + b2], by_y])
         })?;
         let dx = (x - a2 * y) / (1.0 + a1);

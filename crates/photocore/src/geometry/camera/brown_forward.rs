@@ -4,7 +4,7 @@ use super::brown::BrownTerms;
 use super::inverse::{Matrix2, RadialLimit, from_radial, times};
 use super::model::{CameraModel, Image, Unit, parameters};
 use super::perspective::Perspective;
-use super::radial_tangential::Bent;
+use super::radial_tangential::Distorted;
 use crate::geometry::Vector3;
 
 /// Radial terms (optionally balanced), tangential terms, affinity and shear, forward: functions of ideal coordinates.
@@ -37,7 +37,7 @@ impl BrownForward {
     }
 
     /// Returns the lens at an ideal position, its value with affinity and shear, and the partials of this value.
-    fn bent(&self, place: [f64; 2]) -> (Bent, [f64; 2], Matrix2) {
+    fn bent(&self, place: [f64; 2]) -> (Distorted, [f64; 2], Matrix2) {
         let (bent, [c1, c2]) = (self.terms.lens().bend(place), self.affinity);
         let [by_x, by_y] = bent.by_place;
         let xy = [bent.xy[0] + c1 * place[0] + c2 * place[1], bent.xy[1]];

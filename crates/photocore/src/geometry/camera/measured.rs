@@ -19,7 +19,7 @@ use crate::geometry::Vector3;
 pub struct Measured<C>(pub C);
 
 /// Model with a name for its measured form.
-trait Named: BackwardModel {
+trait NamedCamera: BackwardModel {
     const MEASURED: &'static str;
 }
 
@@ -28,7 +28,7 @@ macro_rules! measured {
         $(#[$doc])*
         pub type $name = Measured<$camera>;
 
-        impl Named for $camera {
+        impl NamedCamera for $camera {
             const MEASURED: &'static str = $said;
         }
     )*};
@@ -47,7 +47,7 @@ measured! {
     OnComparatorMeasured = OnComparator, "on_comparator_measured";
 }
 
-impl<C: Named> CameraModel for Measured<C> {
+impl<C: NamedCamera> CameraModel for Measured<C> {
     type Parameters = <C as BackwardModel>::Parameters;
 
     const NAME: &'static str = C::MEASURED;

@@ -5,10 +5,10 @@ use super::inverse::{RadialLimit, way_back};
 use super::model::{Unit, parameters};
 
 /// P_0 to P_4 of one coordinate, with derivatives.
-type Basis = [(f64, f64); 5];
+type Monomials = [(f64, f64); 5];
 
 /// Term of a correction: (parameter, component, number, i, j). Parameter times number is the coefficient of P_i(Y) P_j(X).
-type Term = (usize, usize, f64, usize, usize);
+type CorrectionTerm = (usize, usize, f64, usize, usize);
 
 /// Lists the terms of each component: parameter, i and j, and the number if it is not 1.
 macro_rules! terms {
@@ -32,10 +32,10 @@ pub trait OrthogonalSet<const N: usize>: Copy {
     /// Formula for documents.
     const FORMULA: &'static str;
     /// Terms of the corrections; parameters are numbered from zero.
-    const TERMS: &'static [Term];
+    const TERMS: &'static [CorrectionTerm];
 
     /// Returns the polynomials of one coordinate over a format with half side b.
-    fn basis(x: f64, b: f64) -> Basis;
+    fn basis(x: f64, b: f64) -> Monomials;
 }
 
 /// Corrections of a set, backward: functions of measured coordinates, to which they are added.
@@ -87,13 +87,13 @@ impl OrthogonalSet<16> for Ebner12 {
     const FORMULA: &'static str = "X = x - xp, Y = y - yp, k = X^2 - 2 b^2/3, l = Y^2 - 2 b^2/3, corrected = (X + e1 X + e2 Y - 2 e3 k + \
          e4 X Y + e5 l + e7 X l + e9 Y k + e11 k l, Y - e1 Y + e2 X + e3 X Y - 2 e4 l + e6 k + e8 Y k + e10 X l + e12 k l), \
          residual = corrected - image, image = c (u1, u2) / u3";
-    const TERMS: &'static [Term] = terms! {
+    const TERMS: &'static [CorrectionTerm] = terms! {
         0: 0(0 1), 1(1 0), 2(0 2) * -2.0, 3(1 1), 4(2 0), 6(2 1), 8(1 2), 10(2 2);
         1: 0(1 0) * -1.0, 1(0 1), 2(1 1), 3(2 0) * -2.0, 5(0 2), 7(1 2), 9(2 1), 11(2 2);
     };
 
     #[inline(always)]
-    fn basis(x: f64, b: f64) -> Basis {
+    fn basis(x: f64, b: f64) -> Monomials {
         [(1.0, 0.0), (x, 1.0), (x * x - 2.0 * b * b / 3.0, 2.0 * x), (0.0, 0.0), (0.0, 0.0)]
     }
 }
@@ -113,7 +113,7 @@ impl OrthogonalSet<48> for Gruen44 {
          l, q, s of Y as k, p, r of X, T_ij = (1, Y, l, Y q, s)_i (1, X, k, X p, r)_j, corrected = (X + a12 X + a21 Y + a22 X Y + a31 l \
          - (10/7) b22 k + sum a_ij T_ij, Y - a12 Y + a21 X - (10/7) a22 l + b13 k + b22 X Y + sum b_ij T_ij), residual = corrected - \
          image, image = c (u1, u2) / u3";
-    const TERMS: &'static [Term] = terms! {
+    const TERMS: &'static [CorrectionTerm] = terms! {
         0: 0(0 1), 1(1 0), 2(1 1), 3(2 0), 24(0 2) * (-10.0 / 7.0), 4(0 3), 5(1 2), 6(2 1), 7(3 0), 8(0 4), 9(1 3),
             10(2 2), 11(3 1), 12(4 0), 13(1 4), 14(2 3), 15(3 2), 16(4 1), 17(2 4), 18(3 3), 19(4 2), 20(3 4),
             21(4 3), 22(4 4);
@@ -123,7 +123,7 @@ impl OrthogonalSet<48> for Gruen44 {
     };
 
     #[inline(always)]
-    fn basis(x: f64, b: f64) -> Basis {
+    fn basis(x: f64, b: f64) -> Monomials {
         let (square, format) = (x * x, b * b);
         [
             (1.0, 0.0),

@@ -28,14 +28,14 @@ pub struct RadialTangential {
 
 /// Lens terms that may be nonzero.
 #[derive(Debug, Clone, Copy)]
-pub struct Terms {
+pub struct DistortionTerms {
     /// Highest powers of N and D.
     pub powers: [usize; 2],
     /// Whether thin-prism terms exist.
     pub prism: bool,
 }
 
-impl Terms {
+impl DistortionTerms {
     /// All terms.
     pub const ALL: Self = Self { powers: ALL_POWERS, prism: true };
 }
@@ -44,7 +44,7 @@ pub type Profile = [f64; 2];
 
 /// Distorted position with its partials, and intermediate results for the partials with respect to the terms.
 #[derive(Debug, Clone, Copy)]
-pub struct Bent {
+pub struct Distorted {
     /// x, y.
     pub xy: [f64; 2],
     /// With respect to a, b.
@@ -64,13 +64,13 @@ pub struct Bent {
 impl RadialTangential {
     /// Returns the distorted position.
     #[inline(always)]
-    pub fn bend(&self, place: [f64; 2]) -> Bent {
-        self.bend_by(place, Terms::ALL)
+    pub fn bend(&self, place: [f64; 2]) -> Distorted {
+        self.bend_by(place, DistortionTerms::ALL)
     }
 
     /// Returns the distorted position of a lens with only the given terms.
     #[inline(always)]
-    pub fn bend_by(&self, place: [f64; 2], terms: Terms) -> Bent {
+    pub fn bend_by(&self, place: [f64; 2], terms: DistortionTerms) -> Distorted {
         let [a, b] = place;
         let ([t1, t2], [[s1, s2], [s3, s4]]) = (self.tangential, self.prism);
         let square = a * a + b * b;
@@ -95,12 +95,12 @@ impl RadialTangential {
                 by_place[k][1] += along * b;
             }
         }
-        Bent { xy, by_place, place, square, reciprocal, factor, profile: 1.0, decentring: [0.0; 2] }
+        Distorted { xy, by_place, place, square, reciprocal, factor, profile: 1.0, decentring: [0.0; 2] }
     }
 
     /// Returns the distorted position of a lens with a tangential profile.
     #[inline(always)]
-    pub fn bend_profiled(&self, place: [f64; 2], [p3, p4]: Profile, terms: Terms) -> Bent {
+    pub fn bend_profiled(&self, place: [f64; 2], [p3, p4]: Profile, terms: DistortionTerms) -> Distorted {
         let ([a, b], [t1, t2], bent) = (place, self.tangential, self.bend_by(place, terms));
         let [by_t1, by_t2] = bent.by_tangential();
         let decentring = [0, 1].map(|k| t1 * by_t1[k] + t2 * by_t2[k]);
@@ -111,7 +111,7 @@ impl RadialTangential {
             [excess * (6.0 * t1 * a + 2.0 * t2 * b), cross],
             [cross, excess * (6.0 * t2 * b + 2.0 * t1 * a)],
         ];
-        Bent {
+        Distorted {
             xy: [0, 1].map(|k| bent.xy[k] + excess * decentring[k]),
             by_place: [0, 1]
                 .map(|i| [0, 1].map(|k| bent.by_place[i][k] + own[i][k] + slope * decentring[i] * place[k])),
@@ -132,7 +132,7 @@ pub fn power_of(x: f64, power: i32) -> f64 {
     product
 }
 
-impl Bent {
+impl Distorted {
     /// Returns the partials with respect to the coefficient of q^i in N.
     #[inline(always)]
     pub fn by_numerator(&self, power: i32) -> [f64; 2] {
@@ -221,8 +221,8 @@ impl Role {
 }
 
 /// Returns the lens terms of the given roles.
-pub(super) const fn terms(roles: &[Role]) -> Terms {
-    let mut terms = Terms { powers: [0, 0], prism: false };
+pub(super) const fn terms(roles: &[Role]) -> DistortionTerms {
+    let mut terms = DistortionTerms { powers: [0, 0], prism: false };
     let mut i = 0;
     while i < roles.len() {
         match roles[i] {
@@ -282,13 +282,13 @@ impl Parts {
 
     /// Applies the lens to a position.
     #[inline(always)]
-    fn bend(&self, ab: [f64; 2], action: Action, terms: Terms) -> Bending {
+    fn bend(&self, ab: [f64; 2], action: Action, terms: DistortionTerms) -> BentRay {
         if action != Action::Staged {
             let bent = match action {
                 Action::Profiled => self.lens.bend_profiled(ab, self.profile, terms),
                 _ => self.lens.bend_by(ab, terms),
             };
-            return Bending {
+            return BentRay {
                 first: bent,
                 last: bent,
                 by_first: [[1.0, 0.0], [0.0, 1.0]],
@@ -297,12 +297,12 @@ impl Parts {
         }
         let straight = RadialFactor::NONE;
         let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens };
-        let first = first.bend_by(ab, Terms { prism: false, ..terms });
+        let first = first.bend_by(ab, DistortionTerms { prism: false, ..terms });
         let last = RadialTangential { radial: straight, ..self.lens };
-        let last = last.bend_by(first.xy, Terms { powers: [0, 0], ..terms });
+        let last = last.bend_by(first.xy, DistortionTerms { powers: [0, 0], ..terms });
         let (to, from) = (last.by_place, first.by_place);
         let by_place = [0, 1].map(|i| [0, 1].map(|k| to[i][0] * from[0][k] + to[i][1] * from[1][k]));
-        Bending { first, last, by_first: to, by_place }
+        BentRay { first, last, by_first: to, by_place }
     }
 
     #[inline(always)]
@@ -318,7 +318,7 @@ impl Parts {
 
     /// Returns the partials of the image with respect to a parameter.
     #[inline(always)]
-    pub fn by(&self, role: Role, seen: &Seen, bending: &Bending) -> [f64; 2] {
+    pub fn by(&self, role: Role, seen: &Seen, bending: &BentRay) -> [f64; 2] {
         let [a, b] = bending.last.xy;
         let through = |m: &Matrix2, v: [f64; 2]| self.moved(super::inverse::times(m, v));
         match role {
@@ -346,9 +346,9 @@ impl Parts {
 }
 
 /// Result of a lens in one or two stages: radial terms, then the rest.
-pub(super) struct Bending {
-    first: Bent,
-    last: Bent,
+pub(super) struct BentRay {
+    first: Distorted,
+    last: Distorted,
     /// Partials of the distorted position with respect to the result of the first stage, and to the undistorted position.
     by_first: Matrix2,
     by_place: Matrix2,
@@ -359,12 +359,12 @@ pub(super) trait Table<const N: usize>: Copy {
     type Projection: RayProjection;
     const ACTION: Action;
     const ROLES: [Role; N];
-    const TERMS: Terms = terms(&Self::ROLES);
+    const TERMS: DistortionTerms = terms(&Self::ROLES);
 
     fn parts(&self) -> Parts;
 
     /// Returns the partials of x and y with respect to the parameters.
-    fn by_parameters(parts: &Parts, seen: &Seen, bending: &Bending) -> [[f64; N]; 2];
+    fn by_parameters(parts: &Parts, seen: &Seen, bending: &BentRay) -> [[f64; N]; 2];
 
     #[inline(always)]
     fn place(&self, u: &Vector3) -> [f64; 2] {

@@ -31,12 +31,12 @@ pub struct SplinedStereographic {
     /// fx, fy, cx, cy, order, nx, ny, fov.
     parameters: [f64; 8],
     knots: Arc<[[f64; 2]]>,
-    grid: Grid,
+    grid: SplineGrid,
 }
 
 /// Layout of the knots.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Grid {
+struct SplineGrid {
     /// Number of nodes per axis that affect a position; 0 for invalid constants.
     nodes: usize,
     /// Number of knots along columns and rows.
@@ -46,13 +46,13 @@ struct Grid {
 }
 
 /// Nonzero spline values at a position along an axis, their slopes, and the first knot.
-struct Basis {
+struct SplineBasis {
     first: usize,
     values: [f64; NODES],
     slopes: [f64; NODES],
 }
 
-impl Basis {
+impl SplineBasis {
     /// Evaluates the basis at a position in units of knots, of which there are `count`; the edge polynomials extrapolate.
     #[inline]
     fn at(place: f64, count: usize, nodes: usize) -> Self {
@@ -78,10 +78,10 @@ impl Basis {
     }
 }
 
-impl Grid {
+impl SplineGrid {
     const NONE: Self = Self { nodes: 0, size: [0; 2], per_place: f64::NAN };
 
-    /// Returns the grid of the constants; [`Grid::NONE`] if the constants are invalid.
+    /// Returns the grid of the constants; [`SplineGrid::NONE`] if the constants are invalid.
     fn of([order, nx, ny, fov]: [f64; 4]) -> Self {
         let whole = |count: f64| count.fract() == 0.0 && count > order && count <= MOST;
         if (order != 3.0 && order != 2.0) || !whole(nx) || !whole(ny) || !(fov > 0.0 && fov < 360.0) {
@@ -93,10 +93,10 @@ impl Grid {
 
     /// Returns the splines along columns and rows at a position of the stereographic image.
     #[inline]
-    fn bases(&self, place: [f64; 2]) -> [Basis; 2] {
+    fn bases(&self, place: [f64; 2]) -> [SplineBasis; 2] {
         [0, 1].map(|k| {
             let at = self.per_place * place[k] + 0.5 * (self.size[k] as f64 - 1.0);
-            Basis::at(at, self.size[k], self.nodes)
+            SplineBasis::at(at, self.size[k], self.nodes)
         })
     }
 }
@@ -105,7 +105,7 @@ impl SplinedStereographic {
     /// Returns a position of the stereographic image with its displacement, and the partials of the sum.
     #[inline]
     fn moved(&self, place: [f64; 2]) -> ([f64; 2], Matrix2) {
-        let Grid { nodes, size, per_place } = self.grid;
+        let SplineGrid { nodes, size, per_place } = self.grid;
         if nodes == 0 {
             return ([f64::NAN; 2], [[f64::NAN; 2]; 2]);
         }
@@ -135,7 +135,7 @@ impl SplinedStereographic {
 
     /// Returns the knots that affect images within `margin` knot spacings of the image of u; None for invalid constants.
     pub fn window(&self, u: &Vector3, margin: f64) -> Option<Window> {
-        let Grid { nodes, per_place, .. } = self.grid;
+        let SplineGrid { nodes, per_place, .. } = self.grid;
         if nodes == 0 {
             return None;
         }
@@ -182,7 +182,7 @@ impl CameraModel for SplinedStereographic {
 
     fn with_parameters(parameters: [f64; 8]) -> Self {
         let [.., order, nx, ny, fov] = parameters;
-        let grid = Grid::of([order, nx, ny, fov]);
+        let grid = SplineGrid::of([order, nx, ny, fov]);
         Self { parameters, knots: vec![[0.0; 2]; grid.size[0] * grid.size[1]].into(), grid }
     }
 

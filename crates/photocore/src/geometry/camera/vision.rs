@@ -9,7 +9,7 @@ use super::projections::{
     Central, DivisionByRadius, Equidistant, Equisolid as EquisolidRays, ExtendedUnified, FieldOfView, Seen,
     Stereographic as StereographicRays,
 };
-use super::radial_tangential::{Action, Bending, Parts, Role, Table};
+use super::radial_tangential::{Action, BentRay, Parts, Role, Table};
 use crate::geometry::Vector3;
 
 /// Declares cameras: name and number of parameters, name in files, projection, lens formula, parameters with their roles. The last
@@ -42,7 +42,7 @@ macro_rules! cameras_of_vision {
 
             #[inline(always)]
             #[allow(unused_assignments)]
-            fn by_parameters(parts: &Parts, seen: &Seen, bending: &Bending) -> [[f64; $count]; 2] {
+            fn by_parameters(parts: &Parts, seen: &Seen, bending: &BentRay) -> [[f64; $count]; 2] {
                 let (mut by, mut at) = ([[0.0; $count]; 2], 0);
                 $([by[0][at], by[1][at]] = parts.by($role, seen, bending);
                 at += 1;)*

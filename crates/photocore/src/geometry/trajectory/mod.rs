@@ -19,7 +19,7 @@ pub use functions::{Active, BasisModel};
 pub use rotations::Rotations;
 pub use table::{Attitudes, Axes, Interpolation, Positions};
 
-use self::rotations::Corrected;
+use self::rotations::CorrectedAttitude;
 use super::{Matrix3, Pose, Vector3};
 
 macro_rules! bases {
@@ -182,7 +182,7 @@ impl Trajectory {
         let (shift, drift) = position.sums(c);
         let turn = rotation.sums(r);
         let (place, speed) = self.positions.at(time);
-        let Corrected { attitude, mut rate, jacobian, turn } =
+        let CorrectedAttitude { attitude, mut rate, jacobian, turn } =
             self.rotations.corrected(self.attitudes.at(time), turn.into());
         let (mut axes, mut axes_rate) = self.axes.at(&self.positions, time);
         let mut pose = Pose { position: place + axes * shift, attitude };

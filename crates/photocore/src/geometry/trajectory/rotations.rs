@@ -16,7 +16,7 @@ pub enum Rotations {
 
 /// Corrected attitude and its derivatives.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Corrected {
+pub(super) struct CorrectedAttitude {
     pub attitude: Matrix3,
     /// w, about the axes of the photo.
     pub rate: Vector3,
@@ -57,13 +57,17 @@ fn angles(a: &Matrix3) -> Vector3 {
 
 impl Rotations {
     /// Returns the corrected attitude of a table attitude and its rate, for given corrections and rates. NaN if sin a2 is zero.
-    pub(super) fn corrected(self, (attitude, rate): (Matrix3, Vector3), turn: [Vector3; 2]) -> Corrected {
+    pub(super) fn corrected(
+        self,
+        (attitude, rate): (Matrix3, Vector3),
+        turn: [Vector3; 2],
+    ) -> CorrectedAttitude {
         match self {
             Self::Vector => {
                 let (exp, left) = angle_axis_with_jacobian(&turn[0]);
                 let jacobian = left.transpose();
                 let rate = exp.tr_mul(&rate) + jacobian * turn[1];
-                Corrected { attitude: attitude * exp, rate, jacobian, turn }
+                CorrectedAttitude { attitude: attitude * exp, rate, jacobian, turn }
             }
             Self::Zxz => {
                 let table = angles(&attitude);
@@ -71,7 +75,12 @@ impl Rotations {
                 let changes = changes.unwrap_or_else(|| Vector3::repeat(f64::NAN));
                 let turn = [table + turn[0], changes + turn[1]];
                 let jacobian = Self::zxz_jacobian(&turn[0]);
-                Corrected { attitude: self::attitude(&turn[0]), rate: jacobian * turn[1], jacobian, turn }
+                CorrectedAttitude {
+                    attitude: self::attitude(&turn[0]),
+                    rate: jacobian * turn[1],
+                    jacobian,
+                    turn,
+                }
             }
         }
     }

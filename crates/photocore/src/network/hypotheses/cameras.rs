@@ -95,9 +95,9 @@ impl Catalogue<'_> {
     fn write_camera_partials(&self, (image, local): (usize, usize), values: &mut Vec<f64>) {
         let observed = &self.bundle.images[image];
         let station = &self.stations.photos[observed.photo];
-        let sight = match &self.stations.bent {
-            Some(bent) => self.bundle.sight_bent((&self.stations, bent), image, local),
-            None => station.orientation.sight(&self.stations.points[local]),
+        let sight = match self.stations.plain {
+            false => self.bundle.sight_bent(&self.stations, image, local),
+            true => station.orientation.sight(&self.stations.points[local]),
         };
         each_camera!(&station.camera, camera => {
             let (_, computed) = camera.compare(&sight, observed.xy);

@@ -17,7 +17,7 @@ struct Alike {
 
 /// A block among the blocks of a pose.
 #[derive(Debug, Clone, Copy)]
-struct Slot {
+struct ChainBlock {
     block: usize,
     width: usize,
     /// First column of its parameters behind the main block.
@@ -113,7 +113,7 @@ pub(in crate::network) struct Composed {
     /// Partials of these six parameters.
     pub(super) chain: Chain,
     /// Distinct blocks, the main block first, then in the order of the composition.
-    slots: Vec<Slot>,
+    slots: Vec<ChainBlock>,
     /// Slot of each block of the chain.
     numbers: Vec<usize>,
     /// Number of parameters outside the main block.
@@ -136,7 +136,7 @@ impl Composed {
     /// Numbers the blocks of the pose; the main block may be none of them.
     pub(super) fn number(&mut self, main: usize) {
         self.slots.clear();
-        self.slots.push(Slot { block: main, width: POSE, first: 0 });
+        self.slots.push(ChainBlock { block: main, width: POSE, first: 0 });
         self.numbers.clear();
         self.width = 0;
         for &(InBlock { block, width, .. }, _) in self.chain.alike().iter().flat_map(|own| &own.blocks) {
@@ -146,7 +146,7 @@ impl Composed {
                 Some(0) => self.slots[0].width = width,
                 Some(_) => {}
                 None => {
-                    self.slots.push(Slot { block, width, first: self.width });
+                    self.slots.push(ChainBlock { block, width, first: self.width });
                     self.width += width;
                 }
             }
@@ -166,7 +166,7 @@ impl Composed {
 
     /// Returns the distinct blocks with the partials of the pose by their parameters; the main block first.
     pub fn parts(&self) -> Vec<(usize, Matrix6xX<f64>)> {
-        let of_slot = |slot: &Slot| (slot.block, Matrix6xX::zeros(slot.width));
+        let of_slot = |slot: &ChainBlock| (slot.block, Matrix6xX::zeros(slot.width));
         let mut all: Vec<_> = self.slots.iter().map(of_slot).collect();
         for (block, k, step) in self.columns() {
             if let Some((_, own)) = all.iter_mut().find(|own| own.0 == block) {

@@ -122,7 +122,8 @@ macro_rules! kinds {
 }
 
 kinds! {
-    points::{Control, Distance, Difference, EqualHeight};
+    points::{Control, Distance, Difference};
+    equal_height::EqualHeight;
     on_figure::{OnLevel, OnPlane, OnPlumbLine, OnLine};
     photos::{Range, Position, Attitude, Relative};
     unknowns::{Base, Prior};

@@ -1,0 +1,292 @@
+//! Acceleration of full steps that converge slowly, oscillate, or raise the sum of squares.
+//!
+//! Gauss-Newton steps p = -N^-1 (N + S) e for an error e neglect S, the second derivatives of the observations times their residuals. For
+//! well-determined unknowns S is irrelevant, and convergence is quadratic. If photos share self-calibrated cameras, some combinations of
+//! camera parameters, poses and heights are determined weakly. Convergence is then linear, with a factor of 30 to 50 in practice.
+//!
+//! * A chord N_k^-1 A^T l, with A and l formed at the new values, converges as fast as the next full step. It only needs normal matrices of
+//!   the local blocks, but not a new factor (Kelley 1995, "Iterative Methods for Linear and Nonlinear Equations", chapter 5).
+//! * If S is as large as N along a combination of unknowns, steps oscillate across the solution; Anderson acceleration ([`super::secants`])
+//!   combines several steps.
+//! * Chains of chords with one factor are accelerated in the same way. With N = L L^T, a chord p is computed from y = L^-1 A^T l, and
+//!   y^T y' equals p^T N p', so that no pass over the observations is required.
+
+use std::time::Instant;
+
+use nalgebra::DMatrix;
+
+use super::damped::ROUNDING;
+use super::equations::ObservationEquations;
+use super::options::{History, Iteration, NEGLIGIBLE, Phase, Stop};
+use super::result::AdjustError;
+use super::run::{Iterate, Run, between};
+use super::secants::Secants;
+use crate::normals::{Chord, dot};
+
+/// Minimum ratio of two successive step lengths for acceleration, which continues for all later steps.
+const SLOW: f64 = 0.5;
+/// Maximum number of stored differences of full steps.
+const MOST_DIFFERENCES: usize = 6;
+/// Minimum and maximum fraction of a step that raises the sum of squares,
+const LEAST: f64 = 0.05;
+const LARGEST: f64 = 0.5;
+/// and maximum number of tested fractions.
+const PARTS: usize = 3;
+/// Maximum change, in standard deviations, of a step followed by chords; farther from the solution chords raise the sum of squares.
+const CLOSE: f64 = 3.0;
+/// Maximum number of chords after a step, and of stored differences.
+const MOST_CHORDS: usize = 40;
+/// Number of chords, and the ratio that their lengths must fall below; otherwise new normal equations are more effective.
+const LONG: usize = 10;
+const FALL: f64 = 0.5;
+
+impl<'a> Run<'a, '_> {
+    /// Returns an accelerated or shortened step with its iteration record, if the full step converges slowly or raises the sum of squares.
+    /// None if the step is unchanged or damped. Steps followed by chords are not accelerated.
+    pub(super) fn corrected(
+        &mut self,
+        state: &Iterate<'a>,
+        step: &[f64],
+        iteration: &Iteration,
+        followed: bool,
+    ) -> Option<(Vec<f64>, Iteration)> {
+        let last = self.secants.last.take();
+        if iteration.damping > 0.0 || self.options.loss.is_some() || !self.problem.model.steps_swing() {
+            self.secants.pairs.clear();
+            return None;
+        }
+        if let Some((given, before)) = last
+            && !followed
+            && (self.secants.correct() || self.is_slow(iteration))
+        {
+            let taken = self.problem.model.step_between(&before, state.reached());
+            let difference = step.iter().zip(&given).map(|(now, before)| now - before).collect();
+            self.secants.keep(taken, difference, MOST_DIFFERENCES);
+        } else {
+            self.secants.pairs.clear();
+        }
+        let learnt = if self.secants.correct() { self.learnt(state, step, iteration) } else { None };
+        if iteration.largest_change <= NEGLIGIBLE {
+            return learnt;
+        }
+        let (best, plain) = (iteration.sum_of_squares, self.reached(state, step));
+        let lowest = best.min(plain);
+        match learnt.filter(|(own, _)| self.reached(state, own) <= lowest) {
+            None if plain.is_nan() || plain > best => self.shortened(state, step, iteration, plain),
+            found => found,
+        }
+    }
+
+    /// Whether a step is hardly shorter than its predecessor.
+    pub(super) fn is_slow(&self, step: &Iteration) -> bool {
+        self.iterations.last().is_some_and(|former| step.largest_change >= SLOW * former.largest_change)
+    }
+
+    /// Returns the sum of squares after a step.
+    fn reached(&self, state: &Iterate<'a>, step: &[f64]) -> f64 {
+        self.objective(&self.problem.advanced(state.values(), step))
+    }
+
+    /// Returns the step after Anderson acceleration.
+    fn learnt(
+        &self,
+        state: &Iterate<'a>,
+        step: &[f64],
+        iteration: &Iteration,
+    ) -> Option<(Vec<f64>, Iteration)> {
+        let all = self.secants.all(step);
+        let products = state.equations.products(self.threads, &state.linearized.prior, &all);
+        let shares = self.secants.shares(&products)?;
+        let own = self.secants.corrected(step, &shares);
+        let largest_change = (&products * &shares).dot(&shares).max(0.0).sqrt();
+        Some((own, Iteration { largest_change, ..*iteration }))
+    }
+
+    /// Returns the fraction of a step with the lowest sum of squares on a fitted parabola, if that is an improvement. Damping would
+    /// suppress the weakly determined combinations that the step must change.
+    fn shortened(
+        &self,
+        state: &Iterate<'a>,
+        step: &[f64],
+        iteration: &Iteration,
+        mut reached: f64,
+    ) -> Option<(Vec<f64>, Iteration)> {
+        let (best, square) = (iteration.sum_of_squares, iteration.largest_change.powi(2));
+        let mut part = 1.0;
+        for _ in 0..PARTS {
+            let bend = (reached - best + 2.0 * part * square) / part.powi(2);
+            let lowest = if bend.is_finite() { square / bend } else { 0.0 };
+            part = lowest.clamp(LEAST * part, LARGEST * part);
+            let own: Vec<f64> = step.iter().map(|value| part * value).collect();
+            reached = self.reached(state, &own);
+            if reached < best {
+                return Some((
+                    own,
+                    Iteration { largest_change: part * iteration.largest_change, ..*iteration },
+                ));
+            }
+        }
+        None
+    }
+
+    /// Returns the values after a step, including a chord if that is useful.
+    pub(super) fn stepped(
+        &mut self,
+        state: &Iterate<'a>,
+        values: Vec<f64>,
+        iteration: &Iteration,
+    ) -> Result<Vec<f64>, AdjustError> {
+        self.chord = None;
+        if !(state.linearized.factor.has_cached() && self.is_for_chord(iteration)) {
+            return Ok(values);
+        }
+        let start = Instant::now();
+        let (_, chord) = self.chord_at(state, &values)?;
+        self.seconds.solve += start.elapsed().as_secs_f64();
+        let change = chord.decrease.sqrt();
+        if !History::is_chord(change, iteration.largest_change) {
+            return Ok(values);
+        }
+        self.chord = Some(change);
+        Ok(self.problem.advanced(&values, &chord.step))
+    }
+
+    fn is_for_chord(&self, step: &Iteration) -> bool {
+        step.damping == 0.0
+            && self.options.loss.is_none()
+            && self.problem.model.ends_slowly()
+            && self.history().is_for_chord(step.largest_change)
+    }
+
+    /// Returns the history of the steps so far.
+    pub(super) fn history(&self) -> History<'_> {
+        let unknowns = self.problem.layout().unknowns();
+        History { iterations: &self.iterations, chord: self.chord, unknowns }
+    }
+
+    /// Whether a full step is followed by chords until convergence.
+    pub(super) fn is_followed(&self, state: &Iterate<'a>, step: &Iteration) -> bool {
+        step.damping == 0.0
+            && step.largest_change < CLOSE
+            && self.options.loss.is_none()
+            && self.problem.model.steps_swing()
+            && state.linearized.factor.has_cached()
+    }
+
+    /// Returns the values after chords from given values.
+    pub(super) fn chords(
+        &mut self,
+        state: &Iterate<'a>,
+        values: Vec<f64>,
+        above: (f64, Stop),
+    ) -> Result<Vec<f64>, AdjustError> {
+        let found = self.followed(state, values.clone(), above)?;
+        self.chord = found.as_ref().map(|&(_, length)| length);
+        Ok(found.map_or(values, |(values, _)| values))
+    }
+
+    /// Returns the best values of a chain of chords and the length of the chord there. None if the sum of squares at the given values is
+    /// above `best`.
+    fn followed(
+        &mut self,
+        state: &Iterate<'a>,
+        values: Vec<f64>,
+        (best, stop): (f64, Stop),
+    ) -> Result<Option<(Vec<f64>, f64)>, AdjustError> {
+        let start = Instant::now();
+        let (mut secants, mut differences) = (Secants::default(), Vec::<Vec<f64>>::new());
+        let mut here = self.link(state, values)?;
+        if here.is_higher_than(best) {
+            return Ok(None);
+        }
+        let (mut end, mut lowest) = ((here.values.clone(), here.change()), here.sum_of_squares);
+        let mut lengths = vec![here.change()];
+        while lengths.len() < MOST_CHORDS && falls(&lengths) && !is_enough(stop, &here) {
+            let taken = here.corrected(&secants, &differences);
+            let next = self.link(state, self.problem.advanced(&here.values, &taken))?;
+            // An accelerated chord may temporarily raise the sum of squares, by no more than the last predicted decrease.
+            if next.is_higher_than(lowest + here.chord.decrease) {
+                break;
+            }
+            if !next.is_higher_than(lowest) {
+                (end, lowest) = ((next.values.clone(), next.change()), lowest.min(next.sum_of_squares));
+            }
+            secants.keep(taken, minus(&next.chord.step, &here.chord.step), MOST_CHORDS);
+            differences.push(minus(&next.chord.reduced, &here.chord.reduced));
+            lengths.push(next.change());
+            here = next;
+        }
+        self.seconds.solve += start.elapsed().as_secs_f64();
+        Ok(Some(end))
+    }
+
+    /// Computes the chord and the sum of squares at given values.
+    fn link(&mut self, state: &Iterate<'a>, values: Vec<f64>) -> Result<Link, AdjustError> {
+        let (equations, chord) = self.chord_at(state, &values)?;
+        let sum_of_squares = self.objective_at(&values, equations.at());
+        Ok(Link { values, sum_of_squares, chord })
+    }
+
+    /// Forms the equations at given values and computes their chord.
+    pub(super) fn chord_at(
+        &mut self,
+        state: &Iterate<'a>,
+        values: &[f64],
+    ) -> Result<(ObservationEquations<'a>, Chord), AdjustError> {
+        let (problem, threads) = (self.problem, self.threads);
+        let equations = ObservationEquations::new(problem, None, values, &self.datum, threads);
+        let prior = problem.prior_equations(&problem.terms(values), &self.datum);
+        let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
+        let of = (&equations as _, &prior);
+        let chord = problem.system.chord(threads, &state.linearized.factor, of, &mut between);
+        Ok((equations, chord?))
+    }
+}
+
+/// Values with the chord from them.
+struct Link {
+    values: Vec<f64>,
+    sum_of_squares: f64,
+    chord: Chord,
+}
+
+impl Link {
+    /// Length of the chord in standard deviations.
+    fn change(&self) -> f64 {
+        self.chord.decrease.sqrt()
+    }
+
+    /// Returns the chord after Anderson acceleration with the stored steps and differences of y.
+    fn corrected(&self, secants: &Secants, differences: &[Vec<f64>]) -> Vec<f64> {
+        if !secants.correct() {
+            return self.chord.step.clone();
+        }
+        let row = |k: usize| if k == 0 { &self.chord.reduced } else { &differences[k - 1] };
+        let count = differences.len() + 1;
+        let shares = secants.shares(&DMatrix::from_fn(count, count, |i, j| dot(row(i), row(j))));
+        shares.map_or_else(|| self.chord.step.clone(), |shares| secants.corrected(&self.chord.step, &shares))
+    }
+
+    /// Whether the sum of squares exceeds a limit, apart from rounding errors and negligible chords, or is not finite.
+    fn is_higher_than(&self, sum_of_squares: f64) -> bool {
+        let highest = sum_of_squares * (1.0 + ROUNDING);
+        !(self.sum_of_squares <= highest || self.change() <= NEGLIGIBLE && self.sum_of_squares.is_finite())
+            || !self.change().is_finite()
+    }
+}
+
+/// Whether the chord satisfies the stopping rule of full steps.
+fn is_enough(stop: Stop, link: &Link) -> bool {
+    stop.at_change(link.change()) || stop.at_decrease(link.chord.decrease, link.sum_of_squares)
+}
+
+/// Whether the chord lengths are still decreasing.
+fn falls(lengths: &[f64]) -> bool {
+    let before = lengths.len().checked_sub(LONG + 1).map(|first| lengths[first]);
+    before.is_none_or(|before| lengths[lengths.len() - 1] < FALL * before)
+}
+
+/// Returns the elementwise difference.
+fn minus(to: &[f64], from: &[f64]) -> Vec<f64> {
+    to.iter().zip(from).map(|(to, from)| to - from).collect()
+}
