@@ -44,7 +44,7 @@ from photogram.network.datum import (
 from photogram.network.unknowns import Unknown
 from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.results.result import Result, dropped_points
 from photogram.words import phrase
 

@@ -32,7 +32,7 @@ from photogram.network.motion import scanners
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Unknown
-from photogram.results import datum, features, iteration, observation_kinds, unknowns
+from photogram.results import datum, features, parts
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -203,7 +203,7 @@ STANDS: dict[type, Callable[[Any], Stand]] = {motion.Trajectory: KeptTrajectory.
 
 MODULES = (
     *(cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
-    *(refraction, rigs, datum, features, iteration, observation_kinds, unknowns),
+    *(refraction, rigs, datum, features, parts),
 )
 CLASSES = (KeptTrajectory, Message, Phrase, Removed, Undetermined)
 

@@ -24,7 +24,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
 from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 

@@ -69,7 +69,7 @@ def check_points(result: Result) -> CheckPoints:
 
 
 def _agreement(result: Result, found: CheckPoints) -> Agreement:
-    from photogram.results.axes import point_axes  # few blocks have check points
+    from photogram.results.network_tables import point_axes  # few blocks have check points
     from photogram.statistics.agreement import agreement
 
     survey = np.zeros((len(found.rows), 3, 3))

@@ -26,7 +26,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
 
 if TYPE_CHECKING:
     from photogram import Result

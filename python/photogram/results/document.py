@@ -14,7 +14,6 @@ from photogram.arguments.types import Floats
 from photogram.network.structuring import structure
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
-from photogram.results.axes import point_axes
 from photogram.results.calibration import calibration_members, cameras_section, gains_section
 from photogram.results.check_points import observed_control
 from photogram.results.features import features_document, features_section
@@ -26,7 +25,7 @@ from photogram.results.network_document import (
     problems_of,
     size_section,
 )
-from photogram.results.network_tables import control
+from photogram.results.network_tables import control, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, about, significant

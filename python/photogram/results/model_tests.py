@@ -33,7 +33,7 @@ from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
 from photogram.results.fixed_tests import quadratic, score
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each

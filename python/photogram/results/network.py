@@ -25,7 +25,7 @@ from photogram.messages import Message
 from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
 from photogram.results.covariance import Adjusted, Covariances, Failure, Propagated, Selection
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.plots import Plots
     from photogram.plots.picture_data import Pictured
-    from photogram.results.axes import Determined, Terms
     from photogram.results.hypotheses import Hypotheses
     from photogram.results.hypothesis_facts import Facts
+    from photogram.results.network_tables import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary

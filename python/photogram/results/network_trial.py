@@ -16,7 +16,7 @@ from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.network.observations import Observation
 from photogram.network.unadjusted import Given
-from photogram.results.observation_kinds import kind_words, named_observation
+from photogram.results.parts import kind_words, named_observation
 from photogram.statistics.findings import Text
 from photogram.statistics.groups import INVISIBLE
 from photogram.statistics.reliability import TESTABLE

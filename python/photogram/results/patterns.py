@@ -27,10 +27,10 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
-from photogram.results.axes import point_axes
 from photogram.results.fixed_tests import fall_by_lens
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import point_axes
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic

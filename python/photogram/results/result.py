@@ -23,16 +23,23 @@ from photogram.results.check_points import CheckPoints, check_points, point_kind
 from photogram.results.covariance import Adjusted, Failure, adjusted
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused, relative_datum
 from photogram.results.films import OnFilm
-from photogram.results.iteration import Redundancies, SumsOfSquares
 from photogram.results.network import AdjustedNetwork
-from photogram.results.observation_kinds import ObservedKind, observed_kinds
+from photogram.results.parts import (
+    AdjustedCamera,
+    AdjustedUnknown,
+    ObservedKind,
+    Redundancies,
+    SumsOfSquares,
+    adjusted_cameras,
+    adjusted_unknowns,
+    observed_kinds,
+)
 from photogram.results.trajectories import (
     AdjustedTrajectory,
     adjusted_trajectories,
     project,
     restarted_motion,
 )
-from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown, adjusted_cameras, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase
 
@@ -42,7 +49,7 @@ if TYPE_CHECKING:
     from photogram import Features
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
-    from photogram.results.axes import Determined, Terms
+    from photogram.results.network_tables import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
@@ -212,12 +219,12 @@ class Result(OnFilm, AdjustedNetwork):
         return block_network(self.block, self.options)
 
     def _terms(self) -> Terms:
-        from photogram.results.axes import block_terms
+        from photogram.results.network_tables import block_terms
 
         return block_terms(self)
 
     def _determined(self) -> Determined:
-        from photogram.results.axes import determined
+        from photogram.results.network_tables import determined
 
         return determined(self)
 

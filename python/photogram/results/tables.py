@@ -11,18 +11,18 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.results import tests
-from photogram.results.axes import component_axis, point_axes
 from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.network_tables import (
+    component_axis,
     deviation,
     difference,
     names,
+    point_axes,
     redundancy,
     test_value,
 )
-from photogram.results.observation_kinds import ObservedKind
-from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown
+from photogram.results.parts import AdjustedCamera, AdjustedUnknown, ObservedKind
 from photogram.show.quantity import Axis, Quantity, attribute, column, component, joined, long
 from photogram.statistics.reliability import TESTABLE
 

@@ -12,11 +12,10 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results import network_tables
-from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import deviation, redundancy
+from photogram.results.network_tables import component_axis, deviation, redundancy
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
-from photogram.results.observation_kinds import kind_words, named_observation, parts_of
+from photogram.results.parts import kind_words, named_observation, parts_of
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Link, Quantity, component
 from photogram.statistics.distributions import lambda0

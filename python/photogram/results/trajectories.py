@@ -22,7 +22,7 @@ from photogram.network.moving_photos import Timed
 from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.projecting import camera_of, projected
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
-from photogram.results.unknowns import AdjustedUnknown
+from photogram.results.parts import AdjustedUnknown
 from photogram.words import phrase
 
 if TYPE_CHECKING:

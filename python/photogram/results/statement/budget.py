@@ -27,10 +27,10 @@ from photogram.results import network_trial
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances, Item, adjusted, used_rows
 from photogram.results.group_sums import Grouping, Left, Probing, grouped, observables
+from photogram.results.parts import units
 from photogram.results.result import Result
 from photogram.results.statement.request import invalid
 from photogram.results.statement.texts import Texts
-from photogram.results.unknowns import units
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 from photogram.words import Phrase, phrase

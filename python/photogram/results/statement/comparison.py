@@ -30,8 +30,8 @@ from photogram.network.block import Block
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
 from photogram.network.observations import Control
 from photogram.network.rays import local_axes
-from photogram.results.axes import point_axes
 from photogram.results.covariance import Covariances
+from photogram.results.network_tables import point_axes
 from photogram.results.result import NOT_PHOTOGRAPHED, Result
 from photogram.results.statement.request import METRES, Asked
 from photogram.words import phrase

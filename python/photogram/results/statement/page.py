@@ -16,6 +16,7 @@ from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
+from photogram.results.parts import AdjustedCamera, units
 from photogram.results.statement import tables as declared
 from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
@@ -23,7 +24,6 @@ from photogram.results.statement.figures import Figures
 from photogram.results.statement.judgement import fixed_values
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
-from photogram.results.unknowns import AdjustedCamera, units
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, Table
