@@ -57,7 +57,6 @@ class ParameterTest:
 
     @property
     def change(self) -> float:
-        """Adjusted minus given value."""
         return self.value - self.given
 
     @property
@@ -260,7 +259,6 @@ RADII = 9  # Rows of a distortion curve
 
 
 def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
-    """Return the section of adjusted and fixed cameras."""
     found = calibrations(result)
     shown, note = found[:LISTED], "the table of cameras has all"
     law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"

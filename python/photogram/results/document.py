@@ -142,10 +142,7 @@ def size_of(result: Result) -> list[tuple[str, str]]:
 
 
 def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
-    """Return the bandwidths in the 1987 program, in input order and in chosen order.
-
-    A sentence, and names with values.
-    """
+    """Return a sentence, and the bandwidths of the 1987 program in input order and in chosen order."""
     images = result.block.image_photos, result.block.image_points
     figures = []
     for name, order in (("of the input", None), ("chosen", result.photo_order)):
@@ -208,7 +205,6 @@ def block_members(result: Result) -> dict[str, Any]:
 
 
 def _of_some(result: Result) -> dict[str, Any]:
-    """Return the members that only some blocks have."""
     found: dict[str, Any] = {}
     if result.cameras:
         found["cameras"] = [

@@ -59,11 +59,7 @@ class Exchange:
 
 
 def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
-    """Find exchanged names among the excluded images of a network after data snooping.
-
-    `block` has all images, with photos from the adjustment without gross errors. This adjustment contains the
-    (m,) `used` images and has the `variance` of unit weight.
-    """
+    """Find exchanged names among the images that a network with `variance` of unit weight does not use."""
     plain, seen = seen_without_lenses(block)
     mounted = {each.photo for each in block.mounts}
     on_frames = np.array([name in mounted for name in block.photo_ids])
@@ -129,10 +125,7 @@ class _Fit:
         self.start = np.concatenate([[0], np.cumsum(counts)])
 
     def of(self, wanted: list[tuple[int, int]]) -> list[tuple[float, int]]:
-        """Return T and its dimension for points with a ray through another image.
-
-        Each pair of `wanted` is an image of the point, and the image that replaces it.
-        """
+        """Return T and its dimension for points of images, each with the ray of another image."""
         of_images = [np.append(self._others(image), place) for image, place in wanted]
         sizes = [len(each) for each in of_images]
         problem, rows = np.repeat(np.arange(len(wanted)), sizes), np.concatenate(of_images)

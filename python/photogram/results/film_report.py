@@ -150,10 +150,7 @@ def _photos(result: Result) -> Quantity:
 
 
 def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
-    """Return the marks that were read only on other photos of a camera, by photo row.
-
-    The halves of a joined scan count as one photo.
-    """
+    """Return marks read on other photos of a camera only; halves of a scan are one photo."""
     cameras, names = result.block.photo_cameras, result.block.camera_names
     of = {row: 0 if cameras is None else int(cameras[row]) for row, _ in result.films}
     on = {each.photo: each.frame for each in result.block.mounts}

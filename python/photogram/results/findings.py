@@ -77,10 +77,7 @@ def network_findings(
 
 
 def type_factors(tests: Tests, unit: str) -> list[TypeFactor]:
-    """Return the sums of squares and redundancy numbers of all observed types.
-
-    `unit` is the unit of image coordinates.
-    """
+    """Return the sums of squares and redundancy numbers of all observed types; `unit` is that of images."""
     found = []
     for each in tests.normal:
         for kind, components in each.groups.items():

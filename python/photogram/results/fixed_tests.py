@@ -48,10 +48,7 @@ class Held:
 
 
 def held_tested(result: Result) -> list[Tested]:
-    """Return tests of fixed stations and points with the worst images, if required.
-
-    Empty if the adjustment is accepted, has not converged, has no covariances, or was done in parts.
-    """
+    """Return tests of fixed stations and points with the worst images, if required."""
     if not result.WHOLE:
         return []
     return held_tests(
@@ -104,10 +101,7 @@ def is_suspected(result: AdjustedNetwork) -> bool:
 
 
 def held_remark(found: Sequence[Tested], largest: float) -> list[Phrase]:
-    """Return a message if a fixed value explains more than any removed observation.
-
-    `found` are its tests in the adjustment of all observations, `largest` is the largest T of removed ones.
-    """
+    """Return a message if a fixed value has a larger T than all removed observations."""
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
         return []
@@ -187,12 +181,7 @@ def as_adjusted(result: Result, *, free: bool = False) -> Block:
 
 
 def fall_by_lens(result: Result, images: Bools) -> float:
-    """Return the decrease of Omega with a separate lens model for (m,) `images`.
-
-    Rao's score (:class:`Scores`) of radial and tangential terms, principal point and distance about the
-    centre of the frame, for any camera model; of the radial terms only if unknowns absorb others. 0 if it is
-    not known.
-    """
+    """Return the decrease of Omega (Rao) with a separate lens model for (m,) `images`; 0 if unknown."""
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0
     block, own = result.block, images & result.used_images

@@ -174,10 +174,7 @@ def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Elli
 
 
 def metric_covariances(result: Result, *, photos: bool = False) -> Floats:
-    """Return (n, 3, 3) covariances of points or stations in the linear unit.
-
-    The axes are X, Y, Z, or east, north and up in geographic space.
-    """
+    """Return (n, 3, 3) covariances of points or stations in the linear unit."""
     found = result.photo_covariances[:, :3, :3] if photos else result.point_covariances
     if result.block.spheroid is None:
         return found

@@ -195,10 +195,7 @@ class Hypotheses:
         return [phrase(f"datum.{code}") for code in codes]
 
     def common(self, rivals: float = -math.inf) -> list[int]:
-        """Return rows of detected errors of sets that explain more than any single value.
-
-        The first is the most likely. `rivals` are the largest log odds of an error of a fixed value.
-        """
+        """Return rows of common errors that explain more than single values, the likeliest first."""
         odds, sets = self.log_odds, range(len(self.sets))
         found = [k for k in sets if self.code[k] not in LENSES and self.probability[k] < DETECTION[0]]
         first = max(found, key=lambda row: odds[row], default=0)

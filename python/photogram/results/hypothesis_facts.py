@@ -28,10 +28,7 @@ NO_FACTS: Facts = {
 
 
 def block_facts(block: Block, places: Floats) -> Facts:
-    """Return facts for hypotheses on a block: velocities, sets, sizes of images.
-
-    `places` are the (P, 3) adjusted positions of photos.
-    """
+    """Return facts for hypotheses on a block with (P, 3) adjusted `places` of photos."""
     count = len(block.photo_ids)
     cameras = np.zeros(count, dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
     facts: Facts = {"widths": [], "readouts": []}

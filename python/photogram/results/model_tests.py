@@ -305,11 +305,7 @@ def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int])
 
 
 def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
-    """Return groups of estimated distortion terms that are used together.
-
-    Powers of the radius are separate, the highest first; others are grouped by letter (P1 and P2, B1 and
-    B2).
-    """
+    """Return distortion terms that are used together: single powers of the radius, letters."""
     radial, others = [], dict[str, list[str]]()
     for k in camera.estimated:
         name = camera.names[k]

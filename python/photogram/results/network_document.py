@@ -99,10 +99,7 @@ def network_document(
 
 
 def problems_of(result: AdjustedNetwork) -> list[str]:
-    """Return reasons against the use of values, most serious first, and messages.
-
-    The first reasons are missing convergence, a rejecting global test and the outliers of the verdict.
-    """
+    """Return reasons against the use of values, the most serious first, and messages."""
     test = result.global_test
     problems = []
     if result.status != "converged":

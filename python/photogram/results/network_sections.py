@@ -78,10 +78,7 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
-    """Return eigenvalue ratios of (n, k, k) matrices; infinite by precision loss.
-
-    For smaller ranks only the largest eigenvalues count: the others belong to fixed unknowns.
-    """
+    """Return eigenvalue ratios of (n, k, k) matrices, of their `ranks` largest eigenvalues."""
     values = np.linalg.eigvalsh(matrices)
     largest = values[:, -1]
     smallest = np.take_along_axis(values, values.shape[1] - np.reshape(ranks, (-1, 1)), axis=1)[:, 0]
@@ -117,10 +114,7 @@ def component_table(
     tests: Floats,
     deviations: Floats | None = None,
 ) -> Table:
-    """Return a table of the components with the largest test values.
-
-    `there` are the (n, k) existing components, `tests` their test values, NaN if missing.
-    """
+    """Return components with the largest of (n, k) test values; `there` are the existing ones."""
     places = np.argwhere(there)
     sizes = np.abs(tests[there])
     rows = np.sort(np.argsort(np.where(np.isnan(sizes), 1.0, -sizes), kind="stable")[:COMPONENTS])
@@ -130,10 +124,7 @@ def component_table(
 
 
 def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> Section:
-    """Return control: prior, posterior, difference, test (unless fixed).
-
-    `free` are the columns of free components of control.
-    """
+    """Return control: prior, posterior, difference, test; `free` are free components."""
     columns, own = network_tables.control(result), result.control
     held = (own.sd == 0).all(axis=1)
     there, sd = np.isfinite(own.sd) & ~held[:, np.newaxis], result.point_sd[own.rows]
@@ -244,10 +235,7 @@ def images_section(result: AdjustedNetwork) -> Section:
 def _chosen_rows(
     kind: str, every: Indices, others: Iterable[int], orders: Sequence[Indices]
 ) -> tuple[Indices, str]:
-    """Return the listed photos or points, and a note on the others.
-
-    Items of other tables are first, then the worst in each order alternately.
-    """
+    """Return listed photos or points: those of other tables, then the worst in each order; and a note."""
     if len(every) <= ALL:
         return every, ""
     rows = dict.fromkeys(others)
@@ -286,10 +274,7 @@ def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
 
 @np.errstate(all="ignore")
 def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
-    """Return (n, 6) image fit statistics of photos or points; `of` are the owners.
-
-    Columns are rms x and y, mean redundancy, longest residual, largest |w|, number of images.
-    """
+    """Return (n, 6) rms x, y, mean redundancy, longest residual, largest |w|, images of owners."""
     used = result.used_images
     own = of[used]
     images = np.bincount(own, minlength=count)

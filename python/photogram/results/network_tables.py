@@ -85,7 +85,6 @@ class Determined:
 
 
 def block_terms(result: Result) -> Terms:
-    """Return the terms of a block."""
     block, axes = result.block, point_axes(result.block)
     point_kinds = result.point_kinds[result.used_points]
     lengths = None

@@ -170,10 +170,7 @@ def _of_photos(
 
 
 def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | None:
-    """Test the normal distribution of residuals in redundant directions.
-
-    The coordinates of a point on two photos repeat each other: the one with most redundancy is used.
-    """
+    """Test the normal distribution of residuals; of points on two photos the one with most redundancy."""
     redundancy, w = result.redundancy[used], result.standardized[used]
     single = result.point_rays[result.image_points[used]] <= 2
     seen = redundancy > VISIBLE

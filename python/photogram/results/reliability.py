@@ -372,10 +372,7 @@ class Downweighted:
 
 
 def downweighted(trial: NetworkTrial, terms: Terms, image_weights: Floats, used: Bools) -> Downweighted:
-    """Return the observations that the loss of an adjustment removes in effect.
-
-    `image_weights` and `used` are the (m,) weight factors of the images, and whether they were used.
-    """
+    """Return the observations that the loss of an adjustment removes in effect, by (m,) weights of images."""
     suspects = trial.suspects
     weights = np.ones(len(suspects))  # (G,) of groups; NaN if not used
     of_images, others = suspects.kinds == IMAGE, suspects.kinds == OBSERVATION

@@ -55,7 +55,6 @@ class Part:
     prefix: str = ""  # Prefix of the names of columns; the name of the one column of a matrix or list
 
     def columns(self, result: AdjustedNetwork) -> list[Column]:
-        """Return the columns; empty if the array is None."""
         array: Any = attrgetter(self.field)(result)
         if array is None:
             return []

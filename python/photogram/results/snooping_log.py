@@ -279,11 +279,7 @@ class _Names:
 
 
 def disputes(log: Sequence[Removal]) -> list[Phrase]:
-    """Return the observations of the log that have alternatives, each with these and their odds.
-
-    Observations other than images, none of which can be removed without losing the datum, are alternatives of
-    each other.
-    """
+    """Return observations with alternatives, also those that the datum requires."""
     found = [_alternatives(each, each.rivals) for each in log if each.kept == KEPT["disputed"]]
     needed = [each for each in log if each.kept == KEPT["needed"] and each.kind != "image"]
     needed.sort(key=lambda each: -each.statistic)

@@ -102,10 +102,7 @@ _NOTHING = ObservedKind(
 
 
 def redundancy_by_kind(result: Result) -> list[Quantity]:
-    """Return number, redundancy, sum of squares and sd factor of every type.
-
-    The redundancies sum to the degrees of freedom; empty without them, or with a loss.
-    """
+    """Return number, redundancy, sum of squares and sd factor of every type, if known."""
     names, numbers = list[str](), np.zeros((0, 3))
     if result.redundancies is not None and result.loss is None:
         grouping = grouped(observables(result), "kind")

@@ -190,10 +190,7 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
 
 
 def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
-    """Return the trajectories of photos and records of a block, by their names.
-
-    They compute covariances once, at the first request for poses.
-    """
+    """Return the trajectories of photos and records of a block, by their names."""
     found = {id(each.given): each for each in result.unknowns}
     once = cache(result.covariances)
 
@@ -330,11 +327,7 @@ _MANY = (Coefficient, Knot)  # Types with thousands of unknowns
 
 
 def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], str]:
-    """Return the common unknowns in reports, and a note on the others.
-
-    All except coefficients of trajectories and knots of lens models; these if they are few, or have large
-    test values.
-    """
+    """Return the common unknowns in reports, and a note on those that are not listed."""
     own = [each for each in every if isinstance(each.given, _MANY)]
     if len(own) <= COEFFICIENTS:
         return list(every), ""

@@ -117,11 +117,7 @@ def budgets(
     coverage: float = 0.95,
     components: VarianceComponents | None = None,
 ) -> list[Budget]:
-    """Return the budgets of quantities: one solution each, and one pass over all rows.
-
-    `components` are the variance components of the result, if weights were estimated. For errors see
-    :meth:`Result.covariances`.
-    """
+    """Return the budgets of quantities: one solution each, and one pass over all rows."""
     if not wanted:
         return []
     rows = Rows(result, covariances.suspects())
@@ -261,10 +257,7 @@ class Rows(network_trial.BlockSuspects):
         return list(found), number
 
     def sources(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return level, name, row number and contribution of sources, from (M,) squares.
-
-        Sources without rows are omitted; the smallest ones of long levels are added.
-        """
+        """Return level, name, row number and contribution of sources, the smallest of long levels added."""
         sums = np.add.reduceat(squares, self.row_starts[:-1])
         for level, names, of, most in self._levels:
             own = of >= 0
@@ -351,11 +344,7 @@ class Wanted:
 
 
 def wanted(result: Result, asked: Any) -> Wanted:
-    """Return a requested quantity; refuse unknown items and unused points.
-
-    `point NAME z`, `distance NAME NAME`, `camera NAME f`, `photo NAME x`, `unknown NAME x`; or a mapping of
-    items to gradients of a linear function, `{("point", "C08"): [0, 0, 1]}`.
-    """
+    """Return a quantity by its words or by gradients of items; refuse unknown items and unused points."""
     if isinstance(asked, Mapping):
         return _linear(result, asked)
     words = asked.split() if isinstance(asked, str) else []
