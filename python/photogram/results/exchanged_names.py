@@ -152,10 +152,7 @@ class _Fit:
         return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
 
     def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
-        """(n,) minimum sums of squares; infinite if rays do not meet before the cameras.
-
-        `rows` are the images of the points `own`.
-        """
+        """(n,) minimum sums of squares of images `rows` of points `own`; infinite behind cameras."""
         block, rays, count = self.block, self.rays, len(points)
         sd = block.image_sd[rows]
 

@@ -61,10 +61,10 @@ def held_tests(
     suspected_by: Callable[[Floats], Sequence[Held]],
     partials_of: Callable[[], Floats],
 ) -> list[Tested]:
-    """Return the test T of each fixed item, if residuals are too large.
+    """Return the test T of each fixed item that (m,) squares of images suspect, if residuals are too large.
 
-    `suspected_by` returns the items to test for (m,) weighted squares of the images. `partials_of` returns
-    (p, m, 2) partials of the images by the unknowns of their photos; each item has indices of these.
+    `partials_of` returns (p, m, 2) partials of the images by the unknowns of photos; items have indices of
+    these.
     """
     if result.loss or not is_suspected(result):
         return []
@@ -142,10 +142,9 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
 
 
 def station_partials(result: Result) -> Floats:
-    """(6, m, 2) partials of images by coordinates and small rotations of stations.
+    """(6, m, 2) partials of images by coordinates and rotations of stations (rolling: at the first line).
 
     Partials by point coordinates have the opposite sign. NaN for scanners, which have several stations.
-    Photos with a rolling shutter are used at their first line.
     """
     plain, seen = seen_without_lenses(as_adjusted(result))
     block = result.block

@@ -48,10 +48,9 @@ class Footprints:
 
 
 def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ()) -> Footprints:
-    """Return footprints of adjusted photos on level planes at their point heights.
+    """Return footprints of adjusted photos on level planes at the heights of their points.
 
-    `sizes` are widths and heights of the images of each camera in the unit of image coordinates. The default
-    is the extent of the measurements on all photos of the camera.
+    `sizes` are widths and heights of the images of each camera; the default is the extent of measurements.
     """
     block = as_adjusted(result, free=True)
     axes = local_axes(block)
@@ -103,10 +102,9 @@ def grounds(result: Result, heights: Floats) -> Floats:
 
 
 def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = ()) -> Floats:
-    """Return (k, 4) minimum x and y, maximum x and y of the camera frames of a block.
+    """Return (k, 4) minimum x and y, maximum x and y of the camera frames of a block, without scanners.
 
     Pixels of cameras with y downwards are measured from the corner, all other coordinates from the centre.
-    Strips of scanners are not frames.
     """
     cameras, photo_cameras = block.core_cameras()
     block = of_pictures(block)

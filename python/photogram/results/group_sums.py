@@ -374,14 +374,11 @@ class Grouping:
 
 
 def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
-    """Return groups of observations; refuse other bases and invalid labels.
+    """Return groups of observations by bases or labels of the user (docs/weights.md); refuse others.
 
-    Groups are by `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more
-    together), or `component` (x and y, plan and height of control, positions and attitudes of stations). All
-    except `kind` and `component` divide the images only; others are grouped by type. Several bases define a
-    group for each combination. Alternatively, user labels: a mapping with arrays of `images` (m,) or (m, 2),
-    `control` (n,) or (n, 3), `stations` (P,) or (P, k), `observations` (o,). Observations without a label
-    (None or an empty text) keep their weights. Parts without labels are grouped by type.
+    All bases except `kind` and `component` divide the images only; others are grouped by type. Several bases
+    define a group for each combination. Observations without a label (None or an empty text) keep their
+    weights.
     """
     if isinstance(groups, Mapping):
         labels = _own(of, groups)

@@ -26,11 +26,7 @@ NEAR = 1e-3  # Distance of points listed first from a station, relative to the m
 
 @np.errstate(all="ignore")
 def weakest_points(result: AdjustedNetwork) -> Table:
-    """Return points with the largest sd ratios, and those nearest to a station.
-
-    The ratio of extreme standard deviations in any direction is the root of the eigenvalue ratio of the
-    covariance matrix, or 1 with a fixed component. The table is empty without cofactors.
-    """
+    """Return points with the largest sd ratios (1 with a fixed component), and those near a station."""
     network = result._determined()
     cofactors = network.point_cofactors
     known = np.isfinite(cofactors).all(axis=(1, 2)) & result.used_points
@@ -55,11 +51,7 @@ def weakest_points(result: AdjustedNetwork) -> Table:
 
 @np.errstate(all="ignore")
 def weakest_photos(result: AdjustedNetwork) -> Table:
-    """Return photos with the largest condition numbers of poses, worst first.
-
-    Fixed unknowns of a photo do not count; photos without free unknowns are omitted. If all points are on a
-    line, a photo can rotate about it, and the condition number is unlimited.
-    """
+    """Return photos with the largest condition numbers of their free unknowns, the worst first."""
     network, count = result._determined(), len(result.given.photo_ids)
     images = np.bincount(result.given.image_photos[result.used_images], minlength=count)
     known = (images > 0) & np.isfinite(network.poses).all(axis=(1, 2)) & (network.ranks > 0)

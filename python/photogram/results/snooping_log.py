@@ -151,18 +151,9 @@ def snooped(
 ) -> Outcome:
     """Remove gross errors from a network and return the outcome.
 
-    Parameters
-    ----------
-    trial
-        The network.
-    settings
-        Settings of data snooping.
-    afresh
-        Restarts the trial from a consensus of its observations if its adjustment diverges. Returns the
-        observations that the consensus rejects; None without consensus.
-    common
-        Returns common errors of sets that explain the test values better than errors of single observations.
-        Then nothing is removed: removing the members one after the other would hide the cause.
+    `afresh` restarts the trial from a consensus if its adjustment diverges, and returns the rejected
+    observations or None. `common` returns common errors of sets that explain the tests better than single
+    errors. Then nothing is removed: removing the members one after the other would hide the cause.
     """
     begin = partial(
         _photocore.NetworkSnooping,

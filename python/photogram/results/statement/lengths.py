@@ -77,11 +77,7 @@ class LengthTest:
 
 
 def measured_lengths(positions: Floats, joint: Floats, pairs: Indices) -> tuple[Floats, Floats]:
-    """Return (m,) distances between points, and their (m, m) joint covariance J C J'.
-
-    `positions` are (p, 3), `joint` is their (3 p, 3 p) covariance, `pairs` are (m, 2) rows of the points of
-    each length. Two points at one position are refused.
-    """
+    """Return (m,) distances of `pairs` of (p, 3) positions, and their joint covariance J C J'."""
     first, second = pairs.T
     steps = positions[second] - positions[first]
     found = np.linalg.norm(steps, axis=1)
@@ -103,11 +99,7 @@ def angle_to_diagonal(steps: Floats, extent: Floats) -> float:
 
 
 def at_reference(lengths: Floats, temperatures: Floats, expansion: float) -> Floats:
-    """Return (m,) lengths of a body at 20 degrees from other temperatures (deg C).
-
-    `expansion` is its coefficient of thermal expansion, per kelvin: 11.5e-6 for steel. A coefficient that
-    gives a length of zero is refused.
-    """
+    """Return (m,) lengths at 20 degrees from others (deg C); `expansion` per kelvin: 11.5e-6 for steel."""
     grown = 1 + expansion * (temperatures - REFERENCE)
     if not (np.isfinite(grown) & (grown > 0)).all():
         raise invalid("expansion", "request.expansion", expansion)

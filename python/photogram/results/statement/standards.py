@@ -75,11 +75,10 @@ def points_asked_for(area: float) -> int:
 
 
 def accuracy(found: float, survey: float, freedom: float, count: int) -> Accuracy:
-    """Return a figure of the standard: RMSE_H (7.11), RMSE_V of NVA or VVA, RMSE_3D.
+    """Return RMSE_H (7.11), RMSE_V of NVA or VVA, or RMSE_3D; horizontal ones are radial.
 
-    `found` and `survey` are RMSE_1 of the differences and RMSE_2 of the check survey in the linear unit:
-    horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
-    the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
+    `found` and `survey` are RMSE_1 of the differences with effective degrees of freedom, and RMSE_2 of the
+    check survey; linear unit.
     """
     rest, upper = (found - survey) * (found + survey), rmse_interval(found, freedom)[1]
     product = math.sqrt(rest) if rest >= 0 else None
@@ -318,11 +317,7 @@ def _control_rmse(result: Result) -> tuple[float, float]:
 
 
 def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
-    """Return the accuracy of `count` check points at 95 %.
-
-    `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
-    on its diagonal. `rmse_z` belongs to the heights, in the linear unit. Missing values are NaN.
-    """
+    """Return the accuracy of `count` check points at 95 %, from (2, 2) sum d d' / n in plan, and RMSE_z."""
     vertical = VERTICAL * rmse_z if math.isfinite(rmse_z) else None
     if not np.isfinite(moments).all():
         return Nssda(count, None, None, None, None, vertical)
