@@ -24,7 +24,7 @@ from photogram.network.hull import hull
 from photogram.network.motion import on_shared, timed_images
 from photogram.network.trajectories import Readout
 from photogram.results.hypotheses import Hypotheses
-from photogram.results.hypothesis_facts import block_facts
+from photogram.results.network_trial import block_facts
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 

@@ -240,7 +240,7 @@ class Result(OnFilm, AdjustedNetwork):
         return network_trial(self.block, core)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
-        from photogram.results.hypothesis_facts import block_facts
+        from photogram.results.network_trial import block_facts
 
         checks = self.check_points
         sd = None if checks.agreement is None else np.hypot(checks.sd, checks.given_sd)
