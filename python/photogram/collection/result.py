@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from photogram.collection import Collection
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
-    from photogram.results.network_tables import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
+    from photogram.results.parts import Determined, Terms
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 

@@ -27,7 +27,6 @@ from photogram.network import (
     rigs,
 )
 from photogram.network import trajectories as motion
-from photogram.network.block import Block
 from photogram.network.motion import scanners
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
@@ -94,30 +93,24 @@ def block_files(result: Result) -> dict[str, Content]:
         "datum": str(result.datum),
         "degrees_of_freedom": result.degrees_of_freedom,
     }
-    return written(result, KIND, "block", _parts(block), leading, tables, block.frame, summary, STANDS)
-
-
-def _parts(block: Block) -> dict[str, list[Part]]:
-    observed = [
-        name for name in ("positions", "attitudes") if getattr(block, f"photo_{name}_observed") is not None
-    ]
-    parts = parts_of_block(
+    declared = parts_of_block(
         geographic=block.geographic,
         unit=block.linear_unit,
         image_unit=block.image_unit,
         distances=block.principal_distances is not None,
-        observed=observed,
+        observed=[
+            name
+            for name in ("positions", "attitudes")
+            if getattr(block, f"photo_{name}_observed") is not None
+        ],
     )
-    scanned = scanners(block)[block.image_photos]
+    scanned, images = scanners(block)[block.image_photos], declared["images"]
     if scanned.any():
         # Image coordinates of spherical cameras are angles; residuals and deviations are in the focal plane.
         units = ("1", "1") if scanned.all() else (f"{block.image_unit}; 1 of scanners",) * 2
-        xy, *others = parts["images"]
-        parts["images"] = [
-            replace(xy, units=units, description="measured {}; of scanners sample (x) and line (y)"),
-            *others,
-        ]
-    return parts
+        description = "measured {}; of scanners sample (x) and line (y)"
+        images[0] = replace(images[0], units=units, description=description)
+    return written(result, KIND, "block", declared, leading, tables, block.frame, summary, STANDS)
 
 
 def parts_of_block(

@@ -15,6 +15,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,6 +164,11 @@ def calibrations(result: Result) -> list[Calibration]:
     found = []
     for number, each in enumerate(cameras):
         parameters = tuple(_parameter(result, each, k) for k in each.estimated)
+        # The least significant term; radial terms in order of decreasing power.
+        lens = [test for test in parameters if test.is_lens]
+        held_up = [test.name for test in lens if re.fullmatch(r"[Kk]\d", test.name)][:-1]
+        candidates = [test for test in lens if not test.significant and test.name not in held_up]
+        removable = max(candidates, key=lambda test: test.probability, default=None)
         found.append(
             Calibration(
                 camera=each,
@@ -171,7 +177,7 @@ def calibrations(result: Result) -> list[Calibration]:
                 correlations=_correlations(each),
                 poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
                 terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
-                removable=_removable(parameters),
+                removable=removable and removable.name,
             )
         )
     return found
@@ -217,14 +223,10 @@ def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
 
 
 def _correlations(camera: AdjustedCamera) -> tuple[Correlation, ...]:
-    table, rows = camera.correlations, camera.estimated
-    pairs = [
-        Correlation(camera.names[i], camera.names[j], float(table[i, j]))
-        for place, i in enumerate(rows)
-        for j in rows[place + 1 :]
-        if abs(table[i, j]) > CORRELATED
-    ]
-    return tuple(sorted(pairs, key=lambda pair: -abs(pair.coefficient)))
+    table, names = camera.correlations, camera.names
+    pairs = [(i, j) for i, j in combinations(camera.estimated, 2) if abs(table[i, j]) > CORRELATED]
+    pairs.sort(key=lambda pair: -abs(table[pair]))
+    return tuple(Correlation(names[i], names[j], float(table[i, j])) for i, j in pairs)
 
 
 def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> tuple[PoseCorrelation, ...]:
@@ -243,15 +245,6 @@ def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> 
                 largest = float(row[above[0], column])
                 pairs.append(PoseCorrelation(camera.names[k], name, photos, largest))
     return tuple(sorted(pairs, key=lambda pair: -pair.coefficient))
-
-
-def _removable(parameters: tuple[ParameterTest, ...]) -> str | None:
-    """Return the least significant term; radial terms in order of decreasing power."""
-    lens = [each for each in parameters if each.is_lens]
-    radial = [each.name for each in lens if re.fullmatch(r"[Kk]\d", each.name)]
-    held_up = set(radial[:-1])
-    candidates = [each for each in lens if not each.significant and each.name not in held_up]
-    return max(candidates, key=lambda each: each.probability).name if candidates else None
 
 
 LISTED = 12  # Number of cameras with individual tables

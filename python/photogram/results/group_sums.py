@@ -450,13 +450,10 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
             if own.shape != default.shape:
                 shapes = f"{default.shape[:1]} or {default.shape}"
                 raise argument_error(f"labels of {name}", "shape", shape=shapes, actual=own.shape)
-            labels[part] = np.vectorize(_text, otypes=[object])(own) if own.size else own
+            missing = [label is None or label != label for label in own.ravel().tolist()]  # None or NaN
+            texts = np.where(missing, "", own.ravel().astype(str)).astype(object)
+            labels[part] = texts.reshape(own.shape)
     return labels, parents
-
-
-def _text(label: object) -> str:
-    missing = label is None or (isinstance(label, float) and np.isnan(label))
-    return "" if missing else str(label)
 
 
 def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, str]) -> Grouping:

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from photogram.plots import Plots
     from photogram.plots.picture_data import Pictured
     from photogram.results.hypotheses import Hypotheses
-    from photogram.results.network_tables import Determined, Terms
     from photogram.results.network_trial import Facts, NetworkTrial
+    from photogram.results.parts import Determined, Terms
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.statistics.findings import Removed

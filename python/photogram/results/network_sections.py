@@ -11,7 +11,8 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results import network_tables
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import Determined, point_axes
+from photogram.results.network_tables import point_axes
+from photogram.results.parts import Determined
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
 from photogram.show.page import Layers, Part, Section, Text, about, layered_tables

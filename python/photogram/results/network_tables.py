@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
 from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork
-from photogram.results.parts import Iteration, ObservedKind
+from photogram.results.parts import Determined, Iteration, Terms
 from photogram.show.quantity import Axis, Link, Quantity, column
 
 if TYPE_CHECKING:
@@ -41,47 +41,6 @@ def image_axes(unit: str) -> tuple[Axis, ...]:
 def component_axis(name: str, unit: str) -> Axis:
     """Return the axis of a component; small rotations are displayed in seconds of arc."""
     return Axis.turned(name) if unit == "rad" else Axis.of(name, unit)
-
-
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """Names, axes and units of the photos, points and images of a network."""
-
-    photos: np.ndarray  # (P,), (n,) names, or numbers from 0
-    points: np.ndarray
-    photo_axes: tuple[Axis, ...]  # Unknowns of a photo, coordinates of a point, image coordinates
-    point_axes: tuple[Axis, ...]
-    image_axes: tuple[Axis, ...]
-    photo_values: Floats  # (P, k) adjusted unknowns
-    # Unknowns of a photo: their name in texts, and their member in JSON documents
-    layers: Mapping[str, slice]
-    parts: Mapping[str, slice]
-    of_photos: tuple[Quantity, ...] = ()  # First columns of the tables of photos and points
-    of_points: tuple[Quantity, ...] = ()
-    kinds: Iterable[ObservedKind] = ()  # Additional observations
-    # (o,) rows of these in the block, in the order of the core
-    observation_rows: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    lengths: Floats | None = None  # (3,) length units of coordinates if plan coordinates are angles
-    linear_unit: str = ""
-    split: bool = False  # Whether JSON documents separate differences of positions and attitudes
-
-    @property
-    def identity(self) -> str:
-        """The member of JSON documents for the name or number of an item."""
-        return "number" if self.points.dtype.kind == "i" else "id"
-
-
-@dataclass(frozen=True, eq=False)
-class Determined:
-    """Positions of the points and photos of an adjusted network, with cofactors."""
-
-    stations: Floats  # (P, 3), (n, 3) positions in axes of equal units
-    points: Floats
-    poses: Floats  # (P, 6, 6) cofactors of position and attitude
-    ranks: Indices  # (P,) numbers of pose unknowns that are not fixed
-    point_cofactors: Floats  # (n, 3, 3) with axes of equal units
-    # (P,) photos of scanners, which have a separate station for each line; None without any
-    moving: Bools | None = None
 
 
 def block_terms(result: Result) -> Terms:

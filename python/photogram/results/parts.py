@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.arrays import freeze_fields, standard_deviations
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation
@@ -20,6 +20,7 @@ from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
+    from photogram.show.quantity import Axis, Quantity
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,47 @@ def parts_of(components: Iterable[str], name: Phrase) -> Phrase:
     return Phrase("named.parts", {"axes": [Phrase(f"axis.{each}") for each in components], "named": name})
 
 
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Names, axes and units of the photos, points and images of a network."""
+
+    photos: np.ndarray  # (P,), (n,) names, or numbers from 0
+    points: np.ndarray
+    photo_axes: tuple[Axis, ...]  # Unknowns of a photo, coordinates of a point, image coordinates
+    point_axes: tuple[Axis, ...]
+    image_axes: tuple[Axis, ...]
+    photo_values: Floats  # (P, k) adjusted unknowns
+    # Unknowns of a photo: their name in texts, and their member in JSON documents
+    layers: Mapping[str, slice]
+    parts: Mapping[str, slice]
+    of_photos: tuple[Quantity, ...] = ()  # First columns of the tables of photos and points
+    of_points: tuple[Quantity, ...] = ()
+    kinds: Iterable[ObservedKind] = ()  # Additional observations
+    # (o,) rows of these in the block, in the order of the core
+    observation_rows: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    lengths: Floats | None = None  # (3,) length units of coordinates if plan coordinates are angles
+    linear_unit: str = ""
+    split: bool = False  # Whether JSON documents separate differences of positions and attitudes
+
+    @property
+    def identity(self) -> str:
+        """The member of JSON documents for the name or number of an item."""
+        return "number" if self.points.dtype.kind == "i" else "id"
+
+
+@dataclass(frozen=True, eq=False)
+class Determined:
+    """Positions of the points and photos of an adjusted network, with cofactors."""
+
+    stations: Floats  # (P, 3), (n, 3) positions in axes of equal units
+    points: Floats
+    poses: Floats  # (P, 6, 6) cofactors of position and attitude
+    ranks: Indices  # (P,) numbers of pose unknowns that are not fixed
+    point_cofactors: Floats  # (n, 3, 3) with axes of equal units
+    # (P,) photos of scanners, which have a separate station for each line; None without any
+    moving: Bools | None = None
+
+
 # Types with components of `position` for values, and types whose values are the first of `position`.
 _PLACED = {"lever arm", "shift", "drift", "instrument", "level", "sensor", "position coefficient", "clock"}
 _PLACED |= {"rotation coefficient", "gyro bias", "readout", "bend", "knot"}
@@ -256,21 +298,12 @@ def adjusted_unknowns(
         change, position, attitude, cofactors, with_former, redundancy, observations = row
         k = len(change)
         matrix = np.array(cofactors).reshape(k, k)
-        found.append(
-            AdjustedUnknown(
-                given=given,
-                components=("factor",) if id(given) in factors else given.components,
-                units=("",) if id(given) in factors else given.units(block.linear_unit),
-                change=np.array(change),
-                position=np.array(position),
-                attitude=np.array(attitude).reshape(3, 3),
-                cofactors=matrix,
-                covariance=matrix * scale,
-                with_former=np.array(with_former).reshape(k, len(with_former) // k),
-                redundancy=np.array(redundancy),
-                observations=observations,
-            )
-        )
+        plain = id(given) in factors
+        names, units = (("factor",), ("",)) if plain else (given.components, given.units(block.linear_unit))
+        former = np.array(with_former).reshape(k, len(with_former) // k)
+        values = np.array(change), np.array(position), np.array(attitude).reshape(3, 3)
+        precision = matrix, matrix * scale, former, np.array(redundancy)
+        found.append(AdjustedUnknown(given, names, units, *values, *precision, observations))
     return tuple(found)
 
 
@@ -374,22 +407,10 @@ def adjusted_cameras(
         parameters, cofactors, redundancy, information, photos, images = row
         k = len(parameters)
         matrix = np.array(cofactors).reshape(k, k)
-        found.append(
-            AdjustedCamera(
-                name=name,
-                given=given,
-                camera=given.replace(
-                    parameters=dict(zip(given.names, parameters, strict=True)),
-                    knots=knots.get(id(given), given.knots),
-                ),
-                cofactors=matrix,
-                covariance=matrix * scale,
-                redundancy=np.array(redundancy),
-                information=np.array(information),
-                photos=photos,
-                images=images,
-            )
-        )
+        values = dict(zip(given.names, parameters, strict=True))
+        camera = given.replace(parameters=values, knots=knots.get(id(given), given.knots))
+        numbers = np.array(redundancy), np.array(information), photos, images
+        found.append(AdjustedCamera(name, given, camera, matrix, matrix * scale, *numbers))
     return tuple(found)
 
 

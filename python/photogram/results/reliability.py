@@ -49,7 +49,7 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.results.network_tables import Terms
+    from photogram.results.parts import Terms
 
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
 SEARCHED = 100  # Number of examined observations: those of the largest norm

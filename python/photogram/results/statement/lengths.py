@@ -8,6 +8,7 @@ the diagonal of the volume, and a line is along a diagonal.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -129,14 +130,8 @@ def length_test(
     errors, (constant, slope, most) = measured - calibrated, limit or (0.0, 0.0, math.inf)
     found = agreement(errors[:, np.newaxis], covariance, sd[:, np.newaxis, np.newaxis] ** 2, second=freedom)
     spread = found.sd[:, 0]
-    return LengthTest(
-        errors=errors,
-        sd=spread,
-        normalised=np.divide(errors, spread, out=np.full(errors.shape, math.nan), where=spread > 0),
-        limits=None if limit is None else np.minimum(constant + slope * calibrated, most),
-        together=found.together,
-        lines=len(set(lines)),
-        least=min(lines.count(each) for each in set(lines)),
-        longest=float(calibrated.max()) / diagonal,
-        off_diagonal=off_diagonal,
-    )
+    normalised = np.divide(errors, spread, out=np.full(errors.shape, math.nan), where=spread > 0)
+    limits = None if limit is None else np.minimum(constant + slope * calibrated, most)
+    counts = Counter(lines).values()
+    parts = errors, spread, normalised, limits, found.together, len(counts), min(counts)
+    return LengthTest(*parts, float(calibrated.max()) / diagonal, off_diagonal)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
 from photogram.network.hull import hull, outside
 from photogram.results.distortion import distortion_curve
-from photogram.results.features import Features, through, unit_deviations
+from photogram.results.features import Features, quantity_columns, through, unit_deviations
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
 from photogram.results.parts import AdjustedCamera, units
@@ -26,7 +26,7 @@ from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Quantity, Table, named
 from photogram.show.sketch import marks as shapes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION, round_length
@@ -237,18 +237,15 @@ def _metrology(statement: Statement) -> list[Part]:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
         parts += [declared.test_lengths(texts, lengths), drawing]
+    values = [each["value"] if isinstance(each["value"], list) else [each["value"]] for each in measures]
+    figures = [["–" if one is None else texts.significant(one, 3) for one in each] for each in values]
     quantities = [
         columns.text("measure", [each["measure"] for each in measures]),
         columns.number("id", [each["measure_id"] for each in measures]),
-        columns.text("value", [_measured(texts, each["value"]) for each in measures]),
+        columns.text("value", [*map(" / ".join, figures)]),
         columns.text(BLANK, [each["unit"] for each in measures]),
     ]
     return [*parts, Table("iso", texts("table.iso"), quantities)]
-
-
-def _measured(texts: Texts, value: Any) -> str:
-    values = value if isinstance(value, list) else [value]
-    return " / ".join("–" if each is None else texts.significant(each, 3) for each in values)
 
 
 def _features(texts: Texts, features: Features) -> Table:
@@ -256,13 +253,8 @@ def _features(texts: Texts, features: Features) -> Table:
     columns = declared.Columns(texts)
     every = [(feature, own) for feature in features for own in feature.quantities]
     names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
-    axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
-    numbers = [
-        Quantity(
-            np.array([getattr(own, key) for _, own in every]), axes, "value", head=columns.head(key), of=of
-        )
-        for key in ("value", "sd", "expanded")
-    ]
+    table = quantity_columns(features)
+    numbers = [replace(named(table, key), head=columns.head(key)) for key in ("value", "sd", "expanded")]
     quantities = [
         columns.text("feature", names),
         columns.text("quantity", [texts.word("measured", own.name) for _, own in every]),
