@@ -68,10 +68,10 @@ class AdjustedCollection(AdjustedNetwork):
         """Return a table as a data frame; pandas is imported here because it is slow."""
         import pandas as pd
 
-        from photogram.results.tests import TABLES
+        from photogram.results.tables import NETWORK_TABLES
         from photogram.show.quantity import frame
 
-        return pd.DataFrame(frame(TABLES[what](self)))
+        return pd.DataFrame(frame(NETWORK_TABLES[what](self)))
 
     def _findings(self) -> Findings:
         from photogram.collection.findings import collection_findings

@@ -15,7 +15,7 @@ from photogram.network.structuring import structure
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
 from photogram.results.calibration import calibration_members, cameras_section, gains_section
-from photogram.results.check_points import observed_control
+from photogram.results.datum import observed_control
 from photogram.results.features import features_document, features_section
 from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
 from photogram.results.network_document import (

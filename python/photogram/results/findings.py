@@ -18,7 +18,7 @@ from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
-from photogram.results.tests import Tests
+from photogram.results.tables import Tests
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text, TypeFactor
 from photogram.statistics.limits import GlobalTest, global_test

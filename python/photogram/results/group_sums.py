@@ -27,7 +27,7 @@ from photogram.network.observations import moments
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.unadjusted import Given
-from photogram.results.check_points import point_kinds
+from photogram.results.datum import point_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Section

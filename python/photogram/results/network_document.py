@@ -15,7 +15,7 @@ from photogram.plots.accessor import sketch_of
 from photogram.results import network_sections as sections
 from photogram.results import network_tables as declared
 from photogram.results.network import AdjustedNetwork
-from photogram.results.tests import Tests
+from photogram.results.tables import Tests
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table

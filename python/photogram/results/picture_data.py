@@ -23,7 +23,7 @@ from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
-from photogram.results.tests import Tests
+from photogram.results.tables import Tests
 from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length

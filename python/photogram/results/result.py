@@ -19,9 +19,17 @@ from photogram.network.block import Block, refuse_trajectories
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import timed_photos
-from photogram.results.check_points import CheckPoints, check_points, point_kinds
 from photogram.results.covariance import Adjusted, Failure, adjusted
-from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused, relative_datum
+from photogram.results.datum import (
+    CheckPoints,
+    ResultDatum,
+    check_points,
+    datum_messages,
+    datum_of,
+    point_kinds,
+    refused,
+    relative_datum,
+)
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import (
