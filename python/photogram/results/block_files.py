@@ -158,10 +158,7 @@ def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
 
 @dataclass(frozen=True, eq=False)
 class KeptTrajectory(Stand):
-    """A stored trajectory: its definition and its computed coefficients.
-
-    A recreated trajectory has new coefficients, which are replaced by shared ones.
-    """
+    """A stored trajectory: its definition and its coefficients, which others share."""
 
     name: str
     table: motion.Table

@@ -188,22 +188,13 @@ def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
     value, sd = float(camera.values[k]), float(camera.sd[k])
     reference = given if name in INTERIOR else 0.0
     t = (value - reference) / sd if sd > 0 else math.nan
-    freedom = result.freedom_of_scale
+    freedom, given_sd = result.freedom_of_scale, float(camera.given.deviations[k])
     probability = math.erfc(abs(t) / math.sqrt(2)) if math.isinf(freedom) else _photocore.student(t, freedom)
-    own = camera.information[k] * camera.cofactors[k, k]
-    return ParameterTest(
-        name=name,
-        unit=camera.camera.unit_of(name),
-        value=value,
-        sd=sd,
-        given=given,
-        given_sd=float(camera.given.deviations[k]),
-        test_value=t,
-        probability=probability,
-        multiple_correlation=math.sqrt(max(0.0, 1.0 - 1.0 / own)) if own > 0 else math.nan,
-        redundancy=float(camera.redundancy[k]),
-        gain=t * t * result.covariance_scale,
-    )
+    own, redundancy = camera.information[k] * camera.cofactors[k, k], float(camera.redundancy[k])
+    correlation = math.sqrt(max(0.0, 1.0 - 1.0 / own)) if own > 0 else math.nan
+    gain, unit = t * t * result.covariance_scale, camera.camera.unit_of(name)
+    numbers = value, sd, given, given_sd, t, probability, correlation, redundancy, gain
+    return ParameterTest(name, unit, *numbers)
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:

@@ -142,10 +142,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
 
 
 def station_partials(result: Result) -> Floats:
-    """(6, m, 2) partials of images by coordinates and rotations of stations (rolling: at the first line).
-
-    Partials by point coordinates have the opposite sign. NaN for scanners, which have several stations.
-    """
+    """(6, m, 2) partials of images by coordinates and rotations of stations; NaN for scanners."""
     plain, seen = seen_without_lenses(as_adjusted(result))
     block = result.block
     if not seen.any():

@@ -182,10 +182,7 @@ def metric_covariances(result: Result, *, photos: bool = False) -> Floats:
 
 
 def fitting_scale(found: Ellipses, places: Floats) -> float:
-    """Return a round display scale (1, 2, 5, 10 ...) for ellipses at (n, 2) positions.
-
-    The median major axis is about a third of the distance between neighbours.
-    """
+    """Return a round display scale (1, 2, 5, 10 ...) for ellipses at (n, 2) positions."""
     known = np.isfinite(found.major) & np.isfinite(places[:, :2]).all(axis=1)
     if not known.any():
         return 1.0

@@ -263,14 +263,11 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         OutOfMemoryError, KeyboardInterrupt
             As in :meth:`covariances`.
         """
-        from photogram.results.reliability import Reliability
+        from photogram.results.reliability import Reliability, downweighted
 
         trial, lost = self._trial(), None
         if self.loss is not None:
-            from photogram.results.reliability import downweighted
-
-            weights = self.image_weights, self.used_images
-            lost = downweighted(trial, self._terms(), *weights)
+            lost = downweighted(trial, self._terms(), self.image_weights, self.used_images)
             trial.out = lost.out
         return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 

@@ -174,11 +174,7 @@ def type_name(kind: int, label: str = "") -> Phrase:
 
 
 class NamedSuspects(ABC):
-    """G groups of observations of a network with M rows in all, and their names.
-
-    They contain arrays, not the core, so that names remain available after the tests. Subclasses return names
-    of observations that are not images, control or poses.
-    """
+    """G groups of observations of a network with M rows in all, and their names, without the core."""
 
     def __init__(
         self,

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 class PicturedNetwork(plots.Pictured):
     """The plot data of all adjusted networks."""
 
-    result: AdjustedNetwork
+    def __init__(self, result: AdjustedNetwork) -> None:
+        self.result = result
 
     @property
     @abstractmethod
@@ -108,9 +109,6 @@ class PicturedBlock(PicturedNetwork):
     """The data of an adjusted block; local axes for geographic space."""
 
     result: Result
-
-    def __init__(self, result: Result) -> None:
-        self.result = result
 
     @property
     def title(self) -> str:

@@ -256,10 +256,7 @@ class Reliability:
         return [self.named(*pair) for pair in self.pairs_on(points, limit)]
 
     def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return inseparable pairs on points by group numbers, with correlation.
-
-        Networks have thousands.
-        """
+        """Return inseparable pairs on points by group numbers, with correlation: thousands."""
         return self.trial.core.inseparable(points, limit)
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:

@@ -97,25 +97,16 @@ def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Ex
             one, other = sorted((int(plain.image_points[i]), int(plain.image_points[j])))
             photo = int(plain.image_photos[i])
             passing.setdefault((one, other), []).append((left, as_named, dimension, photo))
-    return _surest(plain, passing)
-
-
-def _surest(
-    block: Block, passing: dict[tuple[int, int], list[tuple[float, float, int, int]]]
-) -> list[Exchange]:
-    """Return the most certain pairs first; each point is in one pair only."""
-    order = sorted(passing.items(), key=lambda each: min(each[1])[0] - min(each[1])[1])
-    taken: set[int] = set()
-    found = []
-    for points, ways in order:
-        if taken & set(points):
-            continue
-        taken |= set(points)
-        left, as_named, dimension, _ = min(ways)
-        photos = [block.photo_ids[photo] for *_, photo in sorted(ways)]
-        one, other = (block.point_ids[point] for point in points)
-        found.append(Exchange(tuple(photos), (one, other), as_named, left, dimension))
-    return found
+    # The most certain pairs first; each point is in one pair only.
+    exchanges, taken = list[Exchange](), set[int]()
+    for points, ways in sorted(passing.items(), key=lambda each: min(each[1])[0] - min(each[1])[1]):
+        if taken.isdisjoint(points):
+            taken |= set(points)
+            left, as_named, dimension, _ = min(ways)
+            photos = [plain.photo_ids[photo] for *_, photo in sorted(ways)]
+            names = plain.point_ids[points[0]], plain.point_ids[points[1]]
+            exchanges.append(Exchange(tuple(photos), names, as_named, left, dimension))
+    return exchanges
 
 
 def _pairs(block: Block, used: Bools, on_frames: Bools) -> list[tuple[int, int]]:

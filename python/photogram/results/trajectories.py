@@ -255,10 +255,7 @@ LISTED = 20  # Rows of longer lists of coefficients and trajectories
 
 
 def trajectories_table(result: Result) -> Table:
-    """Return trajectory positions and rotations: largest corrections and tests.
-
-    They are in the order of the block; if there are many, those with the largest test values.
-    """
+    """Return trajectories with their largest corrections and tests; of many, the notable ones."""
     from photogram.show.page import about  # only required for tables
     from photogram.show.quantity import Axis, Quantity, Table
 

@@ -136,20 +136,11 @@ def budgets(
         variance = float(squares.sum())
         share = 1.0 / variance if variance > 0 else 0.0
         freedom = freedoms.of(squares, variance)
-        budget = Budget(
-            quantity=each.name,
-            subject=each.subject,
-            unit=each.unit,
-            value=value,
-            sd=math.sqrt(variance),
-            cofactor=variance / result.covariance_scale,
-            sources=tuple(Source(*source, source[-1] * share) for source in rows.sources(squares)),
-            largest=tuple(_largest(rows, squares, t, share)),
-            freedom=freedom,
-            k=coverage_factor(coverage, freedom.used),
-            coverage=coverage,
-        )
-        found.append(budget)
+        sources = tuple(Source(*source, source[-1] * share) for source in rows.sources(squares))
+        largest, k = tuple(_largest(rows, squares, t, share)), coverage_factor(coverage, freedom.used)
+        numbers = value, math.sqrt(variance), variance / result.covariance_scale
+        parts = sources, largest, freedom, k, coverage
+        found.append(Budget(each.name, each.subject, each.unit, *numbers, *parts))
     return found
 
 
