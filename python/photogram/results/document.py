@@ -12,19 +12,13 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.structuring import structure
+from photogram.results import network_document as of_network
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
 from photogram.results.calibration import calibration_members, cameras_section, gains_section
 from photogram.results.datum import observed_control
 from photogram.results.features import features_document, features_section
 from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
-from photogram.results.network_document import (
-    drawings,
-    network_document,
-    network_members,
-    problems_of,
-    size_section,
-)
 from photogram.results.network_tables import control, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
@@ -37,7 +31,7 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite
 def block_document(result: Result) -> Document:
-    pictures, (head, figures) = drawings(result), bandwidths(result)
+    pictures, (head, figures) = of_network.drawings(result), bandwidths(result)
     shown, note = notable(result.unknowns)
     tables = [
         Table("unknowns", "Common unknowns", declared.unknowns(shown), note),
@@ -54,7 +48,7 @@ def block_document(result: Result) -> Document:
     ]
     title, columns = "Redundancy by kind of observation", declared.redundancy_by_kind(result)
     redundancy, datum = Table("redundancy-by-kind", title, columns, about("redundancy-by-kind")), result.datum
-    return network_document(
+    return of_network.network_document(
         result,
         "Adjustment of a block of photos",
         _size_section(result),
@@ -114,7 +108,7 @@ def _size_section(result: Result) -> Section:
         values = [rms_of(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
             good.append(Fact(f"rms of {what}", ", ".join(_differences(result, values))))
-    return size_section(result, size_of(result), more, good)
+    return of_network.size_section(result, size_of(result), more, good)
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:
@@ -175,7 +169,7 @@ def block_members(result: Result) -> dict[str, Any]:
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
     )
     return {
-        **network_members(result, of_photos),
+        **of_network.network_members(result, of_photos),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {
@@ -190,7 +184,7 @@ def block_members(result: Result) -> dict[str, Any]:
         },
         "datum": result.datum.document(),
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
-        "problems": problems_of(result),
+        "problems": of_network.problems_of(result),
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
         "weighted_sum_of_squares": members(result.sums_of_squares, *_SUMS),
         "redundancy": result.redundancies and members(result.redundancies, *_SUMS),

@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results import network_tables
+from photogram.results import network_tables, parts
 from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.network import AdjustedNetwork
@@ -26,14 +26,6 @@ from photogram.results.network_tables import (
     test_value,
 )
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
-from photogram.results.parts import (
-    AdjustedCamera,
-    AdjustedUnknown,
-    ObservedKind,
-    kind_words,
-    named_observation,
-    parts_of,
-)
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Link, Quantity, attribute, column, component, joined, long
 from photogram.statistics.distributions import lambda0
@@ -96,8 +88,8 @@ class Tests:
             of_network(titles[2], "station", "photo_", "named.photo", poses, photos=photos),
         ]
         for each in terms.kinds:
-            title = phrase("test.components", kind=kind_words(each.kind))
-            name = partial(lambda kind, row: named_observation(kind.kind, kind.names[row]), each)
+            title = phrase("test.components", kind=parts.kind_words(each.kind))
+            name = partial(lambda kind, row: parts.named_observation(kind.kind, kind.names[row]), each)
             axes = tuple(map(component_axis, each.components, each.units))
             values = each.residuals, each.sd, each.redundancy, each.standardized
             found.append(_component_tests(title, each.kind, axes, name, values, {"observations": every}))
@@ -234,7 +226,7 @@ def _component_tests(
     return ComponentTests(
         kind=title,
         values=np.where(shares > TESTABLE, w, np.nan),
-        name=lambda place: parts_of([axes[place[1]].name], name(place[0])),
+        name=lambda place: parts.parts_of([axes[place[1]].name], name(place[0])),
         type=kind,
         axes=axes,
         residuals=residuals,
@@ -291,7 +283,7 @@ def _compared(result: Result, rows: Indices, differences: Floats, given_sd: Floa
     ]
 
 
-def observations(kind: ObservedKind) -> list[Quantity]:
+def observations(kind: parts.ObservedKind) -> list[Quantity]:
     axes = tuple(map(component_axis, kind.components, kind.units))
     kinds, names = (np.array(texts, dtype=object) for texts in ([kind.kind] * len(kind.names), kind.names))
     return [
@@ -318,7 +310,7 @@ def observed_components(result: Result) -> list[Quantity]:
 
 
 _EMPTY, _NONE = np.zeros((0, 1)), np.zeros(0)
-_NOTHING = ObservedKind(
+_NOTHING = parts.ObservedKind(
     *("", np.zeros(0, dtype=np.int64), [], ("",), ("",)), *(_EMPTY, _EMPTY, _EMPTY, _EMPTY), *(_NONE, _NONE)
 )
 
@@ -350,7 +342,7 @@ def redundancy_by_kind(result: Result) -> list[Quantity]:
     ]
 
 
-def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
+def unknowns(every: Sequence[parts.AdjustedUnknown]) -> list[Quantity]:
     """Return components of common unknowns; given sd are infinite if free."""
     axes = tuple(
         component_axis(*both) for each in every for both in zip(each.components, each.units, strict=True)
@@ -370,7 +362,7 @@ def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
     ]
 
 
-def camera_parameters(every: Sequence[AdjustedCamera]) -> list[Quantity]:
+def camera_parameters(every: Sequence[parts.AdjustedCamera]) -> list[Quantity]:
     """Return camera parameters; given sd are infinite if free, 0 if fixed."""
     axes = tuple(Axis(name, each.camera.unit_of(name)) for each in every for name in each.names)
     rows: dict[str, Any] = {"of": np.arange(len(axes))}
