@@ -9,7 +9,7 @@ were free (Rao's score, :func:`photogram.score_test`). T is chi-square with the 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,9 +51,7 @@ def held_tested(result: Result) -> list[Tested]:
     """Return tests of fixed stations and points with the worst images, if required."""
     if not result.WHOLE:
         return []
-    return held_tests(
-        result, lambda of_images: _suspected(result, of_images), lambda: station_partials(result)
-    )
+    return held_tests(result, partial(_suspected, result), partial(station_partials, result))
 
 
 def held_tests(

@@ -375,47 +375,39 @@ def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
     if not len(found) and not len(control):
         return None
     places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
-    extent = np.ptp(places, axis=0)
-    panel = _in_plan(shapes.around(places, 0.12), texts)
-    marks = list[shapes.Mark]()
+    extent, marks, bars, shades = np.ptp(places, axis=0), list[shapes.Mark](), list[shapes.ScaleBar](), None
     if len(control):
         marks.append(shapes.Markers(control[:, :2], "^", 6.0, SOFT, label=texts("use.control")))
     if len(found):
-        panel = _points(panel, found, float(extent.max()), texts)
+        plan, d = found.places[:, :2], found.differences
+        heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
+        most = max(float(np.abs(heights).max()), 1e-12)
+        shades = shapes.Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
+        marks += [
+            shapes.Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
+            shapes.Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
+        ]
+        both = np.isfinite(d[:, :2]).all(axis=1)
+        if both.any():
+            largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
+            scale, length = REACH * max(float(extent.max()), 1e-9) / largest, round_length(largest)
+            semi_axes, angles = shapes.ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
+            marks += [
+                shapes.Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
+                shapes.Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
+            ]
+            sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
+            bars = [(length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal")))]
+        if len(found) <= NAMED:
+            marks.append(shapes.Names(plan, found.names, [SOFT] * len(found)))
     height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
-    return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="beside")])
+    panel = _in_plan(shapes.around(places, 0.12), texts)
+    return Plot(WIDTH, height, [replace(panel, marks=marks, bars=bars, shades=shades, legend="beside")])
 
 
 def _in_plan(limits: Floats, texts: Texts) -> shapes.Panel:
     across, up = (f"{texts(f'column.{axis}')}, {texts.unit}" for axis in ("east", "north"))
     return shapes.Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
-
-
-def _points(panel: shapes.Panel, found: Compared, extent: float, texts: Texts) -> shapes.Panel:
-    plan, d = found.places[:, :2], found.differences
-    heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
-    most = max(float(np.abs(heights).max()), 1e-12)
-    shades = shapes.Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
-    marks: list[shapes.Mark] = [
-        shapes.Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
-        shapes.Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
-    ]
-    bars: list[shapes.ScaleBar] = []
-    both = np.isfinite(d[:, :2]).all(axis=1)
-    if both.any():
-        largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
-        scale = REACH * max(extent, 1e-9) / largest
-        semi_axes, angles = shapes.ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
-        marks += [
-            shapes.Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
-            shapes.Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
-        ]
-        length = round_length(largest)
-        sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
-        bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal"))))
-    if len(found) <= NAMED:
-        marks.append(shapes.Names(plan, found.names, [SOFT] * len(found)))
-    return replace(panel, marks=marks, bars=bars, shades=shades)
 
 
 def drawn_lengths(found: Lengths, texts: Texts) -> Plot:
