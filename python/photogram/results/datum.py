@@ -238,7 +238,14 @@ def check_points(result: Result) -> CheckPoints:
     }
     untested = next((reason for reason, holds in obstacles.items() if holds), "")
     names, sd = tuple(block.point_ids[row] for row in rows.tolist()), result.point_sd[rows]
-    found = CheckPoints(rows, names, differences, sd, *_given(block, rows, differences), untested)
+    given = np.full((len(rows), 3), math.nan) if block.point_check_sd is None else block.point_check_sd[rows]
+    lacking: Bools = np.asarray((np.isnan(given) & np.isfinite(differences)).any(axis=1))
+    # Standard deviations of observations are lengths, also in geographic blocks.
+    observed = [] if block.geographic else block.observations.of_type(Control)
+    every = np.vstack([block.point_sd, *(np.sqrt(np.diag(each.precision)) for each in observed)])
+    assumed = [np.median(held) if (held := column[np.isfinite(column)]).size else 0.0 for column in every.T]
+    given = np.asarray(np.where(np.isnan(given), assumed, given))
+    found = CheckPoints(rows, names, differences, sd, given, lacking, untested)
     return found if untested else replace(found, agreement=_agreement(result, found))
 
 
@@ -309,16 +316,3 @@ def _apart(
     axis = axes[k]
     sizes = {"difference": float(own[k] * axis.factor), "sd": float(sd[k] * axis.factor)}
     return {**sizes, "unit": axis.small, "axis": Phrase(f"axis.{axis.name}")}
-
-
-def _given(block: Block, rows: Indices, differences: Floats) -> tuple[Floats, Bools]:
-    """Return standard deviations of given coordinates, and points with assumed ones."""
-    own = np.full((len(rows), 3), math.nan)
-    if block.point_check_sd is not None:
-        own = block.point_check_sd[rows]
-    lacking: Bools = np.asarray((np.isnan(own) & np.isfinite(differences)).any(axis=1))
-    # Standard deviations of observations are lengths, also in geographic blocks.
-    observed = [] if block.geographic else block.observations.of_type(Control)
-    every = np.vstack([block.point_sd, *(np.sqrt(np.diag(each.precision)) for each in observed)])
-    assumed = [np.median(held) if (held := column[np.isfinite(column)]).size else 0.0 for column in every.T]
-    return np.asarray(np.where(np.isnan(own), assumed, own)), lacking

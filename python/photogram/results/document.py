@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -103,11 +102,18 @@ def _size_section(result: Result) -> Section:
         "unheld components": declared.unheld,
         "check points": declared.check_points,
     }
+    axes, lengths, unit = point_axes(result.block), result._terms().lengths, result.block.linear_unit
     for what, table in tables.items():
         differences = named(table(result), "d").values
         values = [rms_of(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
-            good.append(Fact(f"rms of {what}", ", ".join(_differences(result, values))))
+            texts = [
+                f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
+                + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")
+                for k, (axis, value) in enumerate(zip(axes, values, strict=True))
+                if math.isfinite(value)
+            ]
+            good.append(Fact(f"rms of {what}", ", ".join(texts)))
     return of_network.size_section(result, size_of(result), more, good)
 
 
@@ -148,16 +154,6 @@ def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
 
 def rms_of(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
-
-
-def _differences(result: Result, values: Iterable[float]) -> list[str]:
-    axes, lengths, unit = point_axes(result.block), result._terms().lengths, result.block.linear_unit
-    return [
-        f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
-        + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")
-        for k, (axis, value) in enumerate(zip(axes, values, strict=True))
-        if math.isfinite(value)
-    ]
 
 
 def block_members(result: Result) -> dict[str, Any]:

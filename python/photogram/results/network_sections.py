@@ -12,7 +12,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results import network_tables
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
-from photogram.results.parts import Determined
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
 from photogram.show.page import Layers, Part, Section, Text, about, layered_tables
@@ -35,7 +34,16 @@ def weakest_points(result: AdjustedNetwork) -> Table:
     free = known & np.isinf(result.point_given_sd).all(axis=1)
     ratio[known] = 1.0
     ratio[free] = np.sqrt(_condition(cofactors[free], 3))
-    distance = _distances(result, network)
+    # Distances of points from the nearest station, over their median.
+    used = result.used_images
+    if network.moving is not None:
+        used = used & ~network.moving[result.given.image_photos]
+    own = result.image_points[used]
+    of_images = network.points[own] - network.stations[result.given.image_photos[used]]
+    nearest = np.full(len(network.points), np.inf)
+    np.minimum.at(nearest, own, np.linalg.norm(of_images, axis=1))
+    seen = np.isfinite(nearest)
+    distance = np.where(seen, nearest / np.median(nearest[seen]) if seen.any() else np.nan, np.nan)
     order = np.lexsort((distance, -ratio))
     near = np.flatnonzero(distance < NEAR)
     worst = order[~np.isnan(ratio[order])][:WORST]
@@ -76,20 +84,6 @@ def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
     largest = values[:, -1]
     smallest = np.take_along_axis(values, values.shape[1] - np.reshape(ranks, (-1, 1)), axis=1)[:, 0]
     found: Floats = np.where(smallest > np.finfo(float).eps * largest, largest / smallest, np.inf)
-    return found
-
-
-def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
-    """Return distances of points from the nearest station, over their median."""
-    used = result.used_images
-    if network.moving is not None:
-        used = used & ~network.moving[result.given.image_photos]
-    own = result.image_points[used]
-    of_images = network.points[own] - network.stations[result.given.image_photos[used]]
-    nearest = np.full(len(network.points), np.inf)
-    np.minimum.at(nearest, own, np.linalg.norm(of_images, axis=1))
-    seen = np.isfinite(nearest)
-    found: Floats = np.where(seen, nearest / np.median(nearest[seen]) if seen.any() else np.nan, np.nan)
     return found
 
 

@@ -261,9 +261,6 @@ class Rows(network_trial.BlockSuspects):
             yield from ((level, names[k], int(numbers[k]), float(totals[k])) for k in there.tolist())
             if len(rest):
                 yield level, "others", int(numbers[rest].sum()), math.fsum(totals[rest].tolist())
-        yield from self._parameters(squares)
-
-    def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
         several = len(self.block.camera_names) > 1
         for group in np.flatnonzero(self.kinds > network_trial.OBSERVATION).tolist():
             for row in self.rows(group).tolist():
@@ -381,26 +378,20 @@ def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
         order = rows[np.argsort(result.point_sd[rows, 2], kind="stable")]
         found.append(wanted(result, f"point {block.point_ids[order[(len(order) - 1) // 2]]} z"))
     if len(rows) > 1:
-        first, second = _farthest(result, rows)
-        found.append(_distance(result, f"distance {first} {second}", (first, second)))
+        places, best, ends = local_axes(block).positions(result.point_positions[rows]), -1.0, (0, 0)
+        for first in range(0, len(rows), TOGETHER):
+            squares = ((places[first : first + TOGETHER, np.newaxis] - places) ** 2).sum(axis=2)
+            row, column = np.unravel_index(int(np.argmax(squares)), squares.shape)
+            if squares[row, column] > best:
+                best, ends = float(squares[row, column]), (first + int(row), int(column))
+        one, other = (block.point_ids[rows[end]] for end in sorted(ends))
+        found.append(_distance(result, f"distance {one} {other}", (one, other)))
     for camera in result.cameras:
         free = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if sd > 0]
         for name in PRINCIPAL:
             if name in free:
                 return [*found, wanted(result, f"camera {camera.name} {name}")]
     return found
-
-
-def _farthest(result: Result, rows: Indices) -> tuple[str, str]:
-    places = local_axes(result.block).positions(result.point_positions[rows])
-    best, ends = -1.0, (0, 0)
-    for first in range(0, len(rows), TOGETHER):
-        squares = ((places[first : first + TOGETHER, np.newaxis] - places) ** 2).sum(axis=2)
-        own = np.unravel_index(int(np.argmax(squares)), squares.shape)
-        if squares[own] > best:
-            best, ends = float(squares[own]), (first + int(own[0]), int(own[1]))
-    names = result.block.point_ids
-    return names[rows[min(ends)]], names[rows[max(ends)]]
 
 
 def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
