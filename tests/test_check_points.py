@@ -13,7 +13,7 @@ from photogram.cli import app
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.supplements import with_control
 from photogram.giant import Project, write_project
-from photogram.results.check_points import check_points
+from photogram.results.datum import check_points
 from photogram.statistics.agreement import agreement
 
 

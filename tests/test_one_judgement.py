@@ -8,7 +8,7 @@ import pytest
 
 import photogram
 from photogram import collection, formats
-from photogram.results import tests as table
+from photogram.results import tables as table
 from photogram.words import Phrase
 
 PLOT = import_module("photogram.plots.tests")  # the package has a function with this name

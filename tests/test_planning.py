@@ -35,7 +35,7 @@ from photogram.adjustment.prediction import at_adjusted
 from photogram.cli.plan import plan as plan_command
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.planning import Pattern
-from photogram.planning.document import advice
+from photogram.planning.networks import advice
 from photogram.planning.pattern import locations
 from photogram.statistics import largest_effect, minimal_detectable_error, noncentrality
 

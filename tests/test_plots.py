@@ -16,8 +16,7 @@ from photogram import InputError, adjust, collection, simulate
 from photogram.giant import read_project
 from photogram.plots import Plot
 from photogram.plots.accessor import PLOTS
-from photogram.plots.cells import cells
-from photogram.plots.selection import first_panels
+from photogram.plots.selection import cells, first_panels
 from photogram.show.sketch.marks import Names, Panel
 
 ALWAYS = {"network", "residuals", "redundancy", "undetected", "tests"}

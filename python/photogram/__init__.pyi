@@ -66,7 +66,7 @@ from .results.features import Features as Features
 from .results.features import features as features
 from .results.group_sums import GroupSums as GroupSums
 from .results.group_sums import group_sums as group_sums
-from .results.iteration import Iteration as Iteration
+from .results.parts import Iteration as Iteration
 from .results.model_tests import compare as compare
 from .results.model_tests import score_test as score_test
 from .results.model_tests import terms_test as terms_test

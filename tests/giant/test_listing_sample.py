@@ -27,7 +27,7 @@ from photogram.giant.printout.results import (
     propagated_point_pages,
     station_pages,
 )
-from photogram.results.iteration import SumsOfSquares
+from photogram.results.parts import SumsOfSquares
 
 DATA = Path(__file__).parents[1] / "data" / "giant"
 SCAN = DATA / "scanned_pages.txt"

@@ -29,7 +29,7 @@ from photogram import collection as collections
 from photogram.arguments.fields import check_members
 from photogram.io.seals import seal
 from photogram.network import Level, OnLevel, Shift
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 

@@ -20,7 +20,7 @@ from photogram.arguments.arrays import number, one_of, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.messages import Message
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.statistics.limits import externally_studentized, global_test
 from photogram.words import phrase
 

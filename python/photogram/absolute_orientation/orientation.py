@@ -12,7 +12,7 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.findings import Findings

@@ -42,9 +42,8 @@ from photogram.network.datum import (
     minimum_row,
 )
 from photogram.network.unknowns import Unknown
-from photogram.results.check_points import tested_together
-from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
-from photogram.results.iteration import Iteration
+from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused, tested_together
+from photogram.results.parts import Iteration
 from photogram.results.result import Result, dropped_points
 from photogram.words import phrase
 

@@ -12,8 +12,8 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.results.model_tests import EFFECT, KEPT, TermsTest, groups_of_terms, terms_test
+from photogram.results.parts import AdjustedCamera
 from photogram.results.result import Result
-from photogram.results.unknowns import AdjustedCamera
 from photogram.words import phrase
 
 

@@ -17,7 +17,7 @@ from photogram.network.motion import on_shared
 from photogram.network.refraction import metres_per_unit
 from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import Coefficient
-from photogram.results.unknowns import adjusted_cameras
+from photogram.results.parts import adjusted_cameras
 from photogram.words import Phrase, phrase
 
 NEAR = 1e-3  # Distance from a station relative to the median distance, below which a point coincides with it

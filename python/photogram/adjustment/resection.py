@@ -30,7 +30,7 @@ from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.geometry import Spheroid
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.show.methods import Judged
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import GlobalTest, global_test
@@ -140,7 +140,7 @@ class Resection(Judged):
     outside_danger_cylinder: float | None
 
     def _findings(self) -> Findings:
-        from photogram.results.observation_kinds import parts_of
+        from photogram.results.parts import parts_of
 
         def named(code: str, row: int) -> Phrase:
             return Phrase(code, {"point": str(self.point_ids[row])})

@@ -33,12 +33,10 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
-from photogram.results.axes import point_axes
-from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.hypotheses import hypotheses
-from photogram.results.hypothesis_facts import block_facts
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
+from photogram.results.network_tables import point_axes
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
@@ -50,12 +48,13 @@ from photogram.results.network_trial import (
     Out,
     Standing,
     Tests,
+    block_facts,
     network_trial,
 )
 from photogram.results.result import Result
 from photogram.results.snooping_log import Aside, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
-from photogram.results.snooping_result import Snooped, recorded
+from photogram.results.snooping_result import Exchange, Snooped, exchanged_names, recorded
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase, phrase
 

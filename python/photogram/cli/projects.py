@@ -193,7 +193,7 @@ def _control_line(block: Block, rays: Indices) -> str:
     import numpy as np
 
     from photogram.network.observations import Control
-    from photogram.results.check_points import point_kinds
+    from photogram.results.datum import point_kinds
 
     others = {name for each in block.observations if not isinstance(each, Control) for name in each.points}
     measured = (rays > 0) | np.isin(block.point_ids, list(others))

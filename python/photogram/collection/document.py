@@ -8,9 +8,10 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.collection.parameters import POSE
-from photogram.results.axes import Determined, Terms, image_axes
 from photogram.results.network_document import drawings, network_document, network_members, size_section
 from photogram.results.network_sections import control_section, stations_section
+from photogram.results.network_tables import image_axes
+from photogram.results.parts import Determined, Terms
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity
 

@@ -28,9 +28,6 @@ class PicturedCollection(PicturedNetwork):
 
     result: AdjustedCollection
 
-    def __init__(self, result: AdjustedCollection) -> None:
-        self.result = result
-
     @property
     def title(self) -> str:
         """Empty, because collections are untitled."""

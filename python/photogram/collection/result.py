@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from photogram.collection import Collection
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
-    from photogram.results.axes import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
+    from photogram.results.parts import Determined, Terms
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -69,10 +69,10 @@ class AdjustedCollection(AdjustedNetwork):
         """Return a table as a data frame; pandas is imported here because it is slow."""
         import pandas as pd
 
-        from photogram.results.tests import TABLES
+        from photogram.results.tables import NETWORK_TABLES
         from photogram.show.quantity import frame
 
-        return pd.DataFrame(frame(TABLES[what](self)))
+        return pd.DataFrame(frame(NETWORK_TABLES[what](self)))
 
     def _findings(self) -> Findings:
         from photogram.collection.findings import collection_findings

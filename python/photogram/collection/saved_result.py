@@ -12,7 +12,7 @@ from photogram.collection.result import AdjustedCollection
 from photogram.collection.result_files import collection_parts
 from photogram.messages import Message
 from photogram.network.core_arrays import CoreOptions
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.results.result_files import read_saved
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase

@@ -13,7 +13,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import Rays
-from photogram.results.observation_kinds import ObservedKind
+from photogram.results.parts import ObservedKind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
 from photogram.words import Phrase, phrase

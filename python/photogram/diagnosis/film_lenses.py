@@ -20,8 +20,8 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
+from photogram.results.parts import AdjustedCamera
 from photogram.results.result import Result
-from photogram.results.unknowns import AdjustedCamera
 from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[AK]\d")

@@ -24,7 +24,7 @@ from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
 from photogram.network.unknowns import Unknown
 from photogram.results.film_report import mark_residuals
-from photogram.results.observation_kinds import ObservedKind
+from photogram.results.parts import ObservedKind
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
 from photogram.words import phrase

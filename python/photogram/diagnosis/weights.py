@@ -5,7 +5,7 @@ from __future__ import annotations
 from photogram.messages import Message
 from photogram.results.findings import type_factors
 from photogram.results.result import Result
-from photogram.results.tests import Tests
+from photogram.results.tables import Tests
 from photogram.statistics import global_test
 from photogram.words import phrase
 

@@ -39,7 +39,7 @@ from photogram.distributed.walks import Up, Walks
 from photogram.errors import AdjustmentError, RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.core_arrays import CoreOptions
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.words import phrase
 
 RULES = _photocore.step_rules()  # Constants of the step rules, shared with adjustments in one process

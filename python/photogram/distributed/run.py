@@ -37,7 +37,7 @@ from photogram.network.observations.photos import with_epochs
 from photogram.network.trajectories import Spline, Trajectory
 from photogram.network.unknowns import Unknown
 from photogram.results.block_files import KeptTrajectory
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.words import phrase
 
 MANIFEST = "run.json"

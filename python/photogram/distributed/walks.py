@@ -19,7 +19,7 @@ from photogram.distributed.executors import Executor, Handle
 from photogram.distributed.tasks import Formed, Job, Lost, Point, about, formed, inverted, lost, state_path
 from photogram.errors import AdjustmentError, PhotogramError
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.words import phrase
 
 ATTEMPTS = 20  # Maximum number of formations of a node after losses of workers

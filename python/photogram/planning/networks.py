@@ -1,27 +1,60 @@
-"""Comparison of predicted networks as table, text, JSON and plot."""
+"""Comparison of predicted networks: their plan, and its document with tables and plot."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
-from photogram.errors import InputError, RankError, message_of
-from photogram.lazy_dataclasses import dataclass
+from photogram.arguments.types import Floats
+from photogram.errors import InputError, PhotogramError, RankError, message_of
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.planning.pattern import Pattern, with_known_readout
+from photogram.results.hypotheses import FEWEST
+from photogram.show.angles import ARCSEC
+from photogram.show.judgement import remarks_section
 from photogram.show.methods import Documented
-from photogram.words import phrase
+from photogram.show.page import (
+    Document,
+    Drawing,
+    Fact,
+    Judgement,
+    Section,
+    about,
+    layered_tables,
+    significant,
+)
+from photogram.show.quantity import Axis, Quantity, Table, chosen, component, members, of_each, records
+from photogram.show.sketch.letters import NOWHERE
+from photogram.show.sketch.marks import Mark, Markers, Panel, Shades, around
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import FAINT, VERMILION
+from photogram.statistics.reliability import TESTABLE, noncentrality
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.show.page import Document
-    from photogram.show.sketch.plot import Plot
+ALIKE = 1.05  # largest ratio of standard deviations of patterns that count as equal
+MIN_IMPROVEMENT = 1.1  # ratio of standard deviations from which a known readout time is recommended
+MAX_UNCHECKED = 0.01  # share of image coordinates without a check from which more rays are recommended
+MIN_REDUNDANCY = 0.2  # redundancy number of control below which more control is recommended
+REMEDIES = {
+    **dict.fromkeys(("time-offset", "lever-arm", "gnss-drift", "boresight", "camera-point"), "strips"),
+    **dict.fromkeys(("camera-f", "camera-term", "readout-time"), "heights"),
+}
+"""Observations that detect errors of these types; other types need points."""
+SHARE = (Axis("", "", small="percent", factor=100.0),)
+IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
+MOTION_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
+_PANEL_INCHES = 6.0  # Longer side of a panel
+_MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
 
 
 @dataclass(frozen=True)
@@ -44,8 +77,6 @@ class Plan(Documented):
         """
         import pandas as pd  # pandas takes long to import
 
-        from photogram.planning.document import points_table
-
         frames = {pattern.name: points_table(pattern).frame() for pattern in self.patterns}
         table = pd.concat(frames, names=["pattern"]).reset_index(level="pattern")
         present = table.groupby("group")["points"].transform("max") > 0
@@ -53,8 +84,6 @@ class Plan(Documented):
 
     def document(self) -> Document:
         """Return the document of the plan."""
-        from photogram.planning.document import plan_document
-
         return plan_document(self.patterns)
 
     def plot(self) -> Plot:
@@ -65,8 +94,6 @@ class Plan(Documented):
         PhotogramError
             If the plan lacks new points.
         """
-        from photogram.planning.document import plan_sketch
-
         return plan_sketch(self.patterns)
 
 
@@ -99,14 +126,12 @@ def plan(
     made = []
     for name, block in patterns.items():
         tied = np.isfinite(block.point_sd).any() or np.isfinite(block.photo_position_sd).any()
-        # For trajectories, their given values.
-        if not (tied or on_shared(block).any()):
-            raise RankError(
-                phrase("error.at", what=name, message=phrase("plan.datum")), list(block.photo_ids), []
-            )
+        other = with_known_readout(block)
         try:
+            # For trajectories, their given values.
+            if not (tied or on_shared(block).any()):
+                raise RankError(phrase("plan.datum"), list(block.photo_ids), [])
             result = predict(block, threads=threads, progress=progress)
-            other = with_known_readout(block)
             known = None if other is None else predict(other, threads=threads, progress=progress)
             made.append(Pattern(name, result, known))
         except RankError as error:
@@ -114,3 +139,314 @@ def plan(
                 phrase("error.at", what=name, message=message_of(error)), error.photos, error.points
             ) from None
     return Plan(tuple(made))
+
+
+def plan_document(patterns: Sequence[Pattern]) -> Document:
+    """Return the document of a plan."""
+    title = "Expected standard deviation in height"
+    drawing = Drawing("picture-plan", title, about("plan.caption"), partial(plan_sketch, patterns))
+    new = [pattern.new_points.any() for pattern in patterns]
+    headline = _judgement(patterns) if all(new) else phrase("plan.compared.none")
+    return Document(
+        what="Prediction of a network before it is flown",
+        title=patterns[0].block.title,
+        judgements=[Judgement("Prediction", str(headline))],
+        advice=advice(patterns),
+        highlights=_highlights(patterns),
+        sections=[
+            Section("network", "Plan of the network", [drawing] if any(new) else []),
+            Section("comparison", "Side by side", [_comparison(patterns)] if all(new) else []),
+            Section("size", "How much", [_size(patterns)]),
+            _layers("points", "New points", patterns, _points, about("plan.points")),
+            _layers("photos", "Photos", patterns, _photos),
+            _layers("motion", "Motion", patterns, _motion),
+            _layers("control", "Control", patterns, _control, about("plan.control")),
+            _layers("undetected", "Undetected errors", patterns, _undetected, about("plan.undetected")),
+            remarks_section(_remarks(patterns)),
+        ],
+        details=[
+            _layers("multiples", "New points, in standard deviations of an image", patterns, _multiples)
+        ],
+        members=_members(patterns),
+    )
+
+
+def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
+    linear = patterns[0].block.linear_unit
+    units = {
+        "scale": f"{linear} on the ground for 1 mm in the photo",
+        "unit": f"{linear}: the standard deviation of image coordinates on the ground",
+        "points": f"standard deviations {linear}, detectable mm, effect standard deviations",
+        "photos": f"positions {linear}, angles rad",
+        "control": f"sd and detectable {linear}, effect standard deviations",
+        "undetected": f"change {linear} or rad, bias_to_noise and ratio standard deviations",
+    }
+    if any(pattern.motion for pattern in patterns):
+        units["motion"] = "as each says"
+    return {
+        "units": units,
+        "noncentrality": noncentrality(),
+        "unchecked_below": TESTABLE,
+        "next": [str(sentence) for sentence in advice(patterns)],
+        "patterns": [
+            {
+                **members(pattern, "name", "axes", "scale", "unit", title="block.title"),
+                "messages": [*map(str, pattern.result.messages)],
+                "photo_count": len(pattern.block.photo_ids),
+                "image_count": int(pattern.result.used_images.sum()),
+                "points": records(_points(pattern).columns),
+                "photos": [*map(vars, pattern.photos)],
+                "control": records(_control(pattern).columns),
+                "undetected": records(_undetected(pattern).columns),
+                **({"motion": [*map(vars, pattern.motion)]} if pattern.motion else {}),
+                **({"rms_sd_known_readout": known} if (known := pattern.known_rms_sd) else {}),
+            }
+            for pattern in patterns
+        ],
+    }
+
+
+def points_table(pattern: Pattern) -> Table:
+    """Return the quality of new points, one row per group, also empty groups."""
+    axes = tuple(Axis.of(axis, pattern.block.linear_unit) for axis in pattern.axes)
+    groups = partial(of_each, pattern.points)
+    columns = [
+        groups("grouping", (), "name", name="grouping"),
+        groups("group", (), "name", name="group", head="Group"),
+        groups("points", name="points", head="Points"),
+        groups("rms_sd", axes, "deviation", name="rms_sd", head="rms {}"),
+        groups("max_sd", axes, "deviation", name="max_sd", head="max {}"),
+        groups("redundancy", name="redundancy", head="Mean redundancy", decimals=3),
+        groups("unchecked", SHARE, "deviation", name="unchecked", head="Unchecked", decimals=0),
+        groups("detectable", IMAGE, "deviation", name="detectable", head="Detectable", decimals=1),
+        groups("effect", name="effect", head="Effect in sd", decimals=1),
+    ]
+    return Table("", pattern.name, columns)
+
+
+def _points(pattern: Pattern) -> Table:
+    table, groups = points_table(pattern), np.flatnonzero([group.points for group in pattern.points])
+    return replace(table, columns=chosen(table.columns, groups))
+
+
+def _multiples(pattern: Pattern) -> Table:
+    axes, (_, group, _, rms, largest, *_) = tuple(map(Axis, pattern.axes)), _points(pattern).columns
+    columns = [
+        replace(quantity, values=quantity.values / pattern.unit, axes=axes, kind="number", decimals=2)
+        for quantity in (rms, largest)
+    ]
+    return Table("", pattern.name, [group, *columns])
+
+
+def _photos(pattern: Pattern) -> Table:
+    turned = map(Axis.turned, ("omega", "phi", "kappa"))
+    axes = [*(Axis.of(name, pattern.block.linear_unit) for name in pattern.axes), *turned]
+    redundancy = of_each(pattern.photos, "redundancy", head="Mean redundancy of weighted values", decimals=3)
+    return _deviations(pattern, axes, [(each.rms_sd, each.max_sd) for each in pattern.photos], redundancy)
+
+
+def _motion(pattern: Pattern) -> Table:
+    units = [MOTION_UNITS.get(each.unit, (each.unit, 1.0)) for each in pattern.motion]
+    axes = [
+        Axis(each.unknown, small=unit, factor=factor)
+        for each, (unit, factor) in zip(pattern.motion, units, strict=True)
+    ]
+    sd = [(each.rms_sd, each.max_sd) for each in pattern.motion]
+    better = [*(None for _ in pattern.motion), *_improvements(pattern)]
+    for axis, known in zip(pattern.axes, pattern.known_rms_sd or (), strict=False):
+        name = f"{axis} of new points if the readout time is known"
+        axes.append(Axis.of(name, pattern.block.linear_unit))
+        sd.append((known, np.nan))
+    return _deviations(pattern, axes, sd, Quantity(better, head="Times better", decimals=2))
+
+
+def _deviations(
+    pattern: Pattern, axes: Sequence[Axis], sd: Sequence[tuple[float, float]], more: Quantity
+) -> Table:
+    """Return a table with one row per unknown and its unit."""
+    own, of, (rms, largest) = tuple(axes), np.arange(len(axes)), np.reshape(sd, (-1, 2)).T
+    columns = [
+        replace(component(own, of)[0], head="Unknown"),
+        Quantity(rms, own, "deviation", head="rms sd", of=of),
+        Quantity(largest, own, "deviation", head="Largest sd", of=of),
+        more,
+    ]
+    return Table("", pattern.name, columns)
+
+
+def _control(pattern: Pattern) -> Table:
+    length = (Axis.of("", pattern.block.linear_unit),)
+    components = partial(of_each, pattern.control)
+    columns = [
+        components("component", (), "name", head="Component"),
+        components("held", head="Weighted or fixed"),
+        components("sd", length, "deviation", head="sd a priori"),
+        components("redundancy", head="Mean redundancy", decimals=3),
+        components("detectable", length, "deviation", head="Detectable"),
+        components("effect", head="Effect in sd", decimals=1),
+    ]
+    shown = np.flatnonzero([quality.held for quality in pattern.control])
+    return Table("", pattern.name, columns, shown=shown)
+
+
+def _undetected(pattern: Pattern) -> Table:
+    found = pattern.hypotheses
+    if found is None:
+        return Table("", pattern.name, [Quantity([], kind="name", head="Error")])
+    table, members_only = found.external_reliability(found.effective), ("redundancy", "bias_to_noise")
+    columns = [replace(each, head="") if each.name in members_only else each for each in table.columns]
+    return replace(table, key="", title=pattern.name, columns=columns)
+
+
+def _layers(
+    key: str, title: str, patterns: Sequence[Pattern], table: Callable[[Pattern], Table], intro: str = ""
+) -> Section:
+    tables = [made for pattern in patterns if (made := table(pattern)).visible]
+    return Section(key, title, layered_tables(key, tables), intro)
+
+
+def _judgement(patterns: Sequence[Pattern]) -> Phrase:
+    heights = {pattern.name: pattern.points[-1].rms_sd[2] for pattern in patterns}
+    best, worst = min(heights, key=heights.__getitem__), max(heights, key=heights.__getitem__)
+    figures = {"rms": significant(heights[best], 3), "unit": patterns[0].block.linear_unit}
+    if heights[worst] <= ALIKE * heights[best]:
+        return phrase(f"plan.compared.{'alike' if len(patterns) > 1 else 'single'}", **figures)
+    figures |= {"best": best, "worst": worst, "other": significant(heights[worst], 3)}
+    return phrase("plan.compared.better", ratio=heights[worst] / heights[best], **figures)
+
+
+def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
+    unit = patterns[0].block.linear_unit
+    facts = []
+    for pattern in patterns:
+        if pattern.new_points.any():
+            x, y, z = pattern.points[-1].rms_sd
+            plane = f"{pattern.axes[0]} {significant(x, 2)}, {pattern.axes[1]} {significant(y, 2)} {unit}"
+            facts.append(Fact(f"rms in {pattern.axes[2]}, {pattern.name}", significant(z, 2), unit, plane))
+    error = significant(patterns[0].unit, 2)
+    return [*facts, Fact("An image error on the ground", error, unit, "standard deviation, mean of all")]
+
+
+def _comparison(patterns: Sequence[Pattern]) -> Table:
+    unit, names = patterns[0].block.linear_unit, [pattern.name for pattern in patterns]
+    groups = [pattern.points[-1] for pattern in patterns]
+    sd = np.array([np.ravel([group.rms_sd, group.max_sd], order="F") for group in groups])
+    least, most = sd.min(axis=0), sd.max(axis=0)
+    best = np.where(most > 1.005 * least, np.array(names)[sd.argmin(axis=0)], "no difference").tolist()
+    ratios = np.divide(most, least, where=least > 0, out=np.full(len(least), np.nan))
+    rows = [f"{kind} {axis}" for axis in patterns[0].axes for kind in ("rms", "largest")]
+    columns = [
+        Quantity(rows, kind="name", head="Standard deviation"),
+        *(Quantity(own, head=f"{name} {unit}") for name, own in zip(names, sd, strict=True)),
+        Quantity(best, kind="name", head="Best"),
+        Quantity(ratios, head="Largest over smallest", decimals=2),
+    ]
+    return Table("", "All new points", columns)
+
+
+def _size(patterns: Sequence[Pattern]) -> Table:
+    linear = patterns[0].block.linear_unit
+    rows = {
+        "Photos": [len(each.block.photo_ids) for each in patterns],
+        "New points": [each.new_points.sum() for each in patterns],
+        "Control points": [(each.result.used_points & ~each.new_points).sum() for each in patterns],
+        "Points left out": [len(each.result.dropped) for each in patterns],
+        "Image points": [each.result.used_images.sum() for each in patterns],
+        f"1 mm in the photo on the ground, {linear}": [significant(each.scale) for each in patterns],
+        f"sd of image coordinates on the ground, {linear}": [significant(each.unit, 3) for each in patterns],
+    }
+    values = np.array([*rows.values()], dtype=str).T
+    columns = [Quantity(own, head=each.name) for each, own in zip(patterns, values, strict=True)]
+    return Table("", "How much", [Quantity([*rows], kind="name", head=" "), *columns])
+
+
+def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
+    """Return the next steps that would make the network check itself."""
+    phrases = []
+    for pattern in patterns:
+        of_pattern = partial(phrase, pattern=pattern.name)
+        if (unchecked := pattern.points[-1].unchecked) > MAX_UNCHECKED:  # NaN without new points
+            phrases.append(of_pattern("plan.unchecked", percent=100 * unchecked))
+        weak = [each.component for each in pattern.control if each.held and each.redundancy < MIN_REDUNDANCY]
+        if weak:
+            phrases.append(of_pattern("plan.control", components=weak))
+        if found := pattern.hypotheses:
+            worst: dict[str, int] = {}
+            for row in found.harmful:
+                worst.setdefault(REMEDIES.get(str(found.code[row]), "points"), row)
+            phrases += [
+                of_pattern(f"plan.undetected.{remedy}", error=found.sentence(row))
+                for remedy, row in worst.items()
+            ]
+            if assumed := found.assumed(FEWEST):
+                phrases.append(of_pattern("plan.assumed", errors=assumed))
+        if (ratio := max(_improvements(pattern), default=1.0)) > MIN_IMPROVEMENT:
+            sd = next(quality.rms_sd for quality in pattern.motion if quality.unit == "s")
+            phrases.append(of_pattern("plan.readout", sd=1e3 * sd, ratio=ratio))
+    return phrases
+
+
+def _improvements(pattern: Pattern) -> list[float]:
+    known = pattern.known_rms_sd or ()
+    return [sd / better for sd, better in zip(pattern.points[-1].rms_sd, known, strict=False)]
+
+
+def _remarks(patterns: Sequence[Pattern]) -> list[str]:
+    """Return each message once, with the names of its patterns unless it concerns all."""
+    names: dict[str, list[str]] = {}
+    for pattern in patterns:
+        for message in pattern.result.messages:
+            names.setdefault(str(message), []).append(pattern.name)
+    return [
+        text if len(concerned) == len(patterns) else f"{'; '.join(concerned)}: {text}"
+        for text, concerned in names.items()
+    ]
+
+
+def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
+    """Return a plot with one panel per pattern and common scales."""
+    heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
+    if heights.size == 0:
+        raise PhotogramError(phrase("plan.new-points"))
+    plan = np.vstack([pattern.point_plan[pattern.result.used_points] for pattern in patterns])
+    photos = np.vstack([pattern.photo_plan for pattern in patterns])
+    limits = around(np.vstack([plan, photos]), 0.05)
+    label = f"expected standard deviation in height, {patterns[0].block.linear_unit}"
+    shades = Shades(float(heights.min()), float(heights.max()), label)
+    panels = [_panel(pattern, limits, shades) for pattern in patterns]
+    # The legend beside the last panel names the control of all panels.
+    known = {mark.label for mark in panels[-1].labelled}
+    labelled = {mark.label: mark for panel in panels for mark in panel.marks if isinstance(mark, Markers)}
+    more = [replace(mark, places=NOWHERE) for label, mark in labelled.items() if label not in {"", *known}]
+    panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside")
+    width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()
+    stacked = width > _MAX_SIDE_BY_SIDE * height
+    rows, columns = (len(panels), 1) if stacked else (1, len(panels))
+    across = max(2 * _PANEL_INCHES if stacked else min(_PANEL_INCHES, _PANEL_INCHES * width / height), 3.5)
+    up = min(across * height / width, _PANEL_INCHES)
+    size = columns * (across + 0.5) + 3.0, rows * (up + 1.0) + 0.4
+    return Plot(*size, panels, columns, shades)
+
+
+def _panel(pattern: Pattern, limits: Floats, shades: Shades) -> Panel:
+    new, unit, plan = pattern.new_points, pattern.block.linear_unit, pattern.point_plan
+    sd = pattern.point_sd[new, 2]
+    size = float(np.sqrt(np.clip(2e4 / max(1, len(sd)), 2, 30)))
+    marks: list[Mark] = [
+        # The worst points are drawn on top, because a planner looks for them.
+        Markers(plan[new], "o", size, values=sd, shades=shades, rising=True, layer=1.0),
+        Markers(pattern.photo_plan, "+", 4.0, FAINT, label="photo"),
+    ]
+    held = np.isfinite(pattern.block.point_sd) & pattern.result.used_points[:, np.newaxis]
+    plane, height = held[:, :2].any(axis=1), held[:, 2]
+    for name, shape, rows in (
+        ("full control", "^", plane & height),
+        ("height control", "o", height & ~plane),
+        ("plane control", "s", plane & ~height),
+    ):
+        if rows.any():
+            marks.append(Markers(plan[rows], shape, 7.7, VERMILION, "white", 1.6, label=name))
+    quality = pattern.points[-1]
+    figures = f"rms {quality.rms_sd[2]:#.3g} {unit}, largest {quality.max_sd[2]:#.3g} {unit}"
+    across, up = (f"{axis}, {unit}" for axis in pattern.axes[:2])
+    return Panel(limits, marks, f"{pattern.name}\n{figures}", across, up, equal=True)

@@ -24,7 +24,7 @@ from photogram.network.hull import hull
 from photogram.network.motion import on_shared, timed_images
 from photogram.network.trajectories import Readout
 from photogram.results.hypotheses import Hypotheses
-from photogram.results.hypothesis_facts import block_facts
+from photogram.results.network_trial import block_facts
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
@@ -250,23 +250,18 @@ class Pattern:
         block, trajectories = self.block, self.result.trajectories
         if not block.timed:
             return []
-        found = [
-            MotionQuality(f"readout time, {each.name}", "s", float(each.sd[0]), float(each.sd[0]))
-            for each in self.result.unknowns
-            if isinstance(each.given, Readout) and not each.given.is_held
-        ]
-        own = [trajectories[each.photo] for each in block.timed if each.trajectory is None]
-        linear = block.linear_unit
-        if own:
-            found.append(_quality("velocity", f"{linear}/s", np.array([each.position_sd[1] for each in own])))
-            found.append(_quality("rate", "rad/s", np.array([each.rotation_sd[1] for each in own])))
-        if sds := [
-            trajectories[name].poses(times).sd for name, times in _times_on_trajectories(block).items()
-        ]:
+        unknowns, linear = self.result.unknowns, block.linear_unit
+        free = [each for each in unknowns if isinstance(each.given, Readout) and not each.given.is_held]
+        found = [(f"readout time, {each.name}", "s", each.sd[:1]) for each in free]
+        if own := [trajectories[each.photo] for each in block.timed if each.trajectory is None]:
+            found.append(("velocity", f"{linear}/s", np.array([each.position_sd[1] for each in own])))
+            found.append(("rate", "rad/s", np.array([each.rotation_sd[1] for each in own])))
+        times = _times_on_trajectories(block).items()
+        if sds := [trajectories[name].poses(own).sd for name, own in times]:
             sd = np.concatenate(sds)
-            found.append(_quality("position of trajectories", linear, sd[:, :3]))
-            found.append(_quality("rotation of trajectories", "rad", sd[:, 3:]))
-        return found
+            found.append(("position of trajectories", linear, sd[:, :3]))
+            found.append(("rotation of trajectories", "rad", sd[:, 3:]))
+        return [MotionQuality(name, unit, _rms(sd), float(sd.max())) for name, unit, sd in found]
 
     @cached_property
     def hypotheses(self) -> Hypotheses | None:
@@ -363,26 +358,18 @@ def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
     the interior, points beyond one side at an edge, and points beyond two sides in a corner. So a single
     strip has flanks and ends, but hardly an interior.
     """
-    axes = _axes(stations)
+    # One of its sides is on the convex hull (Freeman and Shapira, 1975).
+    corners, axes = hull(stations), np.eye(2)
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(*sides.T)
+    if (lengths > 0).any():
+        c, s = (sides[lengths > 0] / lengths[lengths > 0, np.newaxis]).T
+        frames = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
+        extents = np.ptp(np.einsum("kij,nj->kin", frames, corners), axis=2)
+        axes = frames[np.argmin(extents.prod(axis=1))]
     turned, extent = points @ axes.T, stations @ axes.T
     beyond = (turned < extent.min(axis=0)) | (turned > extent.max(axis=0))
     return np.asarray(np.array(LOCATIONS)[2 - beyond.sum(axis=1)])
-
-
-def _axes(points: Floats) -> Floats:
-    """Return unit vectors (rows) along the smallest rectangle around points.
-
-    One of its sides is on the convex hull (Freeman and Shapira, 1975).
-    """
-    corners = hull(points)
-    sides = np.roll(corners, -1, axis=0) - corners
-    lengths = np.hypot(*sides.T)
-    if not (lengths > 0).any():
-        return np.eye(2)
-    c, s = (sides[lengths > 0] / lengths[lengths > 0, np.newaxis]).T
-    frames = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
-    extents = np.ptp(np.einsum("kij,nj->kin", frames, corners), axis=2)
-    return np.asarray(frames[np.argmin(extents.prod(axis=1))])
 
 
 def _times_on_trajectories(block: Block) -> dict[str, Floats]:
@@ -395,10 +382,6 @@ def _times_on_trajectories(block: Block) -> dict[str, Floats]:
             found.setdefault(trajectory.name, []).append(time + scale * since)
     spans = {name: np.concatenate(times) for name, times in found.items()}
     return {name: np.linspace(times.min(), times.max(), PLACES) for name, times in spans.items()}
-
-
-def _quality(unknown: str, unit: str, sd: Floats) -> MotionQuality:
-    return MotionQuality(unknown, unit, _rms(sd), float(sd.max()))
 
 
 def _triple(reduce: Callable[[Floats], float], sd: Floats) -> Triple:

@@ -11,10 +11,9 @@ from photogram.errors import InputError
 from photogram.plots.correlations import correlations
 from photogram.plots.distortion import distortion
 from photogram.plots.features import features
-from photogram.plots.films import films
 from photogram.plots.network import network
 from photogram.plots.redundancy import redundancy
-from photogram.plots.residuals import residuals
+from photogram.plots.residuals import films, residuals
 from photogram.plots.tests import tests
 from photogram.plots.trajectories import trajectory
 from photogram.plots.undetected import undetected

@@ -9,11 +9,10 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
-from photogram.plots.cells import Cells, cells
 from photogram.plots.network import View
 from photogram.plots.picture_data import Images, Pictured
 from photogram.plots.residuals import frame
-from photogram.plots.selection import thinned
+from photogram.plots.selection import Cells, cells, thinned
 from photogram.show.sketch.marks import Mark, Markers, Mesh, Panel, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.words import phrase

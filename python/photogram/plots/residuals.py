@@ -1,4 +1,4 @@
-"""Image residuals as a field over the frame, camera by camera."""
+"""Residuals of images and fiducial marks, and film patterns, as fields over the frame of each camera."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from photogram.arguments.arrays import bounds
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
-from photogram.plots.cells import Cells, cells
-from photogram.plots.picture_data import Images, display_unit
-from photogram.show.sketch.marks import Arrows, Mark, Markers, Panel, ScaleBar
-from photogram.show.sketch.plot import Plot
+from photogram.plots.picture_data import Images, VectorField, display_unit
+from photogram.plots.selection import Cells, cells, first_panels
+from photogram.show.sketch.marks import Arrows, Mark, Markers, Names, Panel, ScaleBar, around
+from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import FAINT, INK, MARKED, round_length
 
 MAX_SINGLE_IMAGES = 900  # More image points of a camera are drawn as means of cells
@@ -22,6 +22,9 @@ MAX_CAMERAS = 6  # Cameras with the most observations
 MIN_IMAGES = 8
 MARGIN = 0.06  # Around the frame, as a part of its longer side
 LONGEST_VECTOR = 2.5  # Multiple of the typical vector; longer vectors are cut short
+MAX_FIELDS = 6  # Of films
+MARGIN_OF_FIELD = 0.14  # Margin around the points of a film, as a part of their extent
+LONGEST_OF_FIELD = 0.11  # Its longest vector, as a part of the extent of the points
 LEVEL = 0.01  # Probability of a false alarm in any cell of a panel
 
 
@@ -119,3 +122,31 @@ def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, str | list[str
     if beyond.any():
         said.append(f"{int(beyond.sum())} of {len(filled)} are larger than chance gives (coloured)")
     return grid.middles[filled], means[filled], colours, said
+
+
+def films(result: Any) -> Plot:
+    """Plot fiducial residuals, mean over photos of each camera, and film patterns.
+
+    Raises
+    ------
+    InputError
+        If there are neither marks nor patterns.
+    """
+    panels = first_panels("films", "fields", result._plot_data().films, MAX_FIELDS, _vectors)
+    return side_by_side(panels, 2, 4.8)
+
+
+def _vectors(each: VectorField) -> Panel:
+    extent = max(float(np.ptp(each.places, axis=0).max()), 1e-12)
+    marks: list[Mark] = [Markers(each.places, ".", 4.0, FAINT, layer=1.0)]
+    longest = float(np.hypot(*each.vectors.T).max(initial=0.0))
+    bars: list[ScaleBar] = []
+    if longest > 0:
+        scale = LONGEST_OF_FIELD * extent / longest
+        marks.append(Arrows(each.places, scale * each.vectors, INK, 0.004))
+        bar = round_length(1e3 * longest)
+        bars = [(1e-3 * scale * bar, INK, f"{bar:g} µm")]
+    if each.labels:
+        marks.append(Names(each.places, each.labels, [INK] * len(each.labels)))
+    limits = around(each.places, MARGIN_OF_FIELD)
+    return Panel(limits, marks, each.title, "x, mm", "y, mm", equal=True, bars=bars)

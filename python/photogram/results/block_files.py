@@ -27,12 +27,11 @@ from photogram.network import (
     rigs,
 )
 from photogram.network import trajectories as motion
-from photogram.network.block import Block
 from photogram.network.motion import scanners
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Unknown
-from photogram.results import datum, features, iteration, observation_kinds, unknowns
+from photogram.results import datum, features, parts
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -94,30 +93,24 @@ def block_files(result: Result) -> dict[str, Content]:
         "datum": str(result.datum),
         "degrees_of_freedom": result.degrees_of_freedom,
     }
-    return written(result, KIND, "block", _parts(block), leading, tables, block.frame, summary, STANDS)
-
-
-def _parts(block: Block) -> dict[str, list[Part]]:
-    observed = [
-        name for name in ("positions", "attitudes") if getattr(block, f"photo_{name}_observed") is not None
-    ]
-    parts = parts_of_block(
+    declared = parts_of_block(
         geographic=block.geographic,
         unit=block.linear_unit,
         image_unit=block.image_unit,
         distances=block.principal_distances is not None,
-        observed=observed,
+        observed=[
+            name
+            for name in ("positions", "attitudes")
+            if getattr(block, f"photo_{name}_observed") is not None
+        ],
     )
-    scanned = scanners(block)[block.image_photos]
+    scanned, images = scanners(block)[block.image_photos], declared["images"]
     if scanned.any():
         # Image coordinates of spherical cameras are angles; residuals and deviations are in the focal plane.
         units = ("1", "1") if scanned.all() else (f"{block.image_unit}; 1 of scanners",) * 2
-        xy, *others = parts["images"]
-        parts["images"] = [
-            replace(xy, units=units, description="measured {}; of scanners sample (x) and line (y)"),
-            *others,
-        ]
-    return parts
+        description = "measured {}; of scanners sample (x) and line (y)"
+        images[0] = replace(images[0], units=units, description=description)
+    return written(result, KIND, "block", declared, leading, tables, block.frame, summary, STANDS)
 
 
 def parts_of_block(
@@ -165,10 +158,7 @@ def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
 
 @dataclass(frozen=True, eq=False)
 class KeptTrajectory(Stand):
-    """A stored trajectory: its definition and its computed coefficients.
-
-    A recreated trajectory has new coefficients, which are replaced by shared ones.
-    """
+    """A stored trajectory: its definition and its coefficients, which others share."""
 
     name: str
     table: motion.Table
@@ -203,7 +193,7 @@ STANDS: dict[type, Callable[[Any], Stand]] = {motion.Trajectory: KeptTrajectory.
 
 MODULES = (
     *(cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
-    *(refraction, rigs, datum, features, iteration, observation_kinds, unknowns),
+    *(refraction, rigs, datum, features, parts),
 )
 CLASSES = (KeptTrajectory, Message, Phrase, Removed, Undetermined)
 

@@ -15,6 +15,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
 from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
@@ -57,7 +58,6 @@ class ParameterTest:
 
     @property
     def change(self) -> float:
-        """Adjusted minus given value."""
         return self.value - self.given
 
     @property
@@ -164,6 +164,11 @@ def calibrations(result: Result) -> list[Calibration]:
     found = []
     for number, each in enumerate(cameras):
         parameters = tuple(_parameter(result, each, k) for k in each.estimated)
+        # The least significant term; radial terms in order of decreasing power.
+        lens = [test for test in parameters if test.is_lens]
+        held_up = [test.name for test in lens if re.fullmatch(r"[Kk]\d", test.name)][:-1]
+        candidates = [test for test in lens if not test.significant and test.name not in held_up]
+        removable = max(candidates, key=lambda test: test.probability, default=None)
         found.append(
             Calibration(
                 camera=each,
@@ -172,7 +177,7 @@ def calibrations(result: Result) -> list[Calibration]:
                 correlations=_correlations(each),
                 poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
                 terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
-                removable=_removable(parameters),
+                removable=removable and removable.name,
             )
         )
     return found
@@ -183,22 +188,13 @@ def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
     value, sd = float(camera.values[k]), float(camera.sd[k])
     reference = given if name in INTERIOR else 0.0
     t = (value - reference) / sd if sd > 0 else math.nan
-    freedom = result.freedom_of_scale
+    freedom, given_sd = result.freedom_of_scale, float(camera.given.deviations[k])
     probability = math.erfc(abs(t) / math.sqrt(2)) if math.isinf(freedom) else _photocore.student(t, freedom)
-    own = camera.information[k] * camera.cofactors[k, k]
-    return ParameterTest(
-        name=name,
-        unit=camera.camera.unit_of(name),
-        value=value,
-        sd=sd,
-        given=given,
-        given_sd=float(camera.given.deviations[k]),
-        test_value=t,
-        probability=probability,
-        multiple_correlation=math.sqrt(max(0.0, 1.0 - 1.0 / own)) if own > 0 else math.nan,
-        redundancy=float(camera.redundancy[k]),
-        gain=t * t * result.covariance_scale,
-    )
+    own, redundancy = camera.information[k] * camera.cofactors[k, k], float(camera.redundancy[k])
+    correlation = math.sqrt(max(0.0, 1.0 - 1.0 / own)) if own > 0 else math.nan
+    gain, unit = t * t * result.covariance_scale, camera.camera.unit_of(name)
+    numbers = value, sd, given, given_sd, t, probability, correlation, redundancy, gain
+    return ParameterTest(name, unit, *numbers)
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
@@ -218,14 +214,10 @@ def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
 
 
 def _correlations(camera: AdjustedCamera) -> tuple[Correlation, ...]:
-    table, rows = camera.correlations, camera.estimated
-    pairs = [
-        Correlation(camera.names[i], camera.names[j], float(table[i, j]))
-        for place, i in enumerate(rows)
-        for j in rows[place + 1 :]
-        if abs(table[i, j]) > CORRELATED
-    ]
-    return tuple(sorted(pairs, key=lambda pair: -abs(pair.coefficient)))
+    table, names = camera.correlations, camera.names
+    pairs = [(i, j) for i, j in combinations(camera.estimated, 2) if abs(table[i, j]) > CORRELATED]
+    pairs.sort(key=lambda pair: -abs(table[pair]))
+    return tuple(Correlation(names[i], names[j], float(table[i, j])) for i, j in pairs)
 
 
 def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> tuple[PoseCorrelation, ...]:
@@ -246,21 +238,11 @@ def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> 
     return tuple(sorted(pairs, key=lambda pair: -pair.coefficient))
 
 
-def _removable(parameters: tuple[ParameterTest, ...]) -> str | None:
-    """Return the least significant term; radial terms in order of decreasing power."""
-    lens = [each for each in parameters if each.is_lens]
-    radial = [each.name for each in lens if re.fullmatch(r"[Kk]\d", each.name)]
-    held_up = set(radial[:-1])
-    candidates = [each for each in lens if not each.significant and each.name not in held_up]
-    return max(candidates, key=lambda each: each.probability).name if candidates else None
-
-
 LISTED = 12  # Number of cameras with individual tables
 RADII = 9  # Rows of a distortion curve
 
 
 def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
-    """Return the section of adjusted and fixed cameras."""
     found = calibrations(result)
     shown, note = found[:LISTED], "the table of cameras has all"
     law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"

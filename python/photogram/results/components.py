@@ -95,11 +95,7 @@ class VarianceComponents(Judged, Documented, Brief):
         return components_table(self).frame()
 
     def _findings(self) -> Findings:
-        """Return the components and the tests of the adjustment with their weights.
-
-        With the given weights, if optimistic, good observations would be rejected as gross errors. The global
-        test uses the given weights.
-        """
+        """Return tests with these weights; optimistic given weights reject good observations."""
         estimated = [
             GroupFactor(each.name, each.factor_of_sd, each.interval_of_sd, each.worth_changing)
             for each in self.components

@@ -39,7 +39,6 @@ class Selected:
     shapes: list[tuple[int, ...]]  # Shape of each item: (k,) for one name, (n, k) for several
 
     def arrays(self, values: Floats) -> list[Floats]:
-        """Return values by item."""
         parts, start = [], 0
         for shape in self.shapes:
             size = int(np.prod(shape))

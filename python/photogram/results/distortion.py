@@ -26,7 +26,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -80,7 +80,6 @@ class DistortionCurve:
 
 
 def rows_of_images(result: Result, camera: AdjustedCamera) -> Indices:
-    """Return the indices of the used images of a camera."""
     block = result.block
     row = block.camera_names.index(camera.name)
     return np.flatnonzero(result.used_images & (np.asarray(block.photo_cameras) == row)[block.image_photos])
@@ -166,10 +165,7 @@ def distortion_curve(
 
 
 def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> Floats:
-    """Return (r,) standard deviations of a curve with (r, t) partials.
-
-    `covariance` is the matrix of all parameters of the camera.
-    """
+    """Return (r,) sd of a curve with (r, t) partials by the covariance of all parameters of the camera."""
     variances = np.einsum("ni,ij,nj->n", partials, covariance[np.ix_(terms, terms)], partials)
     return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -12,21 +11,14 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.structuring import structure
+from photogram.results import network_document as of_network
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
-from photogram.results.axes import point_axes
 from photogram.results.calibration import calibration_members, cameras_section, gains_section
-from photogram.results.check_points import observed_control
+from photogram.results.datum import observed_control
 from photogram.results.features import features_document, features_section
 from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
-from photogram.results.network_document import (
-    drawings,
-    network_document,
-    network_members,
-    problems_of,
-    size_section,
-)
-from photogram.results.network_tables import control
+from photogram.results.network_tables import control, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, about, significant
@@ -38,7 +30,7 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite
 def block_document(result: Result) -> Document:
-    pictures, (head, figures) = drawings(result), bandwidths(result)
+    pictures, (head, figures) = of_network.drawings(result), bandwidths(result)
     shown, note = notable(result.unknowns)
     tables = [
         Table("unknowns", "Common unknowns", declared.unknowns(shown), note),
@@ -55,7 +47,7 @@ def block_document(result: Result) -> Document:
     ]
     title, columns = "Redundancy by kind of observation", declared.redundancy_by_kind(result)
     redundancy, datum = Table("redundancy-by-kind", title, columns, about("redundancy-by-kind")), result.datum
-    return network_document(
+    return of_network.network_document(
         result,
         "Adjustment of a block of photos",
         _size_section(result),
@@ -110,12 +102,19 @@ def _size_section(result: Result) -> Section:
         "unheld components": declared.unheld,
         "check points": declared.check_points,
     }
+    axes, lengths, unit = point_axes(result.block), result._terms.lengths, result.block.linear_unit
     for what, table in tables.items():
         differences = named(table(result), "d").values
         values = [rms_of(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
-            good.append(Fact(f"rms of {what}", ", ".join(_differences(result, values))))
-    return size_section(result, size_of(result), more, good)
+            texts = [
+                f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
+                + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")
+                for k, (axis, value) in enumerate(zip(axes, values, strict=True))
+                if math.isfinite(value)
+            ]
+            good.append(Fact(f"rms of {what}", ", ".join(texts)))
+    return of_network.size_section(result, size_of(result), more, good)
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:
@@ -143,10 +142,7 @@ def size_of(result: Result) -> list[tuple[str, str]]:
 
 
 def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
-    """Return the bandwidths in the 1987 program, in input order and in chosen order.
-
-    A sentence, and names with values.
-    """
+    """Return a sentence, and the bandwidths of the 1987 program in input order and in chosen order."""
     images = result.block.image_photos, result.block.image_points
     figures = []
     for name, order in (("of the input", None), ("chosen", result.photo_order)):
@@ -160,16 +156,6 @@ def rms_of(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 
-def _differences(result: Result, values: Iterable[float]) -> list[str]:
-    axes, lengths, unit = point_axes(result.block), result._terms.lengths, result.block.linear_unit
-    return [
-        f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
-        + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")
-        for k, (axis, value) in enumerate(zip(axes, values, strict=True))
-        if math.isfinite(value)
-    ]
-
-
 def block_members(result: Result) -> dict[str, Any]:
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
     test = result.global_test
@@ -179,7 +165,7 @@ def block_members(result: Result) -> dict[str, Any]:
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
     )
     return {
-        **network_members(result, of_photos),
+        **of_network.network_members(result, of_photos),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {
@@ -194,7 +180,7 @@ def block_members(result: Result) -> dict[str, Any]:
         },
         "datum": result.datum.document(),
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
-        "problems": problems_of(result),
+        "problems": of_network.problems_of(result),
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
         "weighted_sum_of_squares": members(result.sums_of_squares, *_SUMS),
         "redundancy": result.redundancies and members(result.redundancies, *_SUMS),
@@ -209,7 +195,6 @@ def block_members(result: Result) -> dict[str, Any]:
 
 
 def _of_some(result: Result) -> dict[str, Any]:
-    """Return the members that only some blocks have."""
     found: dict[str, Any] = {}
     if result.cameras:
         found["cameras"] = [

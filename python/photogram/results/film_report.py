@@ -9,7 +9,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.films import Film, FilmPlacement, FilmSize, Pattern, Readings, Scanner
+from photogram.network.films import Film, FilmPlacement, FilmSize, Readings, Scanner
 from photogram.network.observations import FILM, Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
@@ -90,28 +90,22 @@ def mean_mark_residuals(result: Result) -> list[VectorField]:
 
 def film_patterns(result: Result) -> list[VectorField]:
     """Return the systematic deformation of each film with a pattern, over its format."""
-    found: dict[int, VectorField] = {}
-    for _, film in result.films:
-        pattern = film.pattern
-        if pattern is not None and id(pattern) not in found:
-            found[id(pattern)] = _deformation(result, pattern)
-    return list(found.values())
-
-
-def _deformation(result: Result, pattern: Pattern) -> VectorField:
-    """Return D(q) over the format: reading of an otherwise unchanged film, minus q."""
-    own = {id(each.given): each.position for each in result.unknowns}
-    numbers = np.asarray(pattern.numbers)
-    low, high = np.full(2, -numbers[0]), np.full(2, numbers[0])
-    if pattern.kind == "grid":
-        low, high = numbers[:2], numbers[:2] + (numbers[4:] - 1) * numbers[2:4]
-    across, up = np.linspace(low, high, STEPS).T
-    places = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
-    still = Film(FilmPlacement("still"), FilmSize("still"), Scanner("still"), Readings(), pattern=pattern)
-    vectors = np.array([own.get(id(each), each.position) for each in still.unknowns])
-    readings, _ = _photocore.film_readings(still.numbers(), vectors, places)
-    name = pattern.weights[0].name
-    return VectorField(f"{name}: pattern {pattern.kind}", places, readings - places)
+    found, own = [], {id(each.given): each.position for each in result.unknowns}
+    patterns = {id(film.pattern): film.pattern for _, film in result.films if film.pattern is not None}
+    for pattern in patterns.values():
+        numbers = np.asarray(pattern.numbers)
+        low, high = np.full(2, -numbers[0]), np.full(2, numbers[0])
+        if pattern.kind == "grid":
+            low, high = numbers[:2], numbers[:2] + (numbers[4:] - 1) * numbers[2:4]
+        across, up = np.linspace(low, high, STEPS).T
+        places = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
+        # D(q) is the reading of an otherwise unchanged film, minus q.
+        still = Film(FilmPlacement("still"), FilmSize("still"), Scanner("still"), Readings(), pattern=pattern)
+        vectors = np.array([own.get(id(each), each.position) for each in still.unknowns])
+        readings, _ = _photocore.film_readings(still.numbers(), vectors, places)
+        title = f"{pattern.weights[0].name}: pattern {pattern.kind}"
+        found.append(VectorField(title, places, readings - places))
+    return found
 
 
 _UNITS = ("mm", "mm", "rad", "", "", "")
@@ -150,10 +144,7 @@ def _photos(result: Result) -> Quantity:
 
 
 def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
-    """Return the marks that were read only on other photos of a camera, by photo row.
-
-    The halves of a joined scan count as one photo.
-    """
+    """Return marks read on other photos of a camera only; halves of a scan are one photo."""
     cameras, names = result.block.photo_cameras, result.block.camera_names
     of = {row: 0 if cameras is None else int(cameras[row]) for row, _ in result.films}
     on = {each.photo: each.frame for each in result.block.mounts}

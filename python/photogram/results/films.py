@@ -14,8 +14,7 @@ from photogram.network.block import Block
 from photogram.network.film_reduction import Affine, affine_form
 from photogram.network.films import Film, Mark, Scan
 from photogram.network.observations import Fiducial
-from photogram.results.observation_kinds import ObservedKind
-from photogram.results.unknowns import AdjustedUnknown
+from photogram.results.parts import AdjustedUnknown, ObservedKind
 
 
 class OnFilm:

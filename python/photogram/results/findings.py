@@ -13,12 +13,12 @@ from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Undetermined
 from photogram.network.block import Block
-from photogram.results.axes import point_axes
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
 from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
-from photogram.results.tests import Tests
+from photogram.results.tables import Tests
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text, TypeFactor
 from photogram.statistics.limits import GlobalTest, global_test
@@ -79,10 +79,7 @@ def network_findings(
 
 
 def type_factors(tests: Tests, unit: str) -> list[TypeFactor]:
-    """Return the sums of squares and redundancy numbers of all observed types.
-
-    `unit` is the unit of image coordinates.
-    """
+    """Return the sums of squares and redundancy numbers of all observed types; `unit` is that of images."""
     found = []
     for each in tests.normal:
         for kind, components in each.groups.items():

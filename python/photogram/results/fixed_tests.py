@@ -9,7 +9,7 @@ were free (Rao's score, :func:`photogram.score_test`). T is chi-square with the 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,15 +48,10 @@ class Held:
 
 
 def held_tested(result: Result) -> list[Tested]:
-    """Return tests of fixed stations and points with the worst images, if required.
-
-    Empty if the adjustment is accepted, has not converged, has no covariances, or was done in parts.
-    """
+    """Return tests of fixed stations and points with the worst images, if required."""
     if not result.WHOLE:
         return []
-    return held_tests(
-        result, lambda of_images: _suspected(result, of_images), lambda: station_partials(result)
-    )
+    return held_tests(result, partial(_suspected, result), partial(station_partials, result))
 
 
 def held_tests(
@@ -64,10 +59,10 @@ def held_tests(
     suspected_by: Callable[[Floats], Sequence[Held]],
     partials_of: Callable[[], Floats],
 ) -> list[Tested]:
-    """Return the test T of each fixed item, if residuals are too large.
+    """Return the test T of each fixed item that (m,) squares of images suspect, if residuals are too large.
 
-    `suspected_by` returns the items to test for (m,) weighted squares of the images. `partials_of` returns
-    (p, m, 2) partials of the images by the unknowns of their photos; each item has indices of these.
+    `partials_of` returns (p, m, 2) partials of the images by the unknowns of photos; items have indices of
+    these.
     """
     if result.loss or not is_suspected(result):
         return []
@@ -104,10 +99,7 @@ def is_suspected(result: AdjustedNetwork) -> bool:
 
 
 def held_remark(found: Sequence[Tested], largest: float) -> list[Phrase]:
-    """Return a message if a fixed value explains more than any removed observation.
-
-    `found` are its tests in the adjustment of all observations, `largest` is the largest T of removed ones.
-    """
+    """Return a message if a fixed value has a larger T than all removed observations."""
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
         return []
@@ -148,11 +140,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
 
 
 def station_partials(result: Result) -> Floats:
-    """(6, m, 2) partials of images by coordinates and small rotations of stations.
-
-    Partials by point coordinates have the opposite sign. NaN for scanners, which have several stations.
-    Photos with a rolling shutter are used at their first line.
-    """
+    """(6, m, 2) partials of images by coordinates and rotations of stations; NaN for scanners."""
     plain, seen = seen_without_lenses(as_adjusted(result))
     block = result.block
     if not seen.any():
@@ -187,12 +175,7 @@ def as_adjusted(result: Result, *, free: bool = False) -> Block:
 
 
 def fall_by_lens(result: Result, images: Bools) -> float:
-    """Return the decrease of Omega with a separate lens model for (m,) `images`.
-
-    Rao's score (:class:`Scores`) of radial and tangential terms, principal point and distance about the
-    centre of the frame, for any camera model; of the radial terms only if unknowns absorb others. 0 if it is
-    not known.
-    """
+    """Return the decrease of Omega (Rao) with a separate lens model for (m,) `images`; 0 if unknown."""
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0
     block, own = result.block, images & result.used_images

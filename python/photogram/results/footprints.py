@@ -49,10 +49,9 @@ class Footprints:
 
 
 def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ()) -> Footprints:
-    """Return footprints of adjusted photos on level planes at their point heights.
+    """Return footprints of adjusted photos on level planes at the heights of their points.
 
-    `sizes` are widths and heights of the images of each camera in the unit of image coordinates. The default
-    is the extent of the measurements on all photos of the camera.
+    `sizes` are widths and heights of the images of each camera; the default is the extent of measurements.
     """
     block = as_adjusted(result, free=True)
     axes = local_axes(block)
@@ -104,10 +103,9 @@ def grounds(result: Result, heights: Floats) -> Floats:
 
 
 def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = ()) -> Floats:
-    """Return (k, 4) minimum x and y, maximum x and y of the camera frames of a block.
+    """Return (k, 4) minimum x and y, maximum x and y of the camera frames of a block, without scanners.
 
     Pixels of cameras with y downwards are measured from the corner, all other coordinates from the centre.
-    Strips of scanners are not frames.
     """
     cameras, photo_cameras = block.core_cameras()
     block = of_pictures(block)
@@ -175,10 +173,7 @@ def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Elli
 
 
 def metric_covariances(result: Result, *, photos: bool = False) -> Floats:
-    """Return (n, 3, 3) covariances of points or stations in the linear unit.
-
-    The axes are X, Y, Z, or east, north and up in geographic space.
-    """
+    """Return (n, 3, 3) covariances of points or stations in the linear unit."""
     found = result.photo_covariances[:, :3, :3] if photos else result.point_covariances
     if result.block.spheroid is None:
         return found
@@ -188,10 +183,7 @@ def metric_covariances(result: Result, *, photos: bool = False) -> Floats:
 
 
 def fitting_scale(found: Ellipses, places: Floats) -> float:
-    """Return a round display scale (1, 2, 5, 10 ...) for ellipses at (n, 2) positions.
-
-    The median major axis is about a third of the distance between neighbours.
-    """
+    """Return a round display scale (1, 2, 5, 10 ...) for ellipses at (n, 2) positions."""
     known = np.isfinite(found.major) & np.isfinite(places[:, :2]).all(axis=1)
     if not known.any():
         return 1.0

@@ -27,7 +27,7 @@ from photogram.network.observations import moments
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.unadjusted import Given
-from photogram.results.check_points import point_kinds
+from photogram.results.datum import point_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Section
@@ -374,14 +374,11 @@ class Grouping:
 
 
 def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
-    """Return groups of observations; refuse other bases and invalid labels.
+    """Return groups of observations by bases or labels of the user (docs/weights.md); refuse others.
 
-    Groups are by `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more
-    together), or `component` (x and y, plan and height of control, positions and attitudes of stations). All
-    except `kind` and `component` divide the images only; others are grouped by type. Several bases define a
-    group for each combination. Alternatively, user labels: a mapping with arrays of `images` (m,) or (m, 2),
-    `control` (n,) or (n, 3), `stations` (P,) or (P, k), `observations` (o,). Observations without a label
-    (None or an empty text) keep their weights. Parts without labels are grouped by type.
+    All bases except `kind` and `component` divide the images only; others are grouped by type. Several bases
+    define a group for each combination. Observations without a label (None or an empty text) keep their
+    weights.
     """
     if isinstance(groups, Mapping):
         labels = _own(of, groups)
@@ -407,8 +404,8 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
             pairs, codes = np.unique(codes * len(more) + own, return_inverse=True)
             names = [f"{names[pair // len(more)]}, {more[pair % len(more)]}" for pair in pairs.tolist()]
             parents = dict.fromkeys(names, "other images")
-    images = names, np.stack([codes, codes], axis=1)
-    points = ["control"], np.zeros(of.point_observed.shape, dtype=np.int64)
+    images: _Labels = names, np.stack([codes, codes], axis=1)
+    points: _Labels = ["control"], np.zeros(of.point_observed.shape, dtype=np.int64)
     if "component" in bases:
         along = [[f"{name}, {axis}" for name in names] for axis in "xy"]
         parents |= {each: name for part in along for each, name in zip(part, names, strict=True)}
@@ -418,7 +415,7 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
     photos = [*of.stations], np.broadcast_to(np.arange(len(of.stations)), of.photo_observed.shape)
     parents |= dict.fromkeys(of.stations, "stations")
     observations = [each.label for each in of.given.observations]
-    others = observations, np.arange(len(observations))
+    others: _Labels = observations, np.arange(len(observations))
     return {"images": images, "points": points, "photos": photos, "observations": others}, parents
 
 
@@ -453,15 +450,11 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
             if own.shape != default.shape:
                 shapes = f"{default.shape[:1]} or {default.shape}"
                 raise argument_error(f"labels of {name}", "shape", shape=shapes, actual=own.shape)
-            texts = [_text(label) for label in own.ravel().tolist()]
+            # None and NaN are missing labels.
+            texts = ["" if label is None or label != label else str(label) for label in own.ravel().tolist()]
             codes = {text: code for code, text in enumerate(dict.fromkeys(texts))}
             labels[part] = [*codes], np.array([codes[text] for text in texts], np.int64).reshape(own.shape)
     return labels, parents
-
-
-def _text(label: object) -> str:
-    missing = label is None or (isinstance(label, float) and np.isnan(label))
-    return "" if missing else str(label)
 
 
 def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, str]) -> Grouping:

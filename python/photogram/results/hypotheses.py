@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.hypothesis_facts import NO_FACTS, Facts
-from photogram.results.network_trial import NamedSuspects, NetworkTrial, Tests
+from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
 from photogram.statistics.findings import Tested
@@ -192,10 +191,7 @@ class Hypotheses:
         return [phrase(f"datum.{code}") for code in codes]
 
     def common(self, rivals: float = -math.inf) -> list[int]:
-        """Return rows of detected errors of sets that explain more than any single value.
-
-        The first is the most likely. `rivals` are the largest log odds of an error of a fixed value.
-        """
+        """Return rows of common errors that explain more than single values, the likeliest first."""
         odds, sets = self.log_odds, range(len(self.sets))
         found = [k for k in sets if self.code[k] != "bending" and self.probability[k] < DETECTION[0]]
         found.sort(key=lambda row: -odds[row])

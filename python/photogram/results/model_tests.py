@@ -33,7 +33,7 @@ from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
 from photogram.results.fixed_tests import quadratic, score
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each
@@ -305,11 +305,7 @@ def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int])
 
 
 def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
-    """Return groups of estimated distortion terms that are used together.
-
-    Powers of the radius are separate, the highest first; others are grouped by letter (P1 and P2, B1 and
-    B2).
-    """
+    """Return distortion terms that are used together: single powers of the radius, letters."""
     radial, others = [], dict[str, list[str]]()
     for k in camera.estimated:
         name = camera.names[k]

@@ -25,7 +25,7 @@ from photogram.messages import Message
 from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
 from photogram.results.covariance import Adjusted, Covariances, Failure, Propagated, Selection
-from photogram.results.iteration import Iteration
+from photogram.results.parts import Iteration
 from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
@@ -37,10 +37,9 @@ if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.plots import Plots
     from photogram.plots.picture_data import Pictured
-    from photogram.results.axes import Determined, Terms
     from photogram.results.hypotheses import Hypotheses
-    from photogram.results.hypothesis_facts import Facts
-    from photogram.results.network_trial import NetworkTrial
+    from photogram.results.network_trial import Facts, NetworkTrial
+    from photogram.results.parts import Determined, Terms
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.statistics.findings import Removed
@@ -265,14 +264,11 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         OutOfMemoryError, KeyboardInterrupt
             As in :meth:`covariances`.
         """
-        from photogram.results.reliability import Reliability
+        from photogram.results.reliability import Reliability, downweighted
 
         trial, lost = self._trial(), None
         if self.loss is not None:
-            from photogram.results.reliability import downweighted
-
-            weights = self.image_weights, self.used_images
-            lost = downweighted(trial, self._terms, *weights)
+            lost = downweighted(trial, self._terms, self.image_weights, self.used_images)
             trial.out = lost.out
         return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 

@@ -15,7 +15,7 @@ from photogram.plots.accessor import sketch_of
 from photogram.results import network_sections as sections
 from photogram.results import network_tables as declared
 from photogram.results.network import AdjustedNetwork
-from photogram.results.tests import Tests
+from photogram.results.tables import Tests
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
@@ -99,10 +99,7 @@ def network_document(
 
 
 def problems_of(result: AdjustedNetwork) -> list[str]:
-    """Return reasons against the use of values, most serious first, and messages.
-
-    The first reasons are missing convergence, a rejecting global test and the outliers of the verdict.
-    """
+    """Return reasons against the use of values, the most serious first, and messages."""
     test = result.global_test
     problems = []
     if result.status != "converged":

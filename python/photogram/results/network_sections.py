@@ -10,8 +10,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results import network_tables
-from photogram.results.axes import Determined, point_axes
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import point_axes
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
 from photogram.show.page import Layers, Part, Section, Text, about, layered_tables
@@ -26,11 +26,7 @@ NEAR = 1e-3  # Distance of points listed first from a station, relative to the m
 
 @np.errstate(all="ignore")
 def weakest_points(result: AdjustedNetwork) -> Table:
-    """Return points with the largest sd ratios, and those nearest to a station.
-
-    The ratio of extreme standard deviations in any direction is the root of the eigenvalue ratio of the
-    covariance matrix, or 1 with a fixed component. The table is empty without cofactors.
-    """
+    """Return points with the largest sd ratios (1 with a fixed component), and those near a station."""
     network = result._determined()
     cofactors = network.point_cofactors
     known = np.isfinite(cofactors).all(axis=(1, 2)) & result.used_points
@@ -38,7 +34,16 @@ def weakest_points(result: AdjustedNetwork) -> Table:
     free = known & np.isinf(result.point_given_sd).all(axis=1)
     ratio[known] = 1.0
     ratio[free] = np.sqrt(_condition(cofactors[free], 3))
-    distance = _distances(result, network)
+    # Distances of points from the nearest station, over their median.
+    used = result.used_images
+    if network.moving is not None:
+        used = used & ~network.moving[result.given.image_photos]
+    own = result.image_points[used]
+    of_images = network.points[own] - network.stations[result.given.image_photos[used]]
+    nearest = np.full(len(network.points), np.inf)
+    np.minimum.at(nearest, own, np.linalg.norm(of_images, axis=1))
+    seen = np.isfinite(nearest)
+    distance = np.where(seen, nearest / np.median(nearest[seen]) if seen.any() else np.nan, np.nan)
     order = np.lexsort((distance, -ratio))
     near = np.flatnonzero(distance < NEAR)
     worst = order[~np.isnan(ratio[order])][:WORST]
@@ -55,11 +60,7 @@ def weakest_points(result: AdjustedNetwork) -> Table:
 
 @np.errstate(all="ignore")
 def weakest_photos(result: AdjustedNetwork) -> Table:
-    """Return photos with the largest condition numbers of poses, worst first.
-
-    Fixed unknowns of a photo do not count; photos without free unknowns are omitted. If all points are on a
-    line, a photo can rotate about it, and the condition number is unlimited.
-    """
+    """Return photos with the largest condition numbers of their free unknowns, the worst first."""
     network, count = result._determined(), len(result.given.photo_ids)
     images = np.bincount(result.given.image_photos[result.used_images], minlength=count)
     known = (images > 0) & np.isfinite(network.poses).all(axis=(1, 2)) & (network.ranks > 0)
@@ -78,28 +79,11 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
-    """Return eigenvalue ratios of (n, k, k) matrices; infinite by precision loss.
-
-    For smaller ranks only the largest eigenvalues count: the others belong to fixed unknowns.
-    """
+    """Return eigenvalue ratios of (n, k, k) matrices, of their `ranks` largest eigenvalues."""
     values = np.linalg.eigvalsh(matrices)
     largest = values[:, -1]
     smallest = np.take_along_axis(values, values.shape[1] - np.reshape(ranks, (-1, 1)), axis=1)[:, 0]
     found: Floats = np.where(smallest > np.finfo(float).eps * largest, largest / smallest, np.inf)
-    return found
-
-
-def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
-    """Return distances of points from the nearest station, over their median."""
-    used = result.used_images
-    if network.moving is not None:
-        used = used & ~network.moving[result.given.image_photos]
-    own = result.image_points[used]
-    of_images = network.points[own] - network.stations[result.given.image_photos[used]]
-    nearest = np.full(len(network.points), np.inf)
-    np.minimum.at(nearest, own, np.linalg.norm(of_images, axis=1))
-    seen = np.isfinite(nearest)
-    found: Floats = np.where(seen, nearest / np.median(nearest[seen]) if seen.any() else np.nan, np.nan)
     return found
 
 
@@ -117,10 +101,7 @@ def component_table(
     tests: Floats,
     deviations: Floats | None = None,
 ) -> Table:
-    """Return a table of the components with the largest test values.
-
-    `there` are the (n, k) existing components, `tests` their test values, NaN if missing.
-    """
+    """Return components with the largest of (n, k) test values; `there` are the existing ones."""
     places = np.argwhere(there)
     sizes = np.abs(tests[there])
     rows = np.sort(np.argsort(np.where(np.isnan(sizes), 1.0, -sizes), kind="stable")[:COMPONENTS])
@@ -130,10 +111,7 @@ def component_table(
 
 
 def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> Section:
-    """Return control: prior, posterior, difference, test (unless fixed).
-
-    `free` are the columns of free components of control.
-    """
+    """Return control: prior, posterior, difference, test; `free` are free components."""
     columns, own = network_tables.control(result), result.control
     held = (own.sd == 0).all(axis=1)
     there, sd = np.isfinite(own.sd) & ~held[:, np.newaxis], result.point_sd[own.rows]
@@ -244,10 +222,7 @@ def images_section(result: AdjustedNetwork) -> Section:
 def _chosen_rows(
     kind: str, every: Indices, others: Iterable[int], orders: Sequence[Indices]
 ) -> tuple[Indices, str]:
-    """Return the listed photos or points, and a note on the others.
-
-    Items of other tables are first, then the worst in each order alternately.
-    """
+    """Return listed photos or points: those of other tables, then the worst in each order; and a note."""
     if len(every) <= ALL:
         return every, ""
     rows = dict.fromkeys(others)
@@ -286,10 +261,7 @@ def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
 
 @np.errstate(all="ignore")
 def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
-    """Return (n, 6) image fit statistics of photos or points; `of` are the owners.
-
-    Columns are rms x and y, mean redundancy, longest residual, largest |w|, number of images.
-    """
+    """Return (n, 6) rms x, y, mean redundancy, longest residual, largest |w|, images of owners."""
     used = result.used_images
     own = of[used]
     images = np.bincount(own, minlength=count)

@@ -1,19 +1,86 @@
-"""Quantities of the photos, points and images of every network."""
+"""Axes, names and quantities of the photos, points and images of every network."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
-from photogram.results.axes import Terms
-from photogram.results.iteration import Iteration
+from photogram.network.block import Block
+from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
+from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork
+from photogram.results.parts import Determined, Iteration, Terms
 from photogram.show.quantity import Axis, Link, Quantity, column
+
+if TYPE_CHECKING:
+    from photogram import Result
+
+
+TURNS = tuple(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa"))  # Of attitudes
+
+
+def point_axes(block: Block) -> tuple[Axis, ...]:
+    """Return the axes of points and stations; geographic plan coordinates are angles."""
+    unit = block.linear_unit
+    if block.geographic:
+        return Axis.turned("longitude", "dms"), Axis.turned("latitude", "dms"), Axis.of("height", unit)
+    return tuple(Axis.of(name, unit) for name in "XYZ")
+
+
+def image_axes(unit: str) -> tuple[Axis, ...]:
+    """Return the axes of image coordinates; residuals in mm have micrometres."""
+    small, factor = ("um", 1000.0) if unit == "mm" else (unit, 1.0)
+    return tuple(Axis(name, unit, "", f"_{unit}", small, factor) for name in "xy")
+
+
+def component_axis(name: str, unit: str) -> Axis:
+    """Return the axis of a component; small rotations are displayed in seconds of arc."""
+    return Axis.turned(name) if unit == "rad" else Axis.of(name, unit)
+
+
+def block_terms(result: Result) -> Terms:
+    block, axes = result.block, point_axes(result.block)
+    point_kinds = result.point_kinds[result.used_points]
+    lengths = None
+    if block.geographic and len(result.photo_positions):
+        lengths = lengths_of_units(result.photo_positions.mean(axis=0, keepdims=True), block.spheroid)[0]
+    return Terms(
+        photos=np.array(block.photo_ids, dtype=object),
+        points=np.array(block.point_ids, dtype=object),
+        photo_axes=(*axes, *TURNS),
+        point_axes=axes,
+        image_axes=image_axes(block.image_unit),
+        photo_values=np.hstack([result.photo_positions, result.photo_attitudes]),
+        layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
+        parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
+        of_points=(Quantity(point_kinds, (), "name", "kind", "kind", "what it is", "Kind"),),
+        kinds=tuple(result.kinds.values()),
+        observation_rows=np.array(block.observations.core_order, dtype=np.int64),
+        lengths=lengths,
+        linear_unit=block.linear_unit,
+        split=True,
+    )
+
+
+def determined(result: Result) -> Determined:
+    """Return positions and poses of a block with cofactors, geocentric if geographic."""
+    block, points, stations = result.block, result.point_positions, result.photo_positions
+    cofactors = result.point_cofactors
+    if block.spheroid is not None:
+        units = lengths_of_units(points, block.spheroid)
+        cofactors = cofactors * units[:, :, np.newaxis] * units[:, np.newaxis, :]
+        points, stations = (
+            geographic_to_geocentric(np.array(each), block.spheroid) for each in (points, stations)
+        )
+    poses = result.photo_cofactors[:, :6, :6]
+    ranks = (np.diagonal(poses, axis1=1, axis2=2) > 0).sum(axis=1)
+    return Determined(stations, points, poses, ranks, cofactors, scanners(block))
+
 
 _FREE = {np.inf: "free", 0.0: "fixed"}
 

@@ -27,23 +27,14 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
-from photogram.results.axes import point_axes
 from photogram.results.fixed_tests import fall_by_lens
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import point_axes
+from photogram.statistics import patterns as fits
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
-from photogram.statistics.patterns import (
-    SPEAKING,
-    Fit,
-    durbin_watson,
-    frame_pattern,
-    group_patterns,
-    moran,
-    normality,
-    regression,
-)
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
 
@@ -102,10 +93,10 @@ def patterns(
     if axes:
         # Weighted observed positions may drift along the order of the photos.
         w = np.where(result.photo_redundancy > TESTABLE, result.photo_standardized, math.nan)
-        w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > SPEAKING, w, math.nan)
+        w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > fits.SPEAKING, w, math.nan)
         design = np.vander(np.linspace(-1.0, 1.0, len(w)), 3, increasing=True)
         found += [
-            _regressed("drift", regression(w[:, k], design), axis=Phrase(f"axis.{name}"))
+            _regressed("drift", fits.regression(w[:, k], design), axis=Phrase(f"axis.{name}"))
             for k, name in enumerate(axes)
         ]
         found.append(_of_heights(result))
@@ -143,7 +134,7 @@ def _of_camera(
     unit: str,
 ) -> Systematic | None:
     own = chosen(camera.photos[image_photos])
-    found = frame_pattern(xy[own], residuals[own], redundancy[own], camera.estimated)
+    found = fits.frame_pattern(xy[own], residuals[own], redundancy[own], camera.estimated)
     if found is None:
         return None
     x, y = (each * size for each, size in zip(found.largest, scale.tolist(), strict=True))
@@ -160,7 +151,7 @@ def _of_camera(
 def _of_photos(
     image_photos: Indices, photos: Sequence[str], xy: Floats, residuals: Floats, redundancy: Floats
 ) -> Systematic | None:
-    statistics, probabilities = group_patterns(image_photos, len(photos), xy, residuals, redundancy)
+    statistics, probabilities = fits.group_patterns(image_photos, len(photos), xy, residuals, redundancy)
     if np.isnan(probabilities).all():
         return None
     worst, level = int(np.nanargmin(probabilities)), bonferroni(LEVEL, int(np.isfinite(probabilities).sum()))
@@ -170,15 +161,12 @@ def _of_photos(
 
 
 def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | None:
-    """Test the normal distribution of residuals in redundant directions.
-
-    The coordinates of a point on two photos repeat each other: the one with most redundancy is used.
-    """
+    """Test the normal distribution of residuals; of points on two photos the one with most redundancy."""
     redundancy, w = result.redundancy[used], result.standardized[used]
     single = result.point_rays[result.image_points[used]] <= 2
     seen = redundancy > VISIBLE
     seen[single] &= redundancy[single] >= redundancy[single].max(axis=1, keepdims=True)
-    found = normality(w[seen])
+    found = fits.normality(w[seen])
     if found is None:
         return None
     two, three = (100 * float(share) for share in found.beyond)
@@ -200,10 +188,10 @@ def _of_heights(result: AdjustedNetwork) -> Systematic | None:
     plan = plan - plan[tested].mean(axis=0)
     x, y = (plan / np.abs(plan[tested]).max()).T
     design = np.column_stack([np.ones(len(w)), x, y, x * x, x * y, y * y])
-    return _regressed("bending", regression(w, design, tested))
+    return _regressed("bending", fits.regression(w, design, tested))
 
 
-def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | None:
+def _regressed(code: str, found: fits.Fit | None, **fields: Phrase) -> Systematic | None:
     if found is None:
         return None
     sentence = Phrase(f"pattern.{code}", {**fields, "rms": float(found.rms)})
@@ -300,16 +288,16 @@ def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
     tested, xy = (redundancy > 0).any(axis=1), focal_images(result.block)
 
     def bins(own: Indices, v: Floats) -> float:
-        pattern = frame_pattern(xy[own], v[own], redundancy[own])
+        pattern = fits.frame_pattern(xy[own], v[own], redundancy[own])
         return math.nan if pattern is None else pattern.statistic
 
     def alike(own: Indices, v: Floats) -> float:
-        return moran(xy[own], photos[own], v[own])
+        return fits.moran(xy[own], photos[own], v[own])
 
     found: list[_Pattern] = []
     for camera in _cameras(result):
         own = np.flatnonzero(camera.photos[photos] & tested)
         found.append((f"pattern over the frame of {camera.name}", "B", partial(bins, own)))
         found.append((f"neighbours in the frame of {camera.name}", "I", partial(alike, own)))
-    along = partial(durbin_watson, photos, len(block.photo_ids), redundancy=redundancy)
+    along = partial(fits.durbin_watson, photos, len(block.photo_ids), redundancy=redundancy)
     return [*found, ("one photo and the next", "d", along)]

@@ -22,8 +22,8 @@ from photogram.results.features import Features, directions
 from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
-from photogram.results.tests import Tests
-from photogram.results.unknowns import AdjustedCamera
+from photogram.results.parts import AdjustedCamera
+from photogram.results.tables import Tests
 from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length
@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 class PicturedNetwork(plots.Pictured):
     """The plot data of all adjusted networks."""
 
-    result: AdjustedNetwork
+    def __init__(self, result: AdjustedNetwork) -> None:
+        self.result = result
 
     @property
     @abstractmethod
@@ -108,9 +109,6 @@ class PicturedBlock(PicturedNetwork):
     """The data of an adjusted block; local axes for geographic space."""
 
     result: Result
-
-    def __init__(self, result: Result) -> None:
-        self.result = result
 
     @property
     def title(self) -> str:

@@ -27,17 +27,8 @@ import numpy as np
 from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
+from photogram.results import network_trial
 from photogram.results.covariance import Covariances, Selection
-from photogram.results.network_trial import (
-    CONTROL,
-    IMAGE,
-    OBSERVATION,
-    NamedSuspects,
-    NetworkTrial,
-    Out,
-    Standing,
-    Tests,
-)
 from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.quantity import Table, column, members, records
@@ -49,7 +40,7 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.results.axes import Terms
+    from photogram.results.parts import Terms
 
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
 SEARCHED = 100  # Number of examined observations: those of the largest norm
@@ -93,7 +84,7 @@ class Reliability:
 
     def __init__(
         self,
-        trial: NetworkTrial,
+        trial: network_trial.NetworkTrial,
         covariances: Callable[[], Covariances],
         downweighted: Downweighted | None = None,  # Observations that a robust loss removes
         *,
@@ -108,9 +99,9 @@ class Reliability:
         )
         self.trial, self._covariances, self.known = trial, covariances, unit_weight == "known"
         self.downweighted = downweighted
-        self.standing: Standing = trial.stand()
-        self.tests: Tests = trial.tests()
-        self.suspects: NamedSuspects = trial.suspects
+        self.standing: network_trial.Standing = trial.stand()
+        self.tests: network_trial.Tests = trial.tests()
+        self.suspects: network_trial.NamedSuspects = trial.suspects
 
     @property
     def sd(self) -> Floats:
@@ -256,10 +247,7 @@ class Reliability:
         return [self.named(*pair) for pair in self.pairs_on(points, limit)]
 
     def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return inseparable pairs on points by group numbers, with correlation.
-
-        Networks have thousands.
-        """
+        """Return inseparable pairs on points by group numbers, with correlation: thousands."""
         return self.trial.core.inseparable(points, limit)
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:
@@ -366,34 +354,33 @@ NAMED = 100  # Largest number of removed observations in documents
 class Downweighted:
     """Observations and points that a robust loss excludes from the tests."""
 
-    out: Out
+    out: network_trial.Out
     removed: Removed
     unsupported: list[Phrase]  # names of points with too few images
 
 
-def downweighted(trial: NetworkTrial, terms: Terms, image_weights: Floats, used: Bools) -> Downweighted:
-    """Return the observations that the loss of an adjustment removes in effect.
-
-    `image_weights` and `used` are the (m,) weight factors of the images, and whether they were used.
-    """
+def downweighted(
+    trial: network_trial.NetworkTrial, terms: Terms, image_weights: Floats, used: Bools
+) -> Downweighted:
+    """Return the observations that the loss of an adjustment removes in effect, by (m,) weights of images."""
     suspects = trial.suspects
     weights = np.ones(len(suspects))  # (G,) of groups; NaN if not used
-    of_images, others = suspects.kinds == IMAGE, suspects.kinds == OBSERVATION
+    of_images, others = suspects.kinds == network_trial.IMAGE, suspects.kinds == network_trial.OBSERVATION
     weights[of_images] = np.where(used, image_weights, np.nan)[suspects.subjects[of_images]]
     factors = np.ones(len(terms.observation_rows))
     for kind in terms.kinds:
         factors[kind.rows] = kind.weights
     weights[others] = factors[terms.observation_rows[suspects.subjects[others]]]
     removed = weights < REMOVED
-    points, images = suspects.points, (suspects.kinds == IMAGE) & np.isfinite(weights)
+    points, images = suspects.points, (suspects.kinds == network_trial.IMAGE) & np.isfinite(weights)
     count = len(terms.points)
     rays, left = (np.bincount(points[own], minlength=count) for own in (images, images & ~removed))
     alone = np.flatnonzero((left < SUPPORT) & (rays > left))
     rows = np.repeat(removed | np.isin(points, alone), np.diff(suspects.row_starts))
     names = [suspects.name(int(group)) for group in np.flatnonzero(removed)[:NAMED]]
-    control = {int(point) for point in points[suspects.kinds == CONTROL]}
+    control = {int(point) for point in points[suspects.kinds == network_trial.CONTROL]}
     return Downweighted(
-        Out(rows, set(alone.tolist())),
+        network_trial.Out(rows, set(alone.tolist())),
         Removed(
             [{"name": str(name), "subject": name} for name in names],
             suspects.counts(rows, np.isfinite(weights)),

@@ -19,20 +19,12 @@ from photogram.network.block import Block, refuse_trajectories
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import timed_photos
-from photogram.results.check_points import CheckPoints, check_points, point_kinds
+from photogram.results import datum as references
+from photogram.results import parts
+from photogram.results import trajectories as motion
 from photogram.results.covariance import Adjusted, Failure, adjusted
-from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused, relative_datum
 from photogram.results.films import OnFilm
-from photogram.results.iteration import Redundancies, SumsOfSquares
 from photogram.results.network import AdjustedNetwork
-from photogram.results.observation_kinds import ObservedKind, observed_kinds
-from photogram.results.trajectories import (
-    AdjustedTrajectory,
-    adjusted_trajectories,
-    project,
-    restarted_motion,
-)
-from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown, adjusted_cameras, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase
 
@@ -42,8 +34,8 @@ if TYPE_CHECKING:
     from photogram import Features
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
-    from photogram.results.axes import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
+    from photogram.results.parts import Determined, Terms
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -114,19 +106,19 @@ class Result(OnFilm, AdjustedNetwork):
     """
 
     block: Block
-    sums_of_squares: SumsOfSquares
-    redundancies: Redundancies | None
+    sums_of_squares: parts.SumsOfSquares
+    redundancies: parts.Redundancies | None
     unit_variance: str
     photo_corrections: Floats
     photo_positions: Floats
     photo_attitudes: Floats
     photo_order: Indices
     point_last_corrections: Floats
-    kinds: Mapping[str, ObservedKind]
-    cameras: tuple[AdjustedCamera, ...]
-    unknowns: tuple[AdjustedUnknown, ...]
+    kinds: Mapping[str, parts.ObservedKind]
+    cameras: tuple[parts.AdjustedCamera, ...]
+    unknowns: tuple[parts.AdjustedUnknown, ...]
     dropped: Mapping[str, str]
-    datum: ResultDatum
+    datum: references.ResultDatum
     hints: tuple[str, ...] = ()
     exchanged: tuple[Phrase | str, ...] = ()
     set_aside: tuple[Phrase | str, ...] = ()
@@ -141,7 +133,7 @@ class Result(OnFilm, AdjustedNetwork):
         block: Block,
         solution: _photocore.BlockSolution,
         options: CoreOptions,
-        datum: ResultDatum,
+        datum: references.ResultDatum,
         messages: list[Message],
         freedom: float,
     ) -> Self:
@@ -155,13 +147,15 @@ class Result(OnFilm, AdjustedNetwork):
             loss=options.loss,
             options=options,
             datum=datum,
-            sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
-            redundancies=None if solution.redundancies is None else Redundancies(*solution.redundancies),
+            sums_of_squares=parts.SumsOfSquares(*solution.sums_of_squares),
+            redundancies=None
+            if solution.redundancies is None
+            else parts.Redundancies(*solution.redundancies),
             degrees_of_freedom=freedom,
             unit_variance=options.unit_variance,
-            kinds=observed_kinds(block, solution),
-            cameras=adjusted_cameras(block, solution, scale),
-            unknowns=adjusted_unknowns(block, solution, scale),
+            kinds=parts.observed_kinds(block, solution),
+            cameras=parts.adjusted_cameras(block, solution, scale),
+            unknowns=parts.adjusted_unknowns(block, solution, scale),
             dropped=dropped_points(block, solution),
         )
 
@@ -206,19 +200,19 @@ class Result(OnFilm, AdjustedNetwork):
         return adjusted(self)
 
     def _refused(self, error: Failure) -> Exception:
-        return refused(self.block, self._core_network(), self.state, error)
+        return references.refused(self.block, self._core_network(), self.state, error)
 
     def _core_network(self) -> _photocore.BlockNetwork:
         return block_network(self.block, self.options)
 
     @cached_property
     def _terms(self) -> Terms:
-        from photogram.results.axes import block_terms
+        from photogram.results.network_tables import block_terms
 
         return block_terms(self)
 
     def _determined(self) -> Determined:
-        from photogram.results.axes import determined
+        from photogram.results.network_tables import determined
 
         return determined(self)
 
@@ -234,7 +228,7 @@ class Result(OnFilm, AdjustedNetwork):
         return network_trial(self.block, core)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
-        from photogram.results.hypothesis_facts import block_facts
+        from photogram.results.network_trial import block_facts
 
         checks = self.check_points
         sd = None if checks.agreement is None else np.hypot(checks.sd, checks.given_sd)
@@ -259,7 +253,7 @@ class Result(OnFilm, AdjustedNetwork):
         block = self.block
         free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
         if block.all_trajectories:
-            block = restarted_motion(block, self.trajectories.values(), turns)
+            block = motion.restarted_motion(block, self.trajectories.values(), turns)
         return block.replace(
             cameras=[each.restarted() for each in self.cameras] or block.cameras,
             photo_positions=np.where(free["position"], self.photo_positions, block.photo_positions),
@@ -298,7 +292,7 @@ class Result(OnFilm, AdjustedNetwork):
             As in :meth:`covariances`.
         """
         refuse_trajectories(self.block, "relative_to")
-        return self._in(relative_datum(self.block, photo, points))
+        return self._in(references.relative_datum(self.block, photo, points))
 
     def _in(self, row: DatumRow) -> Self:
         block = self.block
@@ -306,19 +300,19 @@ class Result(OnFilm, AdjustedNetwork):
         try:
             solution = network.in_datum(self.state, row, threads=0, progress=None)
         except _photocore.BlockError as error:
-            raise refused(block, network, self.state, error) from None
-        datum = datum_of(block, solution, row)
-        before = datum_messages(block, self.datum, self.point_rays)
+            raise references.refused(block, network, self.state, error) from None
+        datum = references.datum_of(block, solution, row)
+        before = references.datum_messages(block, self.datum, self.point_rays)
         kept = [message for message in self.messages if message not in before]
         return replace(
             self,
             **{name: getattr(solution, name) for name in _OF_DATUM},
-            cameras=adjusted_cameras(block, solution, self.covariance_scale),
-            unknowns=adjusted_unknowns(block, solution, self.covariance_scale),
+            cameras=parts.adjusted_cameras(block, solution, self.covariance_scale),
+            unknowns=parts.adjusted_unknowns(block, solution, self.covariance_scale),
             datum=datum,
             state=solution.state,
             features=None,
-            messages=[*datum_messages(block, datum, self.point_rays), *kept],
+            messages=[*references.datum_messages(block, datum, self.point_rays), *kept],
         )
 
     def _table(self, what: str) -> pd.DataFrame:
@@ -394,7 +388,7 @@ class Result(OnFilm, AdjustedNetwork):
     @cached_property
     def point_kinds(self) -> NDArray[np.str_]:
         """(n,) `control` if observed, `check` if known only, else `pass`."""
-        return point_kinds(self.block)
+        return references.point_kinds(self.block)
 
     @property
     def point_differences(self) -> Floats:
@@ -408,9 +402,9 @@ class Result(OnFilm, AdjustedNetwork):
         return differences
 
     @cached_property
-    def check_points(self) -> CheckPoints:
+    def check_points(self) -> references.CheckPoints:
         """Check points with differences, standard deviations, and single and joint tests."""
-        return check_points(self)
+        return references.check_points(self)
 
     def statement(self, **asked: Any) -> Any:
         """Return the accuracy statement for a client (docs/statement.md).
@@ -427,9 +421,9 @@ class Result(OnFilm, AdjustedNetwork):
         return self._table("check")
 
     @property
-    def trajectories(self) -> dict[str, AdjustedTrajectory]:
+    def trajectories(self) -> dict[str, motion.AdjustedTrajectory]:
         """Trajectories of photos and records by name: coefficients, poses."""
-        return adjusted_trajectories(self)
+        return motion.adjusted_trajectories(self)
 
     def project(self, photo: str, points: ArrayLike) -> Floats:
         """Return image coordinates of points on a photo on a trajectory.
@@ -450,7 +444,7 @@ class Result(OnFilm, AdjustedNetwork):
         InputError
             If the photo is not on a trajectory, or is a scanner on a trajectory with one record.
         """
-        return project(self, photo, points)
+        return motion.project(self, photo, points)
 
     def camera_table(self) -> pd.DataFrame:
         """Return adjusted cameras as a data frame: a row with unit for each parameter."""

@@ -55,7 +55,6 @@ class Part:
     prefix: str = ""  # Prefix of the names of columns; the name of the one column of a matrix or list
 
     def columns(self, result: AdjustedNetwork) -> list[Column]:
-        """Return the columns; empty if the array is None."""
         array: Any = attrgetter(self.field)(result)
         if array is None:
             return []
@@ -223,9 +222,8 @@ def written(
     """Return the files of a result.
 
     `kind` identifies the reader, `given` is the field of the adjusted network. `parts` belong to the tables
-    `photos`, `points` and `images`, `leading` are the columns before them: names. `tables` are additional
-    ones for users. `frame` is the position of coordinates on the earth, `summary` the first data for a
-    reader, and `stands` the substitutes for objects of some classes.
+    of photos, points and images, after the `leading` names. `tables` are additional ones for users, `summary`
+    is the first data for a reader, and `stands` are substitutes for objects of some classes.
     """
     unknowns, *state = result.state.__getnewargs__()
     place = {"kind": frame.kind, "crs": frame.crs, "origin": frame.origin}

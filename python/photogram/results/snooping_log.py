@@ -142,18 +142,9 @@ def snooped(
 ) -> Outcome:
     """Remove gross errors from a network and return the outcome.
 
-    Parameters
-    ----------
-    trial
-        The network.
-    options
-        Options of data snooping.
-    afresh
-        Restarts the trial from a consensus of its observations if its adjustment diverges. Returns the
-        observations that the consensus rejects; None without consensus.
-    common
-        Returns common errors of sets that explain the test values better than errors of single observations.
-        Then nothing is removed: removing the members one after the other would hide the cause.
+    `afresh` restarts the trial from a consensus if its adjustment diverges, and returns the rejected
+    observations or None. `common` returns common errors of sets that explain the tests better than single
+    errors. Then nothing is removed: removing the members one after the other would hide the cause.
     """
     begin = partial(
         _photocore.NetworkSnooping,
@@ -270,11 +261,7 @@ class _Names:
 
 
 def disputes(log: Sequence[Removal]) -> list[Phrase]:
-    """Return the observations of the log that have alternatives, each with these and their odds.
-
-    Observations other than images, none of which can be removed without losing the datum, are alternatives of
-    each other.
-    """
+    """Return observations with alternatives, also those that the datum requires."""
     found = [_alternatives(each, each.rivals) for each in log if each.kept == KEPT["disputed"]]
     needed = [each for each in log if each.kept == KEPT["needed"] and each.kind != "image"]
     needed.sort(key=lambda each: -each.statistic)

@@ -1,33 +1,247 @@
-"""The tables of an adjusted block, quantity by quantity."""
+"""Tests of all observations, and the tables of an adjusted block, quantity by quantity."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
-from photogram.results import tests
-from photogram.results.axes import component_axis, point_axes
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.results import network_tables, parts
 from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.group_sums import grouped, observables, sums_of
+from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import (
+    component_axis,
     deviation,
     difference,
     names,
+    point_axes,
     redundancy,
     test_value,
 )
-from photogram.results.observation_kinds import ObservedKind
-from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown
-from photogram.show.quantity import Axis, Quantity, attribute, column, component, joined, long
-from photogram.statistics.reliability import TESTABLE
+from photogram.results.network_trial import KINDS, OBSERVATION, type_name
+from photogram.show.cells import unit_written
+from photogram.show.quantity import Axis, Link, Quantity, attribute, column, component, joined, long
+from photogram.statistics.distributions import lambda0
+from photogram.statistics.findings import Tested
+from photogram.statistics.reliability import TESTABLE, minimal_detectable_error
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import Result
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ComponentTests(Tested):
+    """(k, c) tests of the single components of k observations of one type."""
+
+    type: str  # `image`, `control`, `station` or the type of observation
+    axes: tuple[Axis, ...]
+    residuals: Floats
+    sd: Floats
+    redundancy: Floats
+    groups: Mapping[Phrase, slice]  # types of the tests of groups, and the components of these
+    photos: Indices | None = None  # (k,) of the observations
+    points: Indices | None = None
+
+    @property
+    def observed(self) -> Bools:
+        """(k, c) components with a standard deviation and a residual."""
+        return np.isfinite(self.sd) & (self.sd > 0) & np.isfinite(self.residuals)
+
+
+class Tests:
+    """The tests of an adjusted network: of single components, and of groups."""
+
+    def __init__(self, result: AdjustedNetwork) -> None:
+        self._result, self._terms = result, result._terms
+
+    @cached_property
+    def normal(self) -> list[ComponentTests]:
+        """Standardized residuals w of all components, type by type."""
+        result, terms, given = self._result, self._terms, self._result.given
+
+        def of_network(
+            title: str, kind: str, what: str, code: str, groups: Mapping[str, slice], **of: Any
+        ) -> ComponentTests:
+            def name(row: int) -> Phrase:
+                return phrase(code, **{each[:-1]: str(getattr(terms, each)[of[each][row]]) for each in of})
+
+            axes = {"image": terms.image_axes, "control": terms.point_axes, "station": terms.photo_axes}[kind]
+            names = (f"{what or 'image_'}given_sd", f"{what}redundancy", f"{what}standardized")
+            values = getattr(result, f"{what}residuals"), *(getattr(result, each) for each in names)
+            return replace(_component_tests(phrase(title), kind, axes, name, values, groups), **of)
+
+        every, images = slice(None), {"photos": given.image_photos, "points": result.image_points}
+        points, photos = (np.arange(len(names)) for names in (terms.points, terms.photos))
+        control, poses = {"control": every}, {"positions": slice(3), "attitudes": slice(3, None)}
+        titles = ("test.image_coordinates", "test.components_of_control", "test.components_of_stations")
+        found = [
+            of_network(titles[0], "image", "", "named.point", {"images": every}, **images),
+            of_network(titles[1], "control", "point_", "named.control", control, points=points),
+            of_network(titles[2], "station", "photo_", "named.photo", poses, photos=photos),
+        ]
+        for each in terms.kinds:
+            title = phrase("test.components", kind=parts.kind_words(each.kind))
+            name = partial(lambda kind, row: parts.named_observation(kind.kind, kind.names[row]), each)
+            axes = tuple(map(component_axis, each.components, each.units))
+            values = each.residuals, each.sd, each.redundancy, each.standardized
+            found.append(_component_tests(title, each.kind, axes, name, values, {"observations": every}))
+        return found
+
+    @cached_property
+    def components(self) -> list[ComponentTests]:
+        """The tests of all components: w if the unit weight is known, else t."""
+        if self._result.KNOWN:
+            return self.normal
+        return [tests.studentized(*self._result.sum_and_freedom) for tests in self.normal]
+
+    @property
+    def groups(self) -> list[Tested]:
+        """Tests of groups by type: T if the unit weight is known, else F."""
+        result, summary = self._result, self._result.reliability_summary
+        if summary is None:
+            return []
+        suspects, testable = summary.suspects, summary.testable
+        types = []
+        for kind in range(len(KINDS)):
+            groups = np.flatnonzero(suspects.kinds == kind)
+            rows = suspects.subjects[groups]
+            if kind != OBSERVATION:
+                types.append((type_name(kind), groups, rows))
+                continue
+            rows = self._terms.observation_rows[rows]
+            for each in sorted(self._terms.kinds, key=lambda each: each.kind):
+                own = np.isin(rows, each.rows)
+                types.append((type_name(kind, each.kind), groups[own], np.searchsorted(each.rows, rows[own])))
+        found = [
+            Tested(
+                title,
+                np.where(testable[groups], summary.tests.statistic[groups], math.nan),
+                lambda place, groups=groups: suspects.name(int(groups[place[0]])),  # type: ignore[misc]
+                "T",
+                summary.tests.rank[groups].astype(np.float64),
+                rows=rows,
+            )
+            for title, groups, rows in types
+            if testable[groups].any()
+        ]
+        if result.KNOWN:
+            return found
+        tested = summary.standing if result.loss else result
+        return [tests.studentized(*tested.sum_and_freedom) for tests in found]
+
+    @cached_property
+    def outliers(self) -> list[Bools]:
+        """Components of each type that are outliers, or belong to outlying groups."""
+        verdict, found = self._result.verdict, []
+        for tests in self.normal:
+            marks = verdict.marks(tests.kind, tests.values.shape)
+            for kind, components in tests.groups.items():
+                marks[[place[0] for place in verdict.outlying.get(kind, ())], components] = True
+            found.append(marks)
+        return found
+
+    def largest(self, count: int) -> Indices:
+        """Return (n, 3) indices of largest test values: type, observation, component."""
+        found = []
+        for order, tests in enumerate(self.components):
+            sizes = np.nan_to_num(np.abs(tests.values)).ravel()
+            few = np.flatnonzero(sizes > 0)
+            if len(few) > count:
+                few = few[np.argpartition(-sizes[few], count)[:count]]
+            for index in few.tolist():
+                row, component = divmod(index, tests.values.shape[1])
+                found.append((-sizes[index], str(tests.kind), row, component, order))
+        places = [(order, row, component) for *_, row, component, order in sorted(found)[:count]]
+        return np.array(places, dtype=np.int64).reshape(-1, 3)
+
+    def columns(self, places: Indices | None = None) -> list[Quantity]:
+        """Return columns of all observed components, or of (n, 3) indices."""
+        types = self.components
+        if places is None:
+            observed = [np.argwhere(tests.observed) for tests in types]
+            places = np.vstack([np.insert(own, 0, k, axis=1) for k, own in enumerate(observed)])
+        of_type, rows, parts = places.T
+        names = ("residuals", "sd", "redundancy", "values", "log_p")
+        numbers = {name: np.full(len(rows), np.nan) for name in names}
+        owners = {name: np.full(len(rows), -1) for name in ("photos", "points")}
+        marked = np.zeros(len(rows), dtype=bool)
+        for k, tests in enumerate(types):
+            own = of_type == k
+            place = rows[own], parts[own]
+            for name in names[:-1]:
+                numbers[name][own] = getattr(tests, name)[place]
+            numbers["log_p"][own] = replace(tests, values=tests.values[place]).log_probability()
+            marked[own] = self.outliers[k][place]
+            for name, found in owners.items():
+                if (every := getattr(tests, name)) is not None:
+                    found[own] = every[rows[own]]
+        axes = tuple(axis for tests in types for axis in tests.axes)
+        of = np.cumsum([0, *(len(tests.axes) for tests in types)])[of_type] + parts
+        sd, shares, values = (numbers[name] for name in ("sd", "redundancy", "values"))
+        freedom = math.inf if self._result.KNOWN else self._result.sum_and_freedom[1]
+        detectable = minimal_detectable_error(sd, shares, math.sqrt(lambda0(dof=freedom)))
+        statistic = types[0].statistic
+        units = np.array([unit_written(axis.small) for axis in axes], dtype=object)
+        type_names = np.array([tests.type for tests in types], dtype=object)
+        return [
+            Quantity(type_names[of_type], kind="name", name="type"),
+            Quantity(rows, kind="name", name="row"),
+            self._linked("photo", self._terms.photos, owners["photos"]),
+            self._linked("point", self._terms.points, owners["points"]),
+            *component(axes, of),
+            Quantity(numbers["residuals"], axes, "deviation", "residual", head="Residual", of=of),
+            deviation(sd, axes, head="sd given", of=of),
+            Quantity(units[of], kind="name", head="Unit"),
+            redundancy(shares, axes, of=of),
+            Quantity(detectable, axes, "deviation", "detectable", head="Detectable error", of=of),
+            Quantity(values, name=statistic, head=f"Test value {statistic}", decimals=2, marked=marked),
+            Quantity(np.exp(numbers["log_p"]), name="p", head="p", figures=2),
+            Quantity(marked, kind="name", name="outlier"),
+        ]
+
+    @staticmethod
+    def _linked(kind: str, names: np.ndarray, rows: Indices) -> Quantity:
+        texts = np.append(names.astype(object), "")[rows]
+        return Quantity(texts, (), "name", kind, head=kind.capitalize(), link=Link(kind, rows))
+
+
+def _component_tests(
+    title: Phrase,
+    kind: str,
+    axes: tuple[Axis, ...],
+    name: Callable[[int], Phrase],
+    values: tuple[Floats, Floats, Floats, Floats],
+    groups: Mapping[str, slice],
+) -> ComponentTests:
+    """Return tests of a type by residuals, sd, redundancy numbers and w."""
+    residuals, sd, shares, w = values
+    return ComponentTests(
+        kind=title,
+        values=np.where(shares > TESTABLE, w, np.nan),
+        name=lambda place: parts.parts_of([axes[place[1]].name], name(place[0])),
+        type=kind,
+        axes=axes,
+        residuals=residuals,
+        sd=sd,
+        redundancy=shares,
+        groups={Phrase(f"test.{code}", title.fields): components for code, components in groups.items()},
+    )
+
+
+NETWORK_TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
+    **network_tables.TABLES,
+    "test": lambda result: Tests(result).columns(),
+}
+"""The tables of every network by the type of the items in their rows."""
+
 
 _EITHER = "standard deviation that was given, or is assumed: {}"
 
@@ -69,7 +283,7 @@ def _compared(result: Result, rows: Indices, differences: Floats, given_sd: Floa
     ]
 
 
-def observations(kind: ObservedKind) -> list[Quantity]:
+def observations(kind: parts.ObservedKind) -> list[Quantity]:
     axes = tuple(map(component_axis, kind.components, kind.units))
     kinds, names = (np.array(texts, dtype=object) for texts in ([kind.kind] * len(kind.names), kind.names))
     return [
@@ -96,16 +310,13 @@ def observed_components(result: Result) -> list[Quantity]:
 
 
 _EMPTY, _NONE = np.zeros((0, 1)), np.zeros(0)
-_NOTHING = ObservedKind(
+_NOTHING = parts.ObservedKind(
     *("", np.zeros(0, dtype=np.int64), [], ("",), ("",)), *(_EMPTY, _EMPTY, _EMPTY, _EMPTY), *(_NONE, _NONE)
 )
 
 
 def redundancy_by_kind(result: Result) -> list[Quantity]:
-    """Return number, redundancy, sum of squares and sd factor of every type.
-
-    The redundancies sum to the degrees of freedom; empty without them, or with a loss.
-    """
+    """Return number, redundancy, sum of squares and sd factor of every type, if known."""
     names, numbers = list[str](), np.zeros((0, 3))
     if result.redundancies is not None and result.loss is None:
         grouping = grouped(observables(result), "kind")
@@ -131,7 +342,7 @@ def redundancy_by_kind(result: Result) -> list[Quantity]:
     ]
 
 
-def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
+def unknowns(every: Sequence[parts.AdjustedUnknown]) -> list[Quantity]:
     """Return components of common unknowns; given sd are infinite if free."""
     axes = tuple(
         component_axis(*both) for each in every for both in zip(each.components, each.units, strict=True)
@@ -151,7 +362,7 @@ def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
     ]
 
 
-def camera_parameters(every: Sequence[AdjustedCamera]) -> list[Quantity]:
+def camera_parameters(every: Sequence[parts.AdjustedCamera]) -> list[Quantity]:
     """Return camera parameters; given sd are infinite if free, 0 if fixed."""
     axes = tuple(Axis(name, each.camera.unit_of(name)) for each in every for name in each.names)
     rows: dict[str, Any] = {"of": np.arange(len(axes))}
@@ -188,7 +399,7 @@ def _each(every: Sequence[Any], what: str) -> Any:
 
 
 TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
-    **tests.TABLES,
+    **NETWORK_TABLES,
     "check": check_points,
     "observation": observed_components,
     "camera": lambda result: camera_parameters(result.cameras),

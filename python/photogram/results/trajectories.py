@@ -22,7 +22,7 @@ from photogram.network.moving_photos import Timed
 from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.projecting import camera_of, projected
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
-from photogram.results.unknowns import AdjustedUnknown
+from photogram.results.parts import AdjustedUnknown
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -190,10 +190,7 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
 
 
 def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
-    """Return the trajectories of photos and records of a block, by their names.
-
-    They compute covariances once, at the first request for poses.
-    """
+    """Return the trajectories of photos and records of a block, by their names."""
     found = {id(each.given): each for each in result.unknowns}
     once = cache(result.covariances)
 
@@ -258,10 +255,7 @@ LISTED = 20  # Rows of longer lists of coefficients and trajectories
 
 
 def trajectories_table(result: Result) -> Table:
-    """Return trajectory positions and rotations: largest corrections and tests.
-
-    They are in the order of the block; if there are many, those with the largest test values.
-    """
+    """Return trajectories with their largest corrections and tests; of many, the notable ones."""
     from photogram.show.page import about  # only required for tables
     from photogram.show.quantity import Axis, Quantity, Table
 
@@ -330,11 +324,7 @@ _MANY = (Coefficient, Knot)  # Types with thousands of unknowns
 
 
 def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], str]:
-    """Return the common unknowns in reports, and a note on the others.
-
-    All except coefficients of trajectories and knots of lens models; these if they are few, or have large
-    test values.
-    """
+    """Return the common unknowns in reports, and a note on those that are not listed."""
     own = [each for each in every if isinstance(each.given, _MANY)]
     if len(own) <= COEFFICIENTS:
         return list(every), ""

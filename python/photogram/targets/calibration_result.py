@@ -18,9 +18,9 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
 from photogram.network.trajectories import Clock
+from photogram.results.parts import AdjustedCamera, AdjustedUnknown
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
-from photogram.results.unknowns import AdjustedCamera, AdjustedUnknown
 from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.show.page import Document
 from photogram.statistics.verdict import Verdict

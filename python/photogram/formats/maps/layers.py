@@ -14,8 +14,8 @@ from photogram.formats.project import frame_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
 from photogram.network.moving_photos import Moment
-from photogram.results.axes import point_axes
 from photogram.results.footprints import CONFIDENCE, ellipses, fitting_scale, footprints
+from photogram.results.network_tables import point_axes
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
 from photogram.statistics.reliability import TESTABLE

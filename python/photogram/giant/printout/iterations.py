@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from photogram.arguments.types import Floats
 from photogram.giant.printout.forms import Page, Space, Values, fixed, headed, paginate
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.iteration import Iteration, SumsOfSquares
+from photogram.results.parts import Iteration, SumsOfSquares
 
 TITLE = "CAMERA STATIONS CORRECTIONS"
 

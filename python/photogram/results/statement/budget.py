@@ -27,10 +27,10 @@ from photogram.results import network_trial
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances, Item, adjusted, used_rows
 from photogram.results.group_sums import Grouping, Left, Probing, grouped, observables
+from photogram.results.parts import units
 from photogram.results.result import Result
 from photogram.results.statement.request import invalid
 from photogram.results.statement.texts import Texts
-from photogram.results.unknowns import units
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 from photogram.words import Phrase, phrase
@@ -117,11 +117,7 @@ def budgets(
     coverage: float = 0.95,
     components: VarianceComponents | None = None,
 ) -> list[Budget]:
-    """Return the budgets of quantities: one solution each, and one pass over all rows.
-
-    `components` are the variance components of the result, if weights were estimated. For errors see
-    :meth:`Result.covariances`.
-    """
+    """Return the budgets of quantities: one solution each, and one pass over all rows."""
     if not wanted:
         return []
     rows = Rows(result, covariances.suspects())
@@ -140,20 +136,11 @@ def budgets(
         variance = float(squares.sum())
         share = 1.0 / variance if variance > 0 else 0.0
         freedom = freedoms.of(squares, variance)
-        budget = Budget(
-            quantity=each.name,
-            subject=each.subject,
-            unit=each.unit,
-            value=value,
-            sd=math.sqrt(variance),
-            cofactor=variance / result.covariance_scale,
-            sources=tuple(Source(*source, source[-1] * share) for source in rows.sources(squares)),
-            largest=tuple(_largest(rows, squares, t, share)),
-            freedom=freedom,
-            k=coverage_factor(coverage, freedom.used),
-            coverage=coverage,
-        )
-        found.append(budget)
+        sources = tuple(Source(*source, source[-1] * share) for source in rows.sources(squares))
+        largest, k = tuple(_largest(rows, squares, t, share)), coverage_factor(coverage, freedom.used)
+        numbers = value, math.sqrt(variance), variance / result.covariance_scale
+        parts = sources, largest, freedom, k, coverage
+        found.append(Budget(each.name, each.subject, each.unit, *numbers, *parts))
     return found
 
 
@@ -261,10 +248,7 @@ class Rows(network_trial.BlockSuspects):
         return list(found), number
 
     def sources(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return level, name, row number and contribution of sources, from (M,) squares.
-
-        Sources without rows are omitted; the smallest ones of long levels are added.
-        """
+        """Return level, name, row number and contribution of sources, the smallest of long levels added."""
         sums = np.add.reduceat(squares, self.row_starts[:-1])
         for level, names, of, most in self._levels:
             own = of >= 0
@@ -277,9 +261,6 @@ class Rows(network_trial.BlockSuspects):
             yield from ((level, names[k], int(numbers[k]), float(totals[k])) for k in there.tolist())
             if len(rest):
                 yield level, "others", int(numbers[rest].sum()), math.fsum(totals[rest].tolist())
-        yield from self._parameters(squares)
-
-    def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
         several = len(self.block.camera_names) > 1
         for group in np.flatnonzero(self.kinds > network_trial.OBSERVATION).tolist():
             for row in self.rows(group).tolist():
@@ -351,11 +332,7 @@ class Wanted:
 
 
 def wanted(result: Result, asked: Any) -> Wanted:
-    """Return a requested quantity; refuse unknown items and unused points.
-
-    `point NAME z`, `distance NAME NAME`, `camera NAME f`, `photo NAME x`, `unknown NAME x`; or a mapping of
-    items to gradients of a linear function, `{("point", "C08"): [0, 0, 1]}`.
-    """
+    """Return a quantity by its words or by gradients of items; refuse unknown items and unused points."""
     if isinstance(asked, Mapping):
         return _linear(result, asked)
     words = asked.split() if isinstance(asked, str) else []
@@ -401,26 +378,20 @@ def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
         order = rows[np.argsort(result.point_sd[rows, 2], kind="stable")]
         found.append(wanted(result, f"point {block.point_ids[order[(len(order) - 1) // 2]]} z"))
     if len(rows) > 1:
-        first, second = _farthest(result, rows)
-        found.append(_distance(result, f"distance {first} {second}", (first, second)))
+        places, best, ends = local_axes(block).positions(result.point_positions[rows]), -1.0, (0, 0)
+        for first in range(0, len(rows), TOGETHER):
+            squares = ((places[first : first + TOGETHER, np.newaxis] - places) ** 2).sum(axis=2)
+            row, column = np.unravel_index(int(np.argmax(squares)), squares.shape)
+            if squares[row, column] > best:
+                best, ends = float(squares[row, column]), (first + int(row), int(column))
+        one, other = (block.point_ids[rows[end]] for end in sorted(ends))
+        found.append(_distance(result, f"distance {one} {other}", (one, other)))
     for camera in result.cameras:
         free = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if sd > 0]
         for name in PRINCIPAL:
             if name in free:
                 return [*found, wanted(result, f"camera {camera.name} {name}")]
     return found
-
-
-def _farthest(result: Result, rows: Indices) -> tuple[str, str]:
-    places = local_axes(result.block).positions(result.point_positions[rows])
-    best, ends = -1.0, (0, 0)
-    for first in range(0, len(rows), TOGETHER):
-        squares = ((places[first : first + TOGETHER, np.newaxis] - places) ** 2).sum(axis=2)
-        own = np.unravel_index(int(np.argmax(squares)), squares.shape)
-        if squares[own] > best:
-            best, ends = float(squares[own]), (first + int(own[0]), int(own[1]))
-    names = result.block.point_ids
-    return names[rows[min(ends)]], names[rows[max(ends)]]
 
 
 def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:

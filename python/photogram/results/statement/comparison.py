@@ -30,8 +30,8 @@ from photogram.network.block import Block
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
 from photogram.network.observations import Control
 from photogram.network.rays import local_axes
-from photogram.results.axes import point_axes
 from photogram.results.covariance import Covariances
+from photogram.results.network_tables import point_axes
 from photogram.results.result import NOT_PHOTOGRAPHED, Result
 from photogram.results.statement.request import METRES, Asked
 from photogram.words import phrase
@@ -141,7 +141,10 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     _check_apart(block, rows)
     given = block.point_positions[rows]
     turn = turned_to_east(block, given)
-    differences = _turned(turn, result.point_differences[rows])
+    # Components that J does not use may be missing.
+    differences = result.point_differences[rows]
+    missing = np.einsum("iab,ib->ia", (turn != 0).astype(float), np.isnan(differences).astype(float)) > 0
+    differences = np.where(missing, np.nan, np.einsum("iab,ib->ia", turn, np.nan_to_num(differences)))
     sd = _survey(block, rows, differences, names, asked.sd)
     joint = covariances.covariance(("point", names)) if names else np.zeros((0, 0))
     if block.geographic or block.frame.kind == "geocentric":
@@ -202,13 +205,6 @@ def _finite(positions: Floats) -> Floats:
         [np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0 for own in positions.T]
     )
     return np.where(np.isfinite(positions), positions, middle)
-
-
-def _turned(turn: Floats, differences: Floats) -> Floats:
-    """Return J d; components that J does not use may be missing."""
-    whole = np.einsum("iab,ib->ia", turn, np.nan_to_num(differences))
-    mixed = np.einsum("iab,ib->ia", (turn != 0).astype(float), np.isnan(differences).astype(float)) > 0
-    return np.where(mixed, np.nan, whole)
 
 
 def plan_positions(block: Block, positions: Floats) -> Floats:

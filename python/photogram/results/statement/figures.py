@@ -187,15 +187,8 @@ def bias(found: Compared, component: str, k: float) -> Bias | None:
         return None
     mean, n = float(d.mean()), len(d)
     sd = math.sqrt(max(float(covariance.sum()), 0.0)) / n
-    z = mean / sd if sd > 0 else math.nan
-    return Bias(
-        mean=mean,
-        sd_of_mean=sd,
-        sd_of_mean_without_correlations=math.sqrt(float(np.trace(covariance))) / n,
-        z=z,
-        p=math.erfc(abs(z) / math.sqrt(2.0)),
-        expanded=k * sd,
-    )
+    z, alone = mean / sd if sd > 0 else math.nan, math.sqrt(float(np.trace(covariance))) / n
+    return Bias(mean, sd, alone, z, math.erfc(abs(z) / math.sqrt(2.0)), k * sd)
 
 
 def surface(found: Compared) -> Surface | None:

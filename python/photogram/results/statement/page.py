@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +13,10 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
 from photogram.network.hull import hull, outside
 from photogram.results.distortion import distortion_curve
-from photogram.results.features import Features, through, unit_deviations
+from photogram.results.features import Features, quantity_columns, through, unit_deviations
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
+from photogram.results.parts import AdjustedCamera, units
 from photogram.results.statement import tables as declared
 from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
@@ -23,10 +24,9 @@ from photogram.results.statement.figures import Figures
 from photogram.results.statement.judgement import fixed_values
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
-from photogram.results.unknowns import AdjustedCamera, units
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Quantity, Table, named
 from photogram.show.sketch import marks as shapes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION, round_length
@@ -237,18 +237,15 @@ def _metrology(statement: Statement) -> list[Part]:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
         parts += [declared.test_lengths(texts, lengths), drawing]
+    values = [each["value"] if isinstance(each["value"], list) else [each["value"]] for each in measures]
+    figures = [["–" if one is None else texts.significant(one, 3) for one in each] for each in values]
     quantities = [
         columns.text("measure", [each["measure"] for each in measures]),
         columns.number("id", [each["measure_id"] for each in measures]),
-        columns.text("value", [_measured(texts, each["value"]) for each in measures]),
+        columns.text("value", [*map(" / ".join, figures)]),
         columns.text(BLANK, [each["unit"] for each in measures]),
     ]
     return [*parts, Table("iso", texts("table.iso"), quantities)]
-
-
-def _measured(texts: Texts, value: Any) -> str:
-    values = value if isinstance(value, list) else [value]
-    return " / ".join("–" if each is None else texts.significant(each, 3) for each in values)
 
 
 def _features(texts: Texts, features: Features) -> Table:
@@ -256,13 +253,8 @@ def _features(texts: Texts, features: Features) -> Table:
     columns = declared.Columns(texts)
     every = [(feature, own) for feature in features for own in feature.quantities]
     names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
-    axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
-    numbers = [
-        Quantity(
-            np.array([getattr(own, key) for _, own in every]), axes, "value", head=columns.head(key), of=of
-        )
-        for key in ("value", "sd", "expanded")
-    ]
+    table = quantity_columns(features)
+    numbers = [replace(named(table, key), head=columns.head(key)) for key in ("value", "sd", "expanded")]
     quantities = [
         columns.text("feature", names),
         columns.text("quantity", [texts.word("measured", own.name) for _, own in every]),
@@ -383,47 +375,39 @@ def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
     if not len(found) and not len(control):
         return None
     places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
-    extent = np.ptp(places, axis=0)
-    panel = _in_plan(shapes.around(places, 0.12), texts)
-    marks = list[shapes.Mark]()
+    extent, marks, bars, shades = np.ptp(places, axis=0), list[shapes.Mark](), list[shapes.ScaleBar](), None
     if len(control):
         marks.append(shapes.Markers(control[:, :2], "^", 6.0, SOFT, label=texts("use.control")))
     if len(found):
-        panel = _points(panel, found, float(extent.max()), texts)
+        plan, d = found.places[:, :2], found.differences
+        heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
+        most = max(float(np.abs(heights).max()), 1e-12)
+        shades = shapes.Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
+        marks += [
+            shapes.Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
+            shapes.Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
+        ]
+        both = np.isfinite(d[:, :2]).all(axis=1)
+        if both.any():
+            largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
+            scale, length = REACH * max(float(extent.max()), 1e-9) / largest, round_length(largest)
+            semi_axes, angles = shapes.ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
+            marks += [
+                shapes.Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
+                shapes.Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
+            ]
+            sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
+            bars = [(length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal")))]
+        if len(found) <= NAMED:
+            marks.append(shapes.Names(plan, found.names, [SOFT] * len(found)))
     height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
-    return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="beside")])
+    panel = _in_plan(shapes.around(places, 0.12), texts)
+    return Plot(WIDTH, height, [replace(panel, marks=marks, bars=bars, shades=shades, legend="beside")])
 
 
 def _in_plan(limits: Floats, texts: Texts) -> shapes.Panel:
     across, up = (f"{texts(f'column.{axis}')}, {texts.unit}" for axis in ("east", "north"))
     return shapes.Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
-
-
-def _points(panel: shapes.Panel, found: Compared, extent: float, texts: Texts) -> shapes.Panel:
-    plan, d = found.places[:, :2], found.differences
-    heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
-    most = max(float(np.abs(heights).max()), 1e-12)
-    shades = shapes.Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
-    marks: list[shapes.Mark] = [
-        shapes.Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
-        shapes.Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
-    ]
-    bars: list[shapes.ScaleBar] = []
-    both = np.isfinite(d[:, :2]).all(axis=1)
-    if both.any():
-        largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
-        scale = REACH * max(extent, 1e-9) / largest
-        semi_axes, angles = shapes.ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
-        marks += [
-            shapes.Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
-            shapes.Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
-        ]
-        length = round_length(largest)
-        sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
-        bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal"))))
-    if len(found) <= NAMED:
-        marks.append(shapes.Names(plan, found.names, [SOFT] * len(found)))
-    return replace(panel, marks=marks, bars=bars, shades=shades)
 
 
 def drawn_lengths(found: Lengths, texts: Texts) -> Plot:

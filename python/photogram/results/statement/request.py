@@ -186,13 +186,7 @@ class Asked:
 
     @classmethod
     def checked(cls, **options: Any) -> Asked:
-        """Return the checked options.
-
-        Raises
-        ------
-        InputError
-            If an option is unknown, or a value is not allowed.
-        """
+        """Return the checked options; refuse unknown options and values that are not allowed."""
         known = {each.name: each for each in fields(cls)}
         for name in options:
             require_name("option of a statement", name, known)
@@ -221,25 +215,13 @@ class Asked:
 
 
 def lengths_in(unit: str) -> float:
-    """Return the length of a linear unit in metres.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown.
-    """
+    """Return the length of a linear unit in metres; refuse unknown units."""
     require_name("unit of length", unit, METRES)
     return METRES[unit]
 
 
 def length_of(given: str, unit: str, *, area: bool = False) -> float:
-    """Return a length (`5cm`) or area (`12.5km2`) in the linear unit.
-
-    Raises
-    ------
-    InputError
-        If the text is not a length with a unit.
-    """
+    """Return a length (`5cm`) or area (`12.5km2`) in the linear unit; refuse other texts."""
     found = _LENGTH.fullmatch(given)
     try:
         if found is None or not found[2] or bool(found[3]) != area:

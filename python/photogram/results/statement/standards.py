@@ -24,10 +24,8 @@ from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
 from photogram.results.result import Result
-from photogram.results.statement import comparison
-from photogram.results.statement import lengths as length_tests
+from photogram.results.statement import comparison, layout
 from photogram.results.statement.figures import Figures, root_mean
-from photogram.results.statement.layout import area_in_plan
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
@@ -75,11 +73,10 @@ def points_asked_for(area: float) -> int:
 
 
 def accuracy(found: float, survey: float, freedom: float, count: int) -> Accuracy:
-    """Return a figure of the standard: RMSE_H (7.11), RMSE_V of NVA or VVA, RMSE_3D.
+    """Return RMSE_H (7.11), RMSE_V of NVA or VVA, or RMSE_3D; horizontal ones are radial.
 
-    `found` and `survey` are RMSE_1 of the differences and RMSE_2 of the check survey in the linear unit:
-    horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
-    the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
+    `found` and `survey` are RMSE_1 of the differences with effective degrees of freedom, and RMSE_2 of the
+    check survey; linear unit.
     """
     rest, upper = (found - survey) * (found + survey), rmse_interval(found, freedom)[1]
     product = math.sqrt(rest) if rest >= 0 else None
@@ -226,7 +223,7 @@ class Lengths:
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
     limit: tuple[float, float, float] | None  # A, K and B; B may be infinite
-    test: length_tests.LengthTest
+    test: layout.LengthTest
     expansion: float | None
 
 
@@ -257,7 +254,7 @@ def asprs_figures(
     metre = lengths_in(result.block.linear_unit)
     area = asked.area
     if area is None:
-        area = area_in_plan(
+        area = layout.area_in_plan(
             comparison.plan_positions(result.block, result.point_positions[result.used_points])
         )
     km2 = area * metre**2 / 1e6
@@ -318,11 +315,7 @@ def _control_rmse(result: Result) -> tuple[float, float]:
 
 
 def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
-    """Return the accuracy of `count` check points at 95 %.
-
-    `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
-    on its diagonal. `rmse_z` belongs to the heights, in the linear unit. Missing values are NaN.
-    """
+    """Return the accuracy of `count` check points at 95 %, from (2, 2) sum d d' / n in plan, and RMSE_z."""
     vertical = VERTICAL * rmse_z if math.isfinite(rmse_z) else None
     if not np.isfinite(moments).all():
         return Nssda(count, None, None, None, None, vertical)
@@ -344,16 +337,16 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         joint = comparison.turned_jointly(comparison.turned_to_east(block, positions), joint)
         positions = comparison.plan_positions(block, positions)
     pairs = np.array([[names.index(each["from"]), names.index(each["to"])] for each in asked.lengths])
-    measured, covariance = length_tests.measured_lengths(positions, joint, pairs)
+    measured, covariance = layout.measured_lengths(positions, joint, pairs)
     temperatures = np.array([each.get("temperature", math.nan) for each in asked.lengths], dtype=float)
     turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
     if turned and asked.expansion is not None:
-        measured = length_tests.at_reference(measured, temperatures, asked.expansion)
+        measured = layout.at_reference(measured, temperatures, asked.expansion)
     extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
     ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
     lines = [str(each["line"]) for each in asked.lengths]
     calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
-    test = length_tests.length_test(
+    test = layout.length_test(
         measured,
         calibrated,
         covariance=covariance,
@@ -361,7 +354,7 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         lines=lines,
         limit=asked.limit,
         diagonal=float(np.linalg.norm(extent)),
-        off_diagonal=length_tests.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
+        off_diagonal=layout.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]

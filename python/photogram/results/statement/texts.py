@@ -28,10 +28,7 @@ def fields_of(sentence: str) -> set[str]:
 
 
 class Texts(Words):
-    """Sentences in a language, with numbers as the language writes them.
-
-    `own` are sentences by code that replace those of the language, `unit` is the linear unit of the block.
-    """
+    """Sentences and numbers in a language, for a linear unit; `own` replace sentences by code."""
 
     def __init__(self, language: str = "en", own: Mapping[str, str] | None = None, unit: str = "m") -> None:
         one_of("language", language, LANGUAGES)

@@ -1,23 +1,206 @@
-"""Adjusted cameras, and common unknowns of observations, in the order of the block."""
+"""Parts of results: iterations, sums by type, observations, cameras, and common unknowns."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.arrays import freeze_fields, standard_deviations
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.observations import Observation
 from photogram.network.unknowns import Unknown
 from photogram.show.methods import Brief
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
+    from photogram.show.quantity import Axis, Quantity
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One iteration.
+
+    Attributes
+    ----------
+    number
+        From 1.
+    weighted_sum_of_squares
+        After its corrections.
+    largest_change
+        No unknown changed by more than this multiple of its standard deviation (a priori unit weight).
+    damping
+        Levenberg-Marquardt damping of its step; 0 for a Gauss-Newton step.
+    """
+
+    number: int
+    weighted_sum_of_squares: float
+    largest_change: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class SumsByKind:
+    # Weighted positions and attitudes of the photos, and weighted parameters of cameras
+    camera: float
+    ground: float  # Weighted and fixed components of control
+    plates: float  # Image coordinates
+    observations: float = 0.0  # Additional observations
+
+    @property
+    def measured(self) -> float:
+        """The sum without photos."""
+        return self.ground + self.plates + self.observations
+
+    @property
+    def total(self) -> float:
+        return self.camera + self.ground + self.plates + self.observations
+
+
+class SumsOfSquares(SumsByKind):
+    """Weighted sums of squares."""
+
+
+class Redundancies(SumsByKind):
+    """Sums of redundancy numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedKind:
+    """The k additional observations of one type, with r components each.
+
+    Unobserved components and observations of excluded points are NaN. Arrays are read-only.
+    """
+
+    kind: str
+    rows: Indices  # (k,) their indices in the block
+    names: list[str]  # names of the observed items
+    # components, units: Names and units of the r components: the linear unit of the object space, or radians
+    components: tuple[str, ...]
+    units: tuple[str, ...]
+    sd: Floats  # (k, r) standard deviations a priori
+    residuals: Floats  # (k, r) observed minus computed
+    # (k, r) redundancy numbers; single ones may leave 0 to 1 where components are correlated
+    redundancy: Floats
+    # (k, r) standardized residuals, a priori unit weight: with W the inverse of the covariance matrix S of an
+    # observation, `(W v)_i / sqrt((W Qvv W)_ii)`, which without correlations is Baarda's w; NaN without
+    # redundancy
+    standardized: Floats
+    squares: Floats  # (k,) v' W v, weights after the loss
+    weights: Floats  # (k,) weight factors by the loss; 1 without a loss
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+    @property
+    def used(self) -> int:
+        """The number of used observations."""
+        return int(np.isfinite(self.squares).sum())
+
+    @property
+    def sum_of_squares(self) -> float:
+        """The weighted sum of squares of used observations."""
+        return float(np.nansum(self.squares))
+
+
+def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
+    """Return the adjusted observations of a block by the names of their types."""
+    found = iter(solution.adjusted_observations)
+    parts: dict[str, list[tuple[Observation, Indices, tuple[Floats, ...]]]] = {}
+    for columns in block.observations.columns:
+        first, rows = columns.objects[0], columns.rows
+        observed = np.ones((len(rows), len(first.components(geographic=block.geographic))), dtype=bool)
+        if first.MISSING:
+            observed = ~np.isnan(columns.table["observed"])
+        tables = np.full((3, *observed.shape), np.nan)
+        single = np.full((2, len(rows)), np.nan)
+        adjusted = [next(found) for _ in rows]
+        taken = np.array([each is not None for each in adjusted])
+        if some := [each for each in adjusted if each is not None]:
+            values = zip(*some, strict=True)
+            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(values)) for _ in range(3)]
+            single[:, taken] = list(values)
+        variances = np.diagonal(np.asarray(columns.table["precision"]), axis1=1, axis2=2)
+        sd = np.sqrt(np.where(observed, variances, np.nan))
+        parts.setdefault(columns.label, []).append((first, rows, (sd, *tables, *single)))
+    kinds = {}
+    for kind, groups in parts.items():  # Groups of one type have different numbers of unknowns
+        first = groups[0][0]
+        every = np.concatenate([own for _, own, _ in groups])
+        order = np.argsort(every, kind="stable")
+        arrays = zip(*(own for *_, own in groups), strict=True)
+        kinds[kind] = ObservedKind(
+            kind,
+            every[order],
+            [" - ".join(block.observations[row].of) for row in every[order].tolist()],
+            first.components(geographic=block.geographic),
+            first.units(block.linear_unit),
+            *(np.concatenate(each)[order] for each in arrays),
+        )
+    return kinds
+
+
+def named_observation(kind: str, of: str) -> Phrase:
+    """Return the name of an observation: type, and points, photos or unknowns."""
+    return Phrase("named.observation", {"one": kind_words(kind), "of": of})
+
+
+def kind_words(kind: str) -> list[Phrase]:
+    """Return the words of a type, such as `prior, lever arm`."""
+    return [Phrase(f"one.{each}") for each in kind.split(", ")]
+
+
+def parts_of(components: Iterable[str], name: Phrase) -> Phrase:
+    """Return the name of some components of an observation."""
+    return Phrase("named.parts", {"axes": [Phrase(f"axis.{each}") for each in components], "named": name})
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Names, axes and units of the photos, points and images of a network."""
+
+    photos: np.ndarray  # (P,), (n,) names, or numbers from 0
+    points: np.ndarray
+    photo_axes: tuple[Axis, ...]  # Unknowns of a photo, coordinates of a point, image coordinates
+    point_axes: tuple[Axis, ...]
+    image_axes: tuple[Axis, ...]
+    photo_values: Floats  # (P, k) adjusted unknowns
+    # Unknowns of a photo: their name in texts, and their member in JSON documents
+    layers: Mapping[str, slice]
+    parts: Mapping[str, slice]
+    of_photos: tuple[Quantity, ...] = ()  # First columns of the tables of photos and points
+    of_points: tuple[Quantity, ...] = ()
+    kinds: Iterable[ObservedKind] = ()  # Additional observations
+    # (o,) rows of these in the block, in the order of the core
+    observation_rows: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    lengths: Floats | None = None  # (3,) length units of coordinates if plan coordinates are angles
+    linear_unit: str = ""
+    split: bool = False  # Whether JSON documents separate differences of positions and attitudes
+
+    @property
+    def identity(self) -> str:
+        """The member of JSON documents for the name or number of an item."""
+        return "number" if self.points.dtype.kind == "i" else "id"
+
+
+@dataclass(frozen=True, eq=False)
+class Determined:
+    """Positions of the points and photos of an adjusted network, with cofactors."""
+
+    stations: Floats  # (P, 3), (n, 3) positions in axes of equal units
+    points: Floats
+    poses: Floats  # (P, 6, 6) cofactors of position and attitude
+    ranks: Indices  # (P,) numbers of pose unknowns that are not fixed
+    point_cofactors: Floats  # (n, 3, 3) with axes of equal units
+    # (P,) photos of scanners, which have a separate station for each line; None without any
+    moving: Bools | None = None
+
 
 # Types with components of `position` for values, and types whose values are the first of `position`.
 _PLACED = {"lever arm", "shift", "drift", "instrument", "level", "sensor", "position coefficient", "clock"}
@@ -115,21 +298,12 @@ def adjusted_unknowns(
         change, position, attitude, cofactors, with_former, redundancy, observations = row
         k = len(change)
         matrix = np.array(cofactors).reshape(k, k)
-        found.append(
-            AdjustedUnknown(
-                given=given,
-                components=("factor",) if id(given) in factors else given.components,
-                units=("",) if id(given) in factors else given.units(block.linear_unit),
-                change=np.array(change),
-                position=np.array(position),
-                attitude=np.array(attitude).reshape(3, 3),
-                cofactors=matrix,
-                covariance=matrix * scale,
-                with_former=np.array(with_former).reshape(k, len(with_former) // k),
-                redundancy=np.array(redundancy),
-                observations=observations,
-            )
-        )
+        plain = id(given) in factors
+        names, units = (("factor",), ("",)) if plain else (given.components, given.units(block.linear_unit))
+        former = np.array(with_former).reshape(k, len(with_former) // k)
+        values = np.array(change), np.array(position), np.array(attitude).reshape(3, 3)
+        precision = matrix, matrix * scale, former, np.array(redundancy)
+        found.append(AdjustedUnknown(given, names, units, *values, *precision, observations))
     return tuple(found)
 
 
@@ -233,22 +407,10 @@ def adjusted_cameras(
         parameters, cofactors, redundancy, information, photos, images = row
         k = len(parameters)
         matrix = np.array(cofactors).reshape(k, k)
-        found.append(
-            AdjustedCamera(
-                name=name,
-                given=given,
-                camera=given.replace(
-                    parameters=dict(zip(given.names, parameters, strict=True)),
-                    knots=knots.get(id(given), given.knots),
-                ),
-                cofactors=matrix,
-                covariance=matrix * scale,
-                redundancy=np.array(redundancy),
-                information=np.array(information),
-                photos=photos,
-                images=images,
-            )
-        )
+        values = dict(zip(given.names, parameters, strict=True))
+        camera = given.replace(parameters=values, knots=knots.get(id(given), given.knots))
+        numbers = np.array(redundancy), np.array(information), photos, images
+        found.append(AdjustedCamera(name, given, camera, matrix, matrix * scale, *numbers))
     return tuple(found)
 
 
