@@ -66,10 +66,10 @@ from .results.features import Features as Features
 from .results.features import features as features
 from .results.group_sums import GroupSums as GroupSums
 from .results.group_sums import group_sums as group_sums
-from .results.parts import Iteration as Iteration
 from .results.model_tests import compare as compare
 from .results.model_tests import score_test as score_test
 from .results.model_tests import terms_test as terms_test
+from .results.parts import Iteration as Iteration
 from .results.result import Result as Result
 from .results.snooping_result import Snooped as Snooped
 from .results.statement.statement import Statement as Statement
