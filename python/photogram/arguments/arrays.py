@@ -379,9 +379,9 @@ def finite_rows(pairs: NDArray[np.float64]) -> NDArray[np.bool_]:
     return found
 
 
-def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the standard deviations (n, k) of covariance matrices (n, k, k)."""
-    deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+def standard_deviations(covariances: NDArray[np.float64], scale: float = 1.0) -> NDArray[np.float64]:
+    """Return the standard deviations (n, k) of covariance matrices (n, k, k) times a scale."""
+    deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2) * scale)
     return deviations
 
 

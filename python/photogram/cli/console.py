@@ -45,8 +45,8 @@ EXTRAS = {
 }
 """The extra that installs a package missing in the core installation."""
 
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
-output = Console(highlight=False, soft_wrap=True)
+errors = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+output = Console(highlight=False, soft_wrap=True, emoji=False)
 
 
 def print_sections(summary: Iterable[TitledLines], whole: str, most: int = SHOWN) -> None:

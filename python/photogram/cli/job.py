@@ -199,8 +199,8 @@ class Job:
 
     @contextmanager
     def status(self, text: str) -> Iterator[Status | None]:
-        """Show a status line on standard error unless the job is quiet."""
-        if self.quiet:
+        """Show a status line on standard error, if this is a terminal, unless the job is quiet."""
+        if self.quiet or not errors.is_terminal:
             yield None
             return
         with errors.status(text, spinner="line") as status:

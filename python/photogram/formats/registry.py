@@ -168,10 +168,11 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
             wishes = wishes or Wishes()
             if wishes.settings and chosen.name != "plain":
                 raise InputError(phrase("format.settings", title=chosen.title))
-            if (own := [each for each in wishes.sd if each not in SD]) and chosen.name != "plain":
-                raise InputError(phrase("format.kind", kind=own[0], title=chosen.title))
+            if (kinds := [each for each in wishes.sd if each not in SD]) and chosen.name != "plain":
+                raise InputError(phrase("format.kind", kind=kinds[0], title=chosen.title))
             project = chosen.read(path, wishes)
-            if wishes.photos or wishes.gnss or "settings" in project.details:
+            own = getattr(project.details.get("settings"), "photo_files", None)
+            if wishes.photos or wishes.gnss or own:
                 from photogram.formats.metadata.adding import with_wished_photos
 
                 project = with_wished_photos(project, wishes)

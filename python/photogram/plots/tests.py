@@ -54,9 +54,10 @@ def tests(result: Any) -> Plot:
 
 def _speaking(group: Tested) -> Tested:
     """Return a group without components of negligible size, which peak at 0."""
-    sizes = np.nan_to_num(np.abs(group.values))
-    silent = sizes.reshape(len(sizes), -1).max(axis=0, initial=0.0) < SPEAKING
-    return replace(group, values=np.where(silent.reshape(sizes.shape[1:]), np.nan, group.values))
+    values = group.values
+    largest = [np.fmax.reduce(np.abs(own), initial=0.0) for own in values.reshape(len(values), -1).T]
+    silent = np.less(largest, SPEAKING).reshape(values.shape[1:])
+    return replace(group, values=np.where(silent, np.nan, values)) if silent.any() else group
 
 
 def _histogram(values: Floats, unit_weight: float) -> Panel:

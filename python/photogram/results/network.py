@@ -450,12 +450,12 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     @property
     def photo_sd(self) -> Floats:
         """(P, k) standard deviations of the unknowns of photos."""
-        return standard_deviations(self.photo_covariances)
+        return standard_deviations(self.photo_cofactors, self.covariance_scale)
 
     @property
     def point_sd(self) -> Floats:
         """(n, 3) standard deviations."""
-        return standard_deviations(self.point_covariances)
+        return standard_deviations(self.point_cofactors, self.covariance_scale)
 
     @abstractmethod
     def _adjusted(self) -> Adjusted: ...

@@ -270,10 +270,10 @@ def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
     found[:, 5] = images
     for axis in (0, 1):
         found[:, axis] = np.sqrt(np.bincount(own, residuals[:, axis] ** 2, count) / images)
-    found[:, 2] = np.bincount(own, result.redundancy[used].mean(axis=1), count) / images
+    found[:, 2] = np.bincount(own, 0.5 * np.add(*result.redundancy[used].T), count) / images
     for column, values in (
         (3, np.hypot(*residuals.T)),
-        (4, np.nan_to_num(np.abs(result.standardized[used])).max(axis=1, initial=0.0)),
+        (4, np.nan_to_num(np.fmax(*np.abs(result.standardized[used]).T))),
     ):
         largest = np.zeros(count)
         np.maximum.at(largest, own, values)

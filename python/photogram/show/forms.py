@@ -128,7 +128,8 @@ def table_text(table: Table) -> list[str]:
     for row in table.rows:
         for texts, column, cell in zip(columns, table.columns, row, strict=True):
             mark = "*" if cell.tone == "look" and not column.text else ""
-            texts.append(f"{cell.text}{mark}".translate(PLAIN))
+            text = cell.text if cell.text.isascii() else cell.text.translate(PLAIN)
+            texts.append(text + mark)
     longest = max(len(text) for texts in columns for text in texts)
     if longest > WIDTH // 2 and all(
         column.text for column in table.columns

@@ -143,10 +143,13 @@ def _table(table: Table, within: str, known: Set[str]) -> str:
 
 def _cell(cell: Cell, column: Column, known: Set[str]) -> str:
     text, number = cell.text, cell.number
+    readable = number is not None and NUMBER.fullmatch(text)
+    if readable and not (column.text or cell.tone or cell.id or cell.goes_to):
+        return f"<td>{text}</td>"  # Most cells
     long = column.text and any(len(word) > LONG for word in text.split())
     kinds = " ".join(filter(None, ("text" * column.text, "long" * long, cell.tone)))
     # Columns are sorted by these numbers if the texts of cells are not numbers.
-    sorts = number is not None and math.isfinite(number) and not NUMBER.fullmatch(text)
+    sorts = number is not None and math.isfinite(number) and not readable
     value = f' data-value="{number:.9g}"' if sorts else ""
     content = _element("a", escape(text), href=f"#{cell.goes_to}") if cell.goes_to in known else escape(text)
     start = "".join(f' {key}="{escape(each)}"' for key, each in (("class", kinds), ("id", cell.id)) if each)

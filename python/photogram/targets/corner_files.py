@@ -298,8 +298,6 @@ def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Pa
 def holds_targets(path: Path) -> bool:
     """Return whether a path contains board corners, or a board and corner files."""
     with reading(path):
-        if path.is_dir() and (path / "project.toml").exists():
-            return False
         models, boards, corners = sorted_files(path)
     if boards and not path.is_dir():
         return False

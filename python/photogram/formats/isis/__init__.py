@@ -7,15 +7,17 @@ from pathlib import Path
 import lazy_loader
 
 from photogram.formats.format import Format, later
-from photogram.formats.isis.reading import TITLE, is_network
 from photogram.io.files import reading
 
+TITLE = "control network (ISIS)"
 HEAD = 1 << 16  # Bytes that identify a network
 
 
 def _recognises(path: Path) -> bool:
     if not path.is_file():
         return False
+    from photogram.formats.isis.reading import is_network
+
     with reading(path), path.open("rb") as file:
         return is_network(file.read(HEAD))
 

@@ -14,10 +14,11 @@ from photogram.formats.cards import filled_lines
 from photogram.formats.csm.cubes import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
+from photogram.formats.isis import TITLE
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.points import given_starts, known_points
-from photogram.formats.isis.reading import TITLE, read_network
+from photogram.formats.isis.reading import read_network
 from photogram.formats.isis.settings import Settings, read_settings
 from photogram.formats.isis.solving import observations_of, one_flight, solving
 from photogram.formats.project import Project

@@ -18,7 +18,6 @@ from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
-TITLE = "control network (ISIS)"
 LABEL_BYTES = 65536  # Bytes of the label of a binary network, padded with zeros
 _FIRST_OBJECT = re.compile(rb"\s*(?:(?:#|/\*)[^\n]*\n\s*)*object\s*=\s*(\w+)", re.IGNORECASE)
 _BINARY, _TEXT = "protobuffer", "controlnetwork"

@@ -120,20 +120,18 @@ def _on_rig(
 def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
     """Return the line times by photo name."""
     table = tables.rows("line_times")
-    places = {name: row for row, name in enumerate([*photos.names, *sorted(photos.unused)])}
-    of_photos = indices_of(table, "photo", places, "photo")
+    names = [*photos.names, *sorted(photos.unused)]
+    of_photos = indices_of(table, "photo", {name: row for row, name in enumerate(names)}, "photo")
     values = table.given(("line", "time", "seconds_per_line"))
     found: dict[str, Lines] = {}
-    for name, place in places.items():
+    for place in np.unique(of_photos).tolist():
         rows = np.flatnonzero(of_photos == place)
-        if not len(rows):
-            continue
         back = np.diff(values[rows, 0]) <= 0
         if back.any():
             row = int(rows[1 + int(np.argmax(back))])
             last, value = values[[rows[np.argmax(back)], row], 0].tolist()
             raise table.cell_error(row, "line", "plain.increase", before=last, value=value)
-        found[name] = made(table, int(rows[0]), Lines, values[rows])
+        found[names[place]] = made(table, int(rows[0]), Lines, values[rows])
     return found
 
 

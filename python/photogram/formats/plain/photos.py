@@ -117,7 +117,7 @@ def _attitude_weights(
     columns = steps if any(each in table for each in steps) else own
     if not any(each in table for each in columns):
         return free, []
-    sd = table.vectors(columns, math.inf, infinite=True, read=tables.angle)
+    sd = tables.angles(table, columns, math.inf, infinite=True)
     if (sd < 0).any():
         row = int(np.argwhere(sd < 0)[0][0])
         raise table.error(row, phrase("plain.negative-angle-sd", value=float(sd[row].min())))

@@ -297,10 +297,9 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
     listed = [*(control.names if control else ()), *own]
     few = None if own else set(listed)
     rows_of_names = {name: row for row, name in enumerate(images.point_names) if few is None or name in few}
-    names = list(images.point_names)
-    for name in listed:
-        if rows_of_names.setdefault(name, len(names)) == len(names):
-            names.append(name)
+    others = [name for name in dict.fromkeys(listed) if name not in rows_of_names]
+    names = [*images.point_names, *others]
+    rows_of_names |= zip(others, range(len(images.point_names), len(names)), strict=True)
     starts = np.full((len(names), 3), np.nan)
     positions, sd, check_sd = starts.copy(), np.full((len(names), 3), np.inf), starts.copy()
     if table is not None:

@@ -192,6 +192,17 @@ class Tables:
         value = finite_number(text)
         return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
 
+    def angles(
+        self, table: ColumnTable, columns: Sequence[str], default: float = math.nan, *, infinite: bool = False
+    ) -> Floats:
+        """Return (rows, k) angles in radians."""
+        unit = self.settings.angle
+        if unit == "dms":
+            return table.vectors(columns, default, infinite=infinite, read=self.angle)
+        found = table.vectors(columns, infinite=infinite)
+        found = {"deg": np.radians(found), "gon": found * math.pi / 200}.get(unit, found)
+        return np.where(np.isnan(found), default, found)
+
     def attitudes(self, table: ColumnTable) -> Floats:
         """Return (rows, k) numbers of attitudes, angles in radians; NaN without."""
         names = ANGLES[self.settings.attitude]
@@ -200,7 +211,9 @@ class Tables:
             fields = {"names": others, "attitude": self.settings.attitude, "columns": list(names)}
             raise table.head.error(phrase("plain.attitude-columns", **fields))
         plain = self.settings.attitude in ("quaternion", "rotation_vector", "matrix")
-        return vectors_of(table, names, None if plain else self.angle)
+        values: Floats = (table.vectors if plain else partial(self.angles, table))(names)
+        check_complete(table, names, values)
+        return values
 
     def matrices(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) attitudes A, photo to object; NaN without."""
@@ -246,8 +259,9 @@ class Tables:
 
     def sd(self, table: ColumnTable, column: str, default: float = math.nan) -> Floats:
         """Return (rows,) standard deviations of a column in internal units."""
-        read = self.angle if column.removeprefix("sd_") in ANGULAR else None
-        return table.numbers(column, default, infinite=True, read=read)
+        if column.removeprefix("sd_") in ANGULAR:
+            return self.angles(table, [column], default, infinite=True)[:, 0]
+        return table.numbers(column, default, infinite=True)
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
         """Reject invalid quaternions and matrices, with their rows."""
@@ -348,15 +362,6 @@ def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind:
         if name and name not in known:
             raise table.unknown_error(row, column, kind, name, known)
     return [known.get(name) for name in names]
-
-
-def vectors_of(
-    table: ColumnTable, columns: Sequence[str], read: Callable[[str], float] | None = None
-) -> Floats:
-    """Return (rows, k) numbers, complete in each row or NaN; reject incomplete rows."""
-    values: Floats = table.vectors(columns, read=read)
-    check_complete(table, columns, values)
-    return values
 
 
 def check_complete(table: ColumnTable, columns: Sequence[str], values: Floats) -> None:

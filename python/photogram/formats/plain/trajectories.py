@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.schema import AXES, BASES, FACTORS, SD_AXES, VELOCITY
-from photogram.formats.plain.tables import Tables, covariances_of, indices_of, made, vectors_of
+from photogram.formats.plain.tables import Tables, check_complete, covariances_of, indices_of, made
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
 from photogram.network.observations import Observation, Smoothness
@@ -102,7 +102,9 @@ def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> l
     """Return the sampled trajectory of each row."""
     own = tables.rows("trajectory_positions")
     groups = _rows_of(own, places)
-    times, values = _times(own, groups), np.column_stack([own.given(AXES), vectors_of(own, VELOCITY)])
+    velocities = own.vectors(VELOCITY)
+    check_complete(own, VELOCITY, velocities)
+    times, values = _times(own, groups), np.column_stack([own.given(AXES), velocities])
     positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
     attitudes = _turned(tables, "trajectory_attitudes", places)
     joined = [table.words(f"{of}interpolation", get_args(Interpolation)) for of in ("", "attitude_")]

@@ -73,6 +73,8 @@ def read_unknowns(
     Titles are the names of unknowns with the cell `true`, or without a cell.
     """
     make, rule, values = unknown_class(unknown.class_name), unknown.rule, dict[str, Floats]()
+    if rule == "any" and not any(name in table for column in unknown.columns for name in column.names):
+        return [None] * table.count
     for column in unknown.values:
         own = read_values(tables, table, column)
         if column.kind not in TURNS and math.isnan(column.number):

@@ -182,9 +182,10 @@ def boxes(low: Floats, high: Floats) -> Floats:
 
 def ellipse_axes(covariances: Floats) -> tuple[Floats, Floats]:
     """Return (n, 2) semi-axes and (n,) degrees of (n, 2, 2) covariances."""
-    variances, turns = np.linalg.eigh(covariances)
-    angles = np.degrees(np.arctan2(turns[:, 1, 1], turns[:, 0, 1]))
-    return np.sqrt(np.maximum(variances[:, ::-1], 0.0)), angles
+    (across, between), (_, up) = covariances.transpose(1, 2, 0)
+    middle, half = 0.5 * (across + up), np.hypot(0.5 * (across - up), between)
+    angles = np.degrees(0.5 * np.arctan2(between, 0.5 * (across - up)))
+    return np.sqrt(np.maximum(np.column_stack([middle + half, middle - half]), 0.0)), angles
 
 
 def error_bars(places: Floats, low: Floats, high: Floats) -> Floats:
