@@ -13,6 +13,7 @@ from golden_data import golden
 from golden_network import free_network
 from message_codes import as_check
 from photogram import Attitudes, InnerConstraints, InputError, OutOfMemoryError, adjust
+from photogram.arguments.arrays import standard_deviations
 
 
 @pytest.fixture(scope="module")
@@ -166,3 +167,7 @@ def test_results_that_are_copied_or_come_from_another_process_still_answer(small
         np.testing.assert_array_equal(same.point_cofactors, result.point_cofactors)
         selection = [("photo", photo), ("point", point)]
         np.testing.assert_array_equal(same.covariance(selection), result.covariance(selection))
+
+
+def test_a_negative_variance_has_no_standard_deviation():
+    assert np.isnan(standard_deviations(np.array([[[-1e-20]], [[4.0]]]))).tolist() == [[True], [False]]

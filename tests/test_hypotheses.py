@@ -232,6 +232,19 @@ def test_a_missing_term_of_distortion_is_named_before_gross_errors():
     assert every.estimate[every.common()[0], 0] == pytest.approx(0.02, rel=0.2)
 
 
+def test_errors_of_absurd_sizes_are_not_named():
+    """Control heights in feet are not in the catalogue; other errors explain a part of the residuals."""
+    block = block_of("clean")
+    heights = np.where(np.isfinite(block.point_sd[:, 2]), block.point_positions[:, 2] / 0.3048, np.nan)
+    positions = np.column_stack([block.point_positions[:, :2], heights])
+    every = adjust(block.replace(point_positions=positions))._hypotheses()
+    plausible = [np.array(each["plausible"]) for each in every.sets]
+    sizes = [np.abs(every.estimate[row, : len(size)]) / size for row, size in enumerate(plausible)]
+    absurd = {row for row, size in enumerate(sizes) if (size > 5).any()}
+    assert absurd
+    assert not absurd & set(every.common())
+
+
 def test_removed_images_of_one_photo_are_counted_if_they_are_many():
     suspects = adjust(block_of("clean"))._trial().suspects
     images = np.flatnonzero((suspects.kinds == 0) & (suspects.photos == 2))

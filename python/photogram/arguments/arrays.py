@@ -380,8 +380,12 @@ def finite_rows(pairs: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def standard_deviations(covariances: NDArray[np.float64], scale: float = 1.0) -> NDArray[np.float64]:
-    """Return the standard deviations (n, k) of covariance matrices (n, k, k) times a scale."""
-    deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2) * scale)
+    """Return the standard deviations (n, k) of covariance matrices (n, k, k) times a scale.
+
+    NaN for a negative variance, which a nearly singular network has by rounding.
+    """
+    with np.errstate(invalid="ignore"):
+        deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2) * scale)
     return deviations
 
 

@@ -33,6 +33,9 @@ DETECTED = 4.13  # Standard deviations of a check point from which on a change i
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 OF_CAMERAS = frozenset({"camera-f", "camera-point", "camera-term", "readout-time"})
 EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
+ABSURD = 5.0  # Standard deviations of plausible sizes beyond which an error has no plausible size
+ABSURD_PART, UNKNOWN_PART = 0.9, 0.7
+"""Least parts of this excess that errors without a plausible size, or with an unknown one, explain."""
 LISTED = 10  # Rows of each table of documents
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
@@ -194,12 +197,20 @@ class Hypotheses:
         """Return rows of common errors that explain more than single values, the likeliest first."""
         odds, sets = self.log_odds, range(len(self.sets))
         found = [k for k in sets if self.code[k] != "bending" and self.probability[k] < DETECTION[0]]
+        found = [k for k in found if not self._is_absurd(k)]
         found.sort(key=lambda row: -odds[row])
         if not found or odds[found[0]] < max(self.single_odds, rivals):
             return []
         if self.statistic[found[0]] < EXPLAINED * self.excess:
             return []
         return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
+
+    def _is_absurd(self, row: int) -> bool:
+        """Whether the error of a set has no plausible size and leaves a notable part unexplained."""
+        plausible = self.sets[row]["plausible"]
+        sizes = np.abs(self.estimate[row, : len(plausible)]) / plausible
+        least = (ABSURD_PART if (sizes > ABSURD).any() else 0.0) if plausible else UNKNOWN_PART
+        return bool(self.statistic[row] < least * self.excess)
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first."""
