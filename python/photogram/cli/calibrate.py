@@ -21,8 +21,15 @@ from photogram.cli.command_classes import misuse
 from photogram.cli.components import COMPONENTS, MaxBiasRatio
 from photogram.cli.console import print_document, print_remark, print_summary
 from photogram.cli.documents import Documents, OfPrograms
-from photogram.cli.job import InputFile, Job, OutputFolder, adjustment_status, estimation_status, with_job
-from photogram.cli.options import Quiet, Snooping, Threads, check_alone, default_out
+from photogram.cli.job import (
+    Folder,
+    Input,
+    Job,
+    adjustment_status,
+    estimation_status,
+    with_job,
+)
+from photogram.cli.options import Snooping, Threads, check_alone
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -30,8 +37,6 @@ if TYPE_CHECKING:
     from photogram.results.snooping_options import SnoopOptions
     from photogram.show.page import Document
     from photogram.targets import Board, Calibrated, Calibration, ViewPlan
-
-EXAMPLE = ("board",)  # The packaged example, a directory of photogram.examples
 
 
 class CornerBasisName(StrEnum):
@@ -137,13 +142,12 @@ def _board(seen: CalibrationInput) -> Board:
     return board.replace(**{name: value for name, value in changes.items() if value})
 
 
-@with_job
+@with_job(example=("board",), ending="-calibrated")
 def calibrate(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    path: Input,
+    out: Folder,
     documents: OfPrograms,
     seen: CalibrationInput,
     loss: LossName = "none",
@@ -157,7 +161,6 @@ def calibrate(
     planned: Planned,
     threads: Threads = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Calibrate cameras and rigs with images of a board: cameras with their uncertainty.
 
@@ -170,15 +173,12 @@ def calibrate(
     from photogram.show.forms import text
     from photogram.targets.page import drawings
 
-    if path is None:
-        path = job.packaged(*EXAMPLE)
-    target = out or default_out(path, "-calibrated", example)
-    documents.place(target)
-    documents.check_plots(job, target)
+    documents.place(out)
+    documents.check_plots(job, out)
     job.reads_inside(path)
     with job.status("reading corners, finding first values") as status:
         calibration = seen.read(path, None if status is None else status.update)
-    for message in calibration.messages if not quiet else ():
+    for message in calibration.messages if not job.quiet else ():
         print_remark(str(message))
     how: dict[str, Any] = {"loss": None if loss == "none" else loss, "outliers": outliers}
     uncertainty.asked()
@@ -191,12 +191,12 @@ def calibrate(
     document = _document(found, weights)
     files = _files(found, text(document)) | _cameras(found, to or [], uncertainty.need)
     files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
-    page = documents.page(job, "calibrate", target, lambda: document)
-    drawn = documents.plots_of(found.result, target)
+    page = documents.page(job, "calibrate", out, lambda: document)
+    drawn = documents.plots_of(found.result, out)
     if found.worth is not None:
-        drawn |= documents.drawings(partial(drawings, found.worth), target)
+        drawn |= documents.drawings(partial(drawings, found.worth), out)
     job.finish(
-        {target / name: content for name, content in files.items()} | drawn | page,
+        {out / name: content for name, content in files.items()} | drawn | page,
         documents.as_json(found),
         summary=lambda: print_summary(document, "report.txt", "uncertainty", "board", "views"),
         code=found.verdict.exit_code(strict=strict),
