@@ -443,8 +443,17 @@ def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> A
     from photogram.errors import InputError
 
     names = {each.name: _option(each) for each in options}
+    parsers: dict[str, Any] = {each.name: each.metadata.get("parse") for each in fields(kind)}
+    given = {name: values.pop(name) for name in names if values.get(name) is not None}
+    for name in given:
+        try:
+            given[name] = parsers[name](given[name]) if parsers[name] else given[name]
+        except ValueError as error:
+            raise misuse(names[name], "form", form=str(error), value=given[name]) from None
+    for name in names:
+        values.pop(name, None)
     try:
-        return kind(**{name: values.pop(name) for name in names if name in values})
+        return kind(**given)
     except InputError as error:
         known = error.phrase.fields if error.phrase else {}
         if known.get("what") not in names:
