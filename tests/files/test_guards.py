@@ -179,7 +179,7 @@ def test_a_path_that_says_nothing_of_its_use_is_refused_when_the_command_is_made
         raise AssertionError(job, listing)
 
     with pytest.raises(TypeError, match="listing must be marked as one of Reads or Writes"):
-        with_job(forgetful)
+        with_job()(forgetful)
 
 
 def test_words_that_may_be_files_are_marked_too():

@@ -16,7 +16,7 @@ from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.arrays import names as names_of
-from photogram.arguments.arrays import number, one_of, whole_number
+from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.messages import Message
@@ -111,6 +111,7 @@ def orient(
     KeyboardInterrupt
         If interrupted by Ctrl-C.
     """
+    truth_value("trace", trace)
     one_of("method", method, get_args(Method))
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     start = ("auto" if method == "rigorous" else "report") if start is None else start

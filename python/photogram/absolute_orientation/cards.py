@@ -13,6 +13,7 @@ import numpy as np
 
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -98,6 +99,7 @@ def read_cards(
         If the file cannot be read, a record has other words, or the counts M, N, MN differ from the stations.
         The message contains file, record and text.
     """
+    truth_value("zero_missing", zero_missing)
     path = path_of("path", path)
     records = _records(path)
     if len(records) < 2:

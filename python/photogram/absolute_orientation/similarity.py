@@ -11,7 +11,7 @@ import orjson
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import is_covariance, number, numbers, shaped
+from photogram.arguments.arrays import is_covariance, number, numbers, shaped, truth_value
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -236,6 +236,7 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     InputError
         If the file cannot be read, is not such a document, or the orientation is rejected.
     """
+    truth_value("usable", usable)
     path = path_of("path", path)
     with json.holding("result of an absolute orientation", path):
         found = orjson.loads(read_bytes(path))

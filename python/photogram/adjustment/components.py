@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust, adjusted_again, at_least
-from photogram.arguments.arrays import probability
+from photogram.arguments.arrays import probability, truth_value
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -137,6 +137,7 @@ def variance_components(
     AdjustmentError, RankError
         As in the adjustment.
     """
+    truth_value("equality", equality)
     probability("tolerance", tolerance)
     at_least("max_steps", max_steps, 1)
     grouping = grouped(observables(network), groups)

@@ -29,6 +29,8 @@ def option(
     *,
     is_open: bool = False,
     kind: type | None = None,
+    parse: Callable[[str], Any] | None = None,
+    name: str = "",
 ) -> Any:
     """Return a field with its limits.
 
@@ -40,8 +42,13 @@ def option(
         Smallest and largest value; excluded if `is_open`.
     kind
         Type on the command line; None: the type of the field.
+    parse
+        Function that converts the text of the command line; its ValueError has the required form.
+    name
+        Name on the command line; empty: the name of the field.
     """
-    return field(default=default, metadata={"low": low, "high": high, "open": is_open, "kind": kind})
+    limits = {"low": low, "high": high, "open": is_open}
+    return field(default=default, metadata={**limits, "kind": kind, "parse": parse, "name": name})
 
 
 class Checked:

@@ -14,9 +14,8 @@ from rich.markup import escape
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_document, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
-from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, Reads, Writes, with_job
-from photogram.cli.options import Quiet, default_out
-from photogram.cli.projects import Additions, project_path, read_project
+from photogram.cli.job import Folder, Input, InputFile, Job, OutputFile, Reads, Writes, with_job
+from photogram.cli.projects import EXAMPLE, Additions, read_project
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
@@ -24,21 +23,18 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation.orientation import Orientation
     from photogram.io.writing import OutputSet
 
-EXAMPLE = "absolute_orientation"  # The packaged example, a directory of photogram.examples
-
 
 ModelPointSd = Annotated[float, typer.Option(min=0.0)]
 
 
-@with_job
+@with_job(example=("absolute_orientation", "stations.csv"), ending="-oriented")
 def absolute_orientation(
     job: Job,
     *,
-    file: InputFile = None,
-    example: bool = False,
+    file: Input,
     points: InputFile = None,
     points_out: OutputFile = None,
-    out: OutputFolder = None,
+    out: Folder,
     documents: OfPrograms,
     trace: OutputFile = None,
     reject: list[str] | None = None,
@@ -57,7 +53,6 @@ def absolute_orientation(
     ground_unit: str = "ground unit",
     model_unit: str = "model unit",
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
 
@@ -70,14 +65,12 @@ def absolute_orientation(
     from photogram.absolute_orientation.trace import trace_text
     from photogram.messages import Message
 
-    if file is None:
-        directory = job.packaged(EXAMPLE)
-        file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
-        points = points or directory / "points.csv"
-        job.reads(file, points)
-    folder = out or default_out(file, "-oriented", example)
-    target = points_out or (folder / f"{points.stem}-transformed.csv" if points else None)
-    pictures = documents.announce(job, folder, TEXT, picture="residuals")
+    if job.is_example:
+        ground_unit, model_unit = "m", "mm"
+        points = points or file.with_name("points.csv")
+        job.reads(points)
+    target = points_out or (out / f"{points.stem}-transformed.csv" if points else None)
+    pictures = documents.announce(job, out, TEXT, picture="residuals")
     if target:
         job.writes(target)
     deck = _read(file, format, zero_missing, ground_unit, model_unit)
@@ -95,7 +88,7 @@ def absolute_orientation(
     if points and not result.usable:
         result.messages.append(Message.of("orientation.no-points"))
         points = None
-    made = {folder / TEXT: result.report().encode()}
+    made = {out / TEXT: result.report().encode()}
     if pictures:
         made |= {path: result.plot().render(path.suffix[1:]) for path in pictures}
     if trace:
@@ -104,7 +97,7 @@ def absolute_orientation(
         made |= documents.as_json(result)
     made |= _records(result, part_two, restart_out, deck.identification if ident is None else ident)
     document = replace(result.document(), title=file.name)
-    made |= documents.page(job, "absolute-orientation", folder, lambda: document)
+    made |= documents.page(job, "absolute-orientation", out, lambda: document)
     written = list(made)
     with job.outputs() as outputs:
         if points and target:
@@ -119,7 +112,7 @@ def absolute_orientation(
     )
 
 
-@with_job
+@with_job()
 def transform(
     job: Job,
     *,
@@ -128,7 +121,6 @@ def transform(
     out: Annotated[Path, Writes.FILE],
     point_sd: ModelPointSd = 0.0,
     decimals: Annotated[int, typer.Option(min=0, max=15)] = 6,
-    quiet: Quiet = False,
 ) -> None:
     """Transform any number of model points with an earlier orientation (part II)."""
     from photogram.absolute_orientation import read_similarity, transform_file
@@ -148,16 +140,14 @@ def transform(
     job.conclude([out], summary=lambda: output.print(f"{count} points"))
 
 
-@with_job
+@with_job(example=EXAMPLE)
 def relative(
     job: Job,
     *,
-    path: InputFile = None,
-    out: OutputFile = None,
-    example: bool = False,
+    path: Input,
+    out: Annotated[Path, Writes.FILE],
     photos: str | None = None,
     added: Additions,
-    quiet: Quiet = False,
 ) -> None:
     """Orient pairs of photos relatively and join their models to a strip.
 
@@ -165,14 +155,13 @@ def relative(
     projection centre join the models. The table contains the control of the project and the model points.
     Exit code 3: a model did not converge. Exit code 4: a model without redundancy.
     """
-    assert out is not None
     import numpy as np
 
     from photogram.absolute_orientation.models import strip_of
     from photogram.formats.reduced_coordinates import given_control
     from photogram.io.csv_text import csv_text
 
-    project = read_project(job, project_path(job, path), added)
+    project = read_project(job, path, added)
     names = project.block.photo_ids if photos is None else [each.strip() for each in photos.split(",")]
     strip = strip_of(project.block, names)
     control = given_control(project)

@@ -12,9 +12,17 @@ from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark, print_sections, print_summary
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.in_parts import DIVIDING, adjusted_on_disk, print_plan
-from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
-from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, check_alone, default_out
-from photogram.cli.projects import NOTHING, Additions, described, project_path, read_project
+from photogram.cli.job import (
+    Folder,
+    Input,
+    Job,
+    OutputFolder,
+    Without,
+    adjustment_status,
+    with_job,
+)
+from photogram.cli.options import OrderingName, Snooping, Threads, check_alone
+from photogram.cli.projects import EXAMPLE, NOTHING, Additions, described, read_project
 from photogram.cli.statement_output import OfHead, stated, statement_files
 from photogram.distributed.division import Division
 from photogram.lazy_dataclasses import replace
@@ -31,13 +39,12 @@ if TYPE_CHECKING:
     from photogram.words import Phrase
 
 
-@with_job
+@with_job(example=EXAMPLE, ending="-adjusted")
 def adjust(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    path: Input,
+    out: Folder,
     documents: Documents,
     added: Additions,
     choices: Choices,
@@ -52,7 +59,6 @@ def adjust(
     ordering: OrderingName = "auto",
     threads: Threads = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Adjust a block of any supported format: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...
 
@@ -60,18 +66,16 @@ def adjust(
     and all other observations (standard deviations, redundancy numbers, test values), and the adjusted
     project.
     """
-    path = project_path(job, path)
-    target = out or default_out(path, "-adjusted", example)
-    documents.place(target)  # rejected before any input is read
+    documents.place(out)  # rejected before any input is read
     if not statement:
         wanted.check_alone()
     if snoop:
         check_alone(job, "--snoop", DIVIDING)
     if ordering != "auto":
         check_alone(job, "--ordering", DIVIDING)
-    documents.check_plots(job, target)
+    documents.check_plots(job, out)
     parts = None if run is None and division == Division() else replace(division, folder=run)
-    on_disk = partial(adjusted_on_disk, job, path, target, choices=choices, threads=threads, is_plan=plan)
+    on_disk = partial(adjusted_on_disk, job, path, out, choices=choices, threads=threads, is_plan=plan)
     if parts and added == NOTHING and on_disk(parts):
         return
     project = read_project(job, path, added)
@@ -79,7 +83,7 @@ def adjust(
     project = choices.of(project)
     asked = wanted.asked(project, added, project.block.linear_unit) if statement else None
     sections = described(project)
-    if not quiet:
+    if not job.quiet:
         print_sections(sections, "`photogram info`")
     if documents.crs is not None:
         from photogram.formats.crs_results import check_place
@@ -91,7 +95,7 @@ def adjust(
 
         print_plan(plan_in_parts(block, parts or division, project.options))
         return
-    for remark in started.messages if started is not None and not quiet else ():
+    for remark in started.messages if started is not None and not job.quiet else ():
         print_remark(str(remark))
 
     def adjusted(start: Block | FirstValues) -> Result:
@@ -108,7 +112,7 @@ def adjust(
         with job.status("stating"):
             given: dict[str, Any] = {"command": "adjust", "crs": documents.crs, "strict": strict}
             own = stated(job, result, asked, assumed=project.lacks, **given)
-    _finish(job, project, result, removed, target, documents, sections, own, strict=strict)
+    _finish(job, project, result, removed, out, documents, sections, own, strict=strict)
 
 
 def _finish(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -9,29 +10,37 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from photogram.arguments.fields import option
 from photogram.cli.calibration_options import (
     NOT_GOOD_ENOUGH,
     CalibrationInput,
     PriorName,
-    Uncertainty,
-    distances_of,
+    appraised,
 )
 from photogram.cli.choices import LossName
 from photogram.cli.command_classes import misuse
 from photogram.cli.components import COMPONENTS, MaxBiasRatio
 from photogram.cli.console import print_document, print_remark, print_summary
 from photogram.cli.documents import Documents, OfPrograms
-from photogram.cli.job import InputFile, Job, OutputFolder, adjustment_status, estimation_status, with_job
-from photogram.cli.options import Quiet, Snooping, Threads, check_alone, default_out
+from photogram.cli.job import (
+    Folder,
+    Input,
+    InputFile,
+    Job,
+    Without,
+    adjustment_status,
+    estimation_status,
+    with_job,
+)
+from photogram.cli.options import Snooping, Threads, check_alone
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.targets.worth_options import WorthOptions, distances_of
 
 if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
     from photogram.results.snooping_options import SnoopOptions
     from photogram.show.page import Document
     from photogram.targets import Board, Calibrated, Calibration, ViewPlan
-
-EXAMPLE = ("board",)  # The packaged example, a directory of photogram.examples
 
 
 class CornerBasisName(StrEnum):
@@ -60,7 +69,7 @@ class Planned:
     plan_views: Annotated[int | None, typer.Option("--plan", min=4)] = None
     view_field: Annotated[float | None, typer.Option("--field")] = None
     focal: float | None = None
-    away: str | None = None
+    away: Sequence[float] = option((), kind=str, parse=distances_of)
 
     @property
     def asked(self) -> bool:
@@ -69,7 +78,7 @@ class Planned:
             raise misuse("--field, --focal, --away", "requires", options="--plan")
         return self.plan_views is not None
 
-    def made(self, job: Job, seen: CalibrationInput, uncertainty: Uncertainty) -> ViewPlan:
+    def made(self, job: Job, seen: CalibrationInput, worth: WorthOptions, need: float | None) -> ViewPlan:
         """Return the plan of views of a board for a nominal camera."""
         from photogram.targets import nominal_camera, plan_views
 
@@ -86,11 +95,11 @@ class Planned:
                 camera,
                 _board(seen),
                 size,
-                uncertainty.distances,
+                worth.distances,
                 sd0=seen.sd0() or CORNER_SD,
                 views=self.plan_views or 0,
-                need=uncertainty.need or 0.0,
-                away=distances_of(self.away, "--away"),
+                need=need or 0.0,
+                away=self.away,
                 progress=None if status is None else status.update,
             )
 
@@ -98,23 +107,24 @@ class Planned:
         self,
         job: Job,
         seen: CalibrationInput,
-        uncertainty: Uncertainty,
+        worth: WorthOptions,
+        need: float | None,
         documents: Documents,
         out: Path | None,
     ) -> None:
         """Plan views, write and print the plan."""
         target = out or Path("planned-views")
         documents.check_plots(job, target)
-        plan = self.made(job, seen, uncertainty)
+        plan = self.made(job, seen, worth, need)
         from photogram.io.csv_text import csv_text
         from photogram.show.quantity import frame
         from photogram.targets.page import worth_files
 
-        document, worth = plan.document(), plan.calibrated.worth
-        assert worth is not None
+        document, made = plan.document(), plan.calibrated.worth
+        assert made is not None
 
         views = csv_text(frame(document.table("views").columns))
-        texts = {"report.txt": plan.report().encode(), "views.csv": views, **worth_files(worth)}
+        texts = {"report.txt": plan.report().encode(), "views.csv": views, **worth_files(made)}
         job.finish(
             {target / name: content for name, content in texts.items()}
             | documents.drawings(document.drawings, target)
@@ -137,13 +147,12 @@ def _board(seen: CalibrationInput) -> Board:
     return board.replace(**{name: value for name, value in changes.items() if value})
 
 
-@with_job
+@with_job(example=("board",), ending="-calibrated")
 def calibrate(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    path: Input,
+    out: Folder,
     documents: OfPrograms,
     seen: CalibrationInput,
     loss: LossName = "none",
@@ -153,11 +162,12 @@ def calibrate(
     to: list[str] | None = None,
     components: list[CornerBasisName] | None = None,
     max_bias_ratio: MaxBiasRatio = None,
-    uncertainty: Uncertainty,
+    worth: Annotated[WorthOptions, Without("grid")],
+    need: Annotated[float | None, typer.Option(min=0.0)] = None,
+    compare_with: Annotated[InputFile, typer.Option("--compare")] = None,
     planned: Planned,
     threads: Threads = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Calibrate cameras and rigs with images of a board: cameras with their uncertainty.
 
@@ -165,38 +175,37 @@ def calibrate(
     cameras, and the adjusted project. --plan suggests views before the first photograph.
     """
     if planned.asked:
-        planned.run(job, seen, uncertainty, documents, out)
+        planned.run(job, seen, worth, need, documents, out)
         return
     from photogram.show.forms import text
     from photogram.targets.page import drawings
 
-    if path is None:
-        path = job.packaged(*EXAMPLE)
-    target = out or default_out(path, "-calibrated", example)
-    documents.place(target)
-    documents.check_plots(job, target)
+    documents.place(out)
+    documents.check_plots(job, out)
     job.reads_inside(path)
     with job.status("reading corners, finding first values") as status:
         calibration = seen.read(path, None if status is None else status.update)
-    for message in calibration.messages if not quiet else ():
+    for message in calibration.messages if not job.quiet else ():
         print_remark(str(message))
     how: dict[str, Any] = {"loss": None if loss == "none" else loss, "outliers": outliers}
-    uncertainty.asked()
-    found = uncertainty.told(
+    found = appraised(
         job,
         _adjusted(job, calibration, how, threads, snooping if snoop else None, max_bias_ratio),
+        worth,
+        need,
+        compare_with,
         lambda other: seen.read(other).adjust(**how, threads=threads),
     )
     weights = _weights(job, found, components or [], threads)
     document = _document(found, weights)
-    files = _files(found, text(document)) | _cameras(found, to or [], uncertainty.need)
+    files = _files(found, text(document)) | _cameras(found, to or [], need)
     files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
-    page = documents.page(job, "calibrate", target, lambda: document)
-    drawn = documents.plots_of(found.result, target)
+    page = documents.page(job, "calibrate", out, lambda: document)
+    drawn = documents.plots_of(found.result, out)
     if found.worth is not None:
-        drawn |= documents.drawings(partial(drawings, found.worth), target)
+        drawn |= documents.drawings(partial(drawings, found.worth), out)
     job.finish(
-        {target / name: content for name, content in files.items()} | drawn | page,
+        {out / name: content for name, content in files.items()} | drawn | page,
         documents.as_json(found),
         summary=lambda: print_summary(document, "report.txt", "uncertainty", "board", "views"),
         code=found.verdict.exit_code(strict=strict),

@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from photogram.cli.command_classes import misuse
-from photogram.cli.job import InputFile, Job
+from photogram.cli.job import Job
 from photogram.cli.options import pair
 from photogram.cli.projects import OriginName
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
-    from photogram.targets.cross_validation import Into
-    from photogram.targets.worth import WorthOptions
+    from photogram.targets.worth_options import WorthOptions
 
 
 ShapeName = Literal["held", "bend", "points"]
@@ -170,73 +169,25 @@ def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
 NOT_GOOD_ENOUGH = 4  # Exit code, as of results that should not be used
 
 
-DatumName = Literal["corners", "mean-frames", "image", "axes"]
+def appraised(
+    job: Job,
+    found: Calibrated,
+    options: WorthOptions,
+    need: float | None,
+    compare_with: Path | None,
+    calibrated: Callable[[Path], Calibrated],
+) -> Calibrated:
+    """Return an adjusted calibration with its uncertainty, and its differences from another one."""
+    from photogram.targets.appraisal import appraise
+    from photogram.targets.findings import judged
+    from photogram.targets.uncertainty import difference
 
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """Options for the uncertainty of a calibration."""
-
-    map_distance: Annotated[str | None, typer.Option("--distance")] = None
-    map_datum: Annotated[DatumName, typer.Option("--datum")] = "corners"
-    noise_only: bool = False
-    need: Annotated[float | None, typer.Option(min=0.0)] = None
-    cross_validate: str = "odd"
-    compare_with: Annotated[InputFile, typer.Option("--compare")] = None
-    suggest: Annotated[int, typer.Option(min=0)] = 0
-
-    def asked(self) -> WorthOptions:
-        """Return the options of the uncertainty of a calibration."""
-        from photogram.targets.worth import WorthOptions
-
-        return WorthOptions(
-            distances=self.distances,
-            datum=self.map_datum,
-            noise_only=self.noise_only,
-            cross_validate=self._split(),
-            suggest=self.suggest,
-        )
-
-    @property
-    def distances(self) -> list[float]:
-        """Distances of maps; None: defaults."""
-        return distances_of(self.map_distance, "--distance")
-
-    def _split(self) -> Into | None:
-        if self.cross_validate == "none":
-            return None
-        if self.cross_validate in ("odd", "halves"):
-            return cast("Into", self.cross_validate)
-        if not (self.cross_validate.isdecimal() and int(self.cross_validate) > 1):
-            form = "odd, halves, none, or a number greater than 1"
-            raise misuse("--cross-validate", "form", form=form, value=self.cross_validate)
-        return int(self.cross_validate)
-
-    def told(self, job: Job, found: Calibrated, calibrated: Callable[[Path], Calibrated]) -> Calibrated:
-        """Return an adjusted calibration with its uncertainty."""
-        from photogram.targets.appraisal import appraise
-        from photogram.targets.findings import judged
-        from photogram.targets.uncertainty import difference
-
-        with job.status("uncertainty") as status:
-            own = appraise(found, self.asked(), None if status is None else status.update)
-        if self.compare_with is None:
-            return judged(found, own, self.need)
-        other = calibrated(self.compare_with)
-        distances = self.distances or [math.inf]
-        apart = [
-            difference(found, other, distances, camera=number)
-            for number in range(min(len(found.cameras), len(other.cameras)))
-        ]
-        return judged(found, replace(own, differences=tuple(apart)), self.need)
-
-
-def distances_of(text: str | None, option: str) -> list[float]:
-    """Return distances with commas between them."""
-    try:
-        found = [float(each) for each in (text or "").split(",") if each.strip()]
-    except ValueError:
-        found = [math.nan]
-    if not all(each > 0 for each in found):
-        raise misuse(option, "form", form="a list of distances, such as 1,inf", value=text)
-    return found
+    with job.status("uncertainty") as status:
+        worth = appraise(found, options, None if status is None else status.update)
+    if compare_with is not None:
+        second = calibrated(compare_with)
+        count = min(len(found.cameras), len(second.cameras))
+        distances = options.distances or [math.inf]
+        apart = [difference(found, second, distances, camera=number) for number in range(count)]
+        worth = replace(worth, differences=tuple(apart))
+    return judged(found, worth, need)

@@ -11,27 +11,22 @@ import typer
 
 from photogram.cli.command_classes import misuse
 from photogram.cli.documents import PageAndJson
-from photogram.cli.job import InputFile, Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, default_out
+from photogram.cli.job import Folder, Input, Job, OutputFolder, Reads, with_job
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
     from photogram.film.years import DatedCamera
 
-EXAMPLE = ("certificate", "rc10.toml")  # The packaged example, in photogram.examples
 
-
-@with_job
+@with_job(example=("certificate", "rc10.toml"))
 def certificate(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
+    path: Input,
     camera: str | None = None,
     out: OutputFolder = None,
     documents: PageAndJson,
-    quiet: Quiet = False,
 ) -> None:
     """Check a camera's certificate: typing errors, marks from distances, lens from its table.
 
@@ -41,22 +36,20 @@ def certificate(
     """
     from photogram.film import Certificate
 
-    found = Certificate.read(job.packaged(*EXAMPLE) if path is None else path, camera)
+    found = Certificate.read(path, camera)
     documents.conclude(job, "certificate", found, out, text=False)
 
 
-@with_job
+@with_job(example=(), ending="-compared", name="camera")
 def compare_certificates(
     job: Job,
     *,
     calibrations: Annotated[list[Path] | None, Reads.FILE] = None,
-    example: bool = False,
     day: list[str] | None = None,
     name: str = "1",
     angle: Annotated[float | None, typer.Option(min=0.1, max=89.0)] = None,
-    out: OutputFolder = None,
+    out: Folder,
     documents: PageAndJson,
-    quiet: Quiet = False,
 ) -> None:
     """Compare calibrations of cameras over years: drift, steps, control charts.
 
@@ -65,18 +58,15 @@ def compare_certificates(
     """
     from photogram.film.years import compare_cameras
 
-    if example:
+    if job.is_example:
         from photogram.film.years.example import simulated_certificates
 
         read: list[Certificate | DatedCamera] = [*simulated_certificates()]
-        folder = out or Path("camera-compared")
     else:
-        paths = calibrations or []
-        read = _read(paths, day or [], name)
-        folder = out or default_out(paths[0], "-compared")
+        read = _read(calibrations or [], day or [], name)
     found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
     tables = ("calibrations", "series")
-    documents.conclude(job, "camera compare", found, folder, text=False, tables=tables)
+    documents.conclude(job, "camera compare", found, out, text=False, tables=tables)
 
 
 def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:

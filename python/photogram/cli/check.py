@@ -9,27 +9,25 @@ from typing import TYPE_CHECKING, Annotated
 
 from photogram.cli.console import print_sections
 from photogram.cli.documents import TEXT, PageAndJson
-from photogram.cli.job import InputFile, Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, Threads, default_out
-from photogram.cli.projects import Additions, described, project_path, read_project
+from photogram.cli.job import Folder, Input, Job, Reads, with_job
+from photogram.cli.options import Threads
+from photogram.cli.projects import EXAMPLE, Additions, described, read_project
 
 if TYPE_CHECKING:
     pass
 
-EXAMPLE = "galveston"  # The packaged example, a directory of photogram.examples
+GALVESTON = "galveston"  # The packaged example, a directory of photogram.examples
 
 
-@with_job
+@with_job(example=EXAMPLE, ending="-checked")
 def check_project(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    path: Input,
+    out: Folder,
     documents: PageAndJson,
     added: Additions,
     threads: Threads = None,
-    quiet: Quiet = False,
 ) -> None:
     """Search for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.
 
@@ -37,28 +35,24 @@ def check_project(
     """
     from photogram import diagnose
 
-    path = project_path(job, path)
-    out = out or default_out(path, "-checked", example)
     documents.place(out)  # rejected before any input is read
     project = read_project(job, path, added)
-    if not quiet:
+    if not job.quiet:
         print_sections(described(project), "`photogram info`")
     with job.status("checking"):
         found = diagnose(project.block, threads=threads)
     documents.conclude(job, "check", found, out)
 
 
-@with_job
+@with_job(example=(GALVESTON,), ending="-checked", name=GALVESTON)
 def check(
     job: Job,
     *,
-    directory: Annotated[Path | None, Reads.PROJECT] = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    directory: Annotated[Path, Reads.PROJECT],
+    out: Folder,
     documents: PageAndJson,
     limits: str | None = None,
     threads: Threads = None,
-    quiet: Quiet = False,
 ) -> None:
     """Search for errors in a GIANT project: blunders, wrong names, stations and control that do not fit.
 
@@ -67,10 +61,6 @@ def check(
     from photogram.giant import Limits, read_project
     from photogram.giant.checking import check as checked
 
-    if directory is None:
-        out = out or Path(f"{EXAMPLE}-checked")
-    directory = job.input(directory, EXAMPLE)
-    out = out or default_out(directory, "-checked")
     documents.announce(job, out, TEXT)
     project = read_project(directory)
     allowed = Limits.parse(limits) if limits else None

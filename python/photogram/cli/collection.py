@@ -11,8 +11,8 @@ from photogram.cli.command_classes import misuse
 from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, MaxBiasRatio, snooped
 from photogram.cli.console import print_sections, print_summary
 from photogram.cli.documents import TEXT, Documents
-from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
-from photogram.cli.options import OrderingName, Quiet, Threads, check_alone
+from photogram.cli.job import Input, Job, OutputFolder, Without, adjustment_status, with_job
+from photogram.cli.options import OrderingName, Threads, check_alone
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.snooping_options import SnoopOptions, UnitWeight
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photogram.adjustment import robust
     from photogram.collection import AdjustedCollection, Collection
 
-EXAMPLE = ("collection", "ring.txt")  # The packaged example, in photogram.examples
 PACKED = (".bz2", ".gz")
 
 
@@ -46,12 +45,11 @@ class CollectionFit:
         return None
 
 
-@with_job
+@with_job(example=("collection", "ring.txt"))
 def collection(
     job: Job,
     *,
-    problem: InputFile = None,
-    example: bool = False,
+    problem: Input,
     out: OutputFolder = None,
     documents: Annotated[Documents, Without("xlsx", "crs", "map")],
     fit: CollectionFit,
@@ -62,7 +60,6 @@ def collection(
     snooping: Annotated[SnoopOptions, Without("robust", "parts", "max_rounds", "unit_weight")],
     unit_weight: UnitWeight = "unknown",
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Adjust photos of unknown cameras by Levenberg-Marquardt steps from any initial values."""
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
@@ -71,9 +68,8 @@ def collection(
     from photogram.collection.formats import recognised
     from photogram.show.forms import text
 
-    if example and documents.plots:
+    if job.is_example and documents.plots:
         out = out or Path("example-adjusted")
-    problem = job.input(problem, *EXAMPLE)
     packing = problem.suffix if problem.suffix in PACKED else ""
     photos, found = recognised(problem)
     adjusted = f"adjusted{found.suffix}{packing}"

@@ -64,14 +64,17 @@ def option_of(field: Field[Any], kind: type) -> Parameter:
     hint: Any = field.metadata.get("kind")
     if hint is None:
         hint = eval(str(field.type), vars(sys.modules[kind.__module__]))
-    elif field.default is None:
+    default = None if field.default == () else field.default
+    if field.metadata.get("kind") is not None and default is None:
         hint |= None
+    if name := field.metadata.get("name"):
+        hint = Annotated[hint, typer.Option(name)]
     low, high = (field.metadata.get(name, math.inf) for name in ("low", "high"))
     if hint is int:
         limits = (("min", low), ("max", high))
         closed: dict[str, Any] = {name: limit for name, limit in limits if isinstance(limit, int)}
         hint = Annotated[int, typer.Option(**closed)] if closed else int
-    parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hint)
+    parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=hint)
     parameter = declared(parameter, kind.__name__)
     if hint in (float, float | None) and max(-low, high) < UNLIMITED:
         sign = "<" if field.metadata["open"] else "<="

@@ -13,28 +13,24 @@ import typer
 
 from photogram.cli.console import print_document, print_remark, print_withheld
 from photogram.cli.documents import Documents, PageAndJson
-from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
-from photogram.cli.options import Quiet, default_out
+from photogram.cli.job import Folder, Job, OutputFile, Reads, Without, with_job
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
-EXAMPLE = ("comparator", "comparator-3.txt")  # The packaged example, a deck in photogram.examples
-
 
 Hand = Literal["file", "left", "right"]  # Handedness of the comparator against the plate
 
 
-@with_job
+@with_job(example=("comparator", "comparator-3.txt"), ending="-calibrated", name="comparator")
 def comparator(
     job: Job,
     *,
     paths: Annotated[list[Path] | None, Reads.FILE] = None,
-    example: bool = False,
     grid: Annotated[list[str] | None, Reads.FILE] = None,
     hand: Hand = "file",
-    out: OutputFolder = None,
+    out: Folder,
     json: OutputFile = None,
     documents: Annotated[PageAndJson, Without("json")],
     pdf: bool = False,
@@ -45,7 +41,6 @@ def comparator(
     each_case: bool = False,
     date: str | None = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Calibrate a comparator from measurements of a grid plate.
 
@@ -56,9 +51,6 @@ def comparator(
     from photogram.errors import InputError
     from photogram.statistics.verdict import worst
 
-    if example:
-        paths = [job.input(None, *EXAMPLE)]
-        out = out or Path("comparator-calibrated")
     left_handed = None if hand == "file" else hand == "left"
     sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
     options = Options.as_published() if as_published else Options()
@@ -70,11 +62,10 @@ def comparator(
         for message in (message for one in calibrations for message in one.messages):
             text = message.phrase or str(message.text)
             raise InputError(text, file=message.file, record=message.record, text=message.record_text)
-    folder = out or default_out((paths or [])[0], "-calibrated")
     job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
     several = len(calibrations) > 1
-    placed = {folder / str(k) if several else folder: one for k, one in enumerate(calibrations, 1)}
-    written = _results(placed, _run_date(date), pdf=pdf and plots, quiet=quiet)
+    placed = {out / str(k) if several else out: one for k, one in enumerate(calibrations, 1)}
+    written = _results(job, placed, _run_date(date), pdf=pdf and plots)
     if documents.html is not None or (plots and not pdf):
         written |= _pages(job, placed, documents)
     asked = {json: _document(calibrations)} if json is not None else {}
@@ -116,7 +107,7 @@ def _run_date(date: str | None) -> str:
         raise InputError(phrase("command.epoch", value=epoch)) from None
 
 
-def _results(placed: dict[Path, Calibration], run_date: str, *, pdf: bool, quiet: bool) -> dict[Path, bytes]:
+def _results(job: Job, placed: dict[Path, Calibration], run_date: str, *, pdf: bool) -> dict[Path, bytes]:
     """Return all files of the output folder except pages."""
     from photogram.comparator import listing
 
@@ -129,7 +120,7 @@ def _results(placed: dict[Path, Calibration], run_date: str, *, pdf: bool, quiet
         try:
             written |= {place / "report.pdf": _pdf(one, run_date) for place, one in placed.items()}
         except ModuleNotFoundError:
-            if not quiet:
+            if not job.quiet:
                 print_remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
     return written
 
@@ -163,7 +154,7 @@ def _summarize(calibrations: list[Calibration]) -> None:
         print_document(calibration.document(), "variance", "linear", remarks=remarks)
 
 
-@with_job
+@with_job()
 def correct(
     job: Job,
     *,
@@ -172,7 +163,6 @@ def correct(
     corrected: OutputFile = None,
     invert: bool = False,
     extrapolate: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Correct measurements with a calibration.
 
@@ -186,7 +176,7 @@ def correct(
     made, remarks = correct_table(
         Correction.read(correction), read_table(measurements), invert=invert, extrapolate=extrapolate
     )
-    if not quiet:
+    if not job.quiet:
         for remark in remarks:
             print_remark(remark)
     if corrected is None:
@@ -194,15 +184,13 @@ def correct(
     job.finish({corrected: made} if corrected else {})
 
 
-@with_job
+@with_job(example=(), ending="-compared", name="comparator")
 def compare_calibrations(
     job: Job,
     *,
     calibrations: Annotated[list[Path] | None, Reads.FILE] = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    out: Folder,
     documents: PageAndJson,
-    quiet: Quiet = False,
 ) -> None:
     """Compare calibrations over years: drift, steps, control charts; adjust their grids together.
 
@@ -211,22 +199,19 @@ def compare_calibrations(
     """
     from photogram.comparator import compare as compared
 
-    if example:
+    if job.is_example:
         from photogram.comparator.simulation import simulated_years
 
         found = compared(simulated_years())
-        folder = out or Path("comparator-compared")
     else:
-        paths = calibrations or []
-        found = compared(paths)
-        folder = out or default_out(paths[0], "-compared")
+        found = compared(calibrations or [])
     grids = found.grids if found.usable_grids else {}
     documents.conclude(
         job,
         "comparator compare",
         found,
-        folder,
+        out,
         text=False,
-        more={folder / f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()},
+        more={out / f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()},
         tables=("calibrations", "series"),
     )

@@ -11,7 +11,7 @@ import typer
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_document
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, pair
+from photogram.cli.options import pair
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
@@ -51,7 +51,7 @@ class LensFit:
         )
 
 
-@with_job
+@with_job()
 def convert_lens(
     job: Job,
     *,
@@ -64,7 +64,6 @@ def convert_lens(
     out: OutputFolder = None,
     json: OutputFile = None,
     plots: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Fit a lens of another model to a camera and report the differences.
 

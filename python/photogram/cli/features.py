@@ -9,8 +9,8 @@ import typer
 from photogram.cli.adjust import result_at
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_sections
-from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, with_job
-from photogram.cli.options import Quiet, Threads
+from photogram.cli.job import Input, Job, OutputFile, OutputFolder, with_job
+from photogram.cli.options import Threads
 from photogram.cli.projects import Additions
 from photogram.lazy_dataclasses import dataclass, fields
 
@@ -43,12 +43,11 @@ class FeatureOptions:
         return found
 
 
-@with_job
+@with_job(example=("flange",))
 def features(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
+    path: Input,
     wanted: FeatureOptions,
     k: Annotated[float, typer.Option("-k", min=0.01)] = 2.0,
     coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None,
@@ -57,7 +56,6 @@ def features(
     added: Additions,
     threads: Threads = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.
 
@@ -65,7 +63,6 @@ def features(
     project are fitted if no option defines features. --example is the project of `photogram new --kind
     metrology`.
     """
-    path = job.packaged("flange") if path is None else path
     from photogram import features as fitted
     from photogram.formats.adjusted import feature_files
     from photogram.io.json import to_json

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from photogram.cli.adjust import adjusted_block, started_block
 from photogram.cli.console import print_sections
 from photogram.cli.documents import PageAndJson
-from photogram.cli.job import InputFile, Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, Threads, default_out
+from photogram.cli.job import Folder, Input, Job, OutputFolder, Reads, with_job
+from photogram.cli.options import Threads
 from photogram.cli.projects import NOTHING, Additions, read_project
 from photogram.lazy_dataclasses import replace
 from photogram.messages import counted
@@ -19,21 +19,17 @@ if TYPE_CHECKING:
     from photogram import Result
     from photogram.show.forms import TitledLines
 
-EXAMPLE = ("archive",)  # The packaged example, in photogram.examples
 
-
-@with_job
+@with_job(example=("archive",), ending="-film")
 def film(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    path: Input,
+    out: Folder,
     documents: PageAndJson,
     added: Additions,
     threads: Threads = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Adjust a block on film in one step and in two steps, and report the differences.
 
@@ -43,13 +39,11 @@ def film(
 
     --example is the project of `photogram new --kind archive`.
     """
-    source = job.packaged(*EXAMPLE) if path is None else path
-    target = out or default_out(source, "-film", example)
     from photogram.film import compare_steps
 
-    found = compare_steps(*(_adjusted(job, source, added, how, threads) for how in ("inside", "before")))
+    found = compare_steps(*(_adjusted(job, path, added, how, threads) for how in ("inside", "before")))
     code = found.inside.verdict.exit_code(strict=strict)
-    documents.conclude(job, "film", found, target, code=code)
+    documents.conclude(job, "film", found, out, code=code)
 
 
 def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: int | None) -> Result:
@@ -64,14 +58,13 @@ def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: in
     return adjusted_block(job, project, started or block, threads=threads)
 
 
-@with_job
+@with_job()
 def marks(
     job: Job,
     *,
     path: Annotated[Path, Reads.PROJECT],
     out: OutputFolder = None,
     name: str = "1",
-    quiet: Quiet = False,
 ) -> None:
     """Write tables of the fiducial marks of MicMac, or MicMac files of the marks of a project.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from photogram.cli.check import EXAMPLE
+from photogram.cli.check import GALVESTON
 from photogram.cli.command_classes import misuse
 from photogram.cli.components import (
     COMPONENTS,
@@ -21,16 +21,22 @@ from photogram.cli.components import (
 )
 from photogram.cli.console import SHOWN, errors, print_summary
 from photogram.cli.documents import Documents, check_maps
-from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, adjustment_status, with_job
+from photogram.cli.job import (
+    Folder,
+    Job,
+    OutputFile,
+    Reads,
+    Without,
+    adjustment_status,
+    with_job,
+)
 from photogram.cli.options import (
     AirModel,
     OrderingName,
-    Quiet,
     Snooping,
     Threads,
     WaterModel,
     check_alone,
-    default_out,
 )
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.words import phrase
@@ -64,13 +70,12 @@ class GiantOptions:
         return self.unit_variance or said
 
 
-@with_job
+@with_job(example=(GALVESTON,), ending="-adjusted", name=GALVESTON)
 def giant(
     job: Job,
     *,
-    directory: Annotated[Path | None, Reads.PROJECT] = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    directory: Annotated[Path, Reads.PROJECT],
+    out: Folder,
     documents: Annotated[Documents, Without("xlsx", "crs")],
     listing: OutputFile = None,
     how: GiantOptions,
@@ -79,7 +84,6 @@ def giant(
     snooping: Snooping,
     limits: str | None = None,
     strict: bool = False,
-    quiet: Quiet = False,
     overwrite: bool = False,
 ) -> None:
     """Adjust a GIANT project: photographs, points and their covariances.
@@ -90,10 +94,7 @@ def giant(
     from photogram.show.forms import text
 
     check_maps(documents.map)
-    if directory is None:
-        out = out or Path(f"{EXAMPLE}-adjusted")
-    directory = job.input(directory, EXAMPLE)
-    out = _output_directory(directory, out, overwrite)
+    _check_output(out, overwrite)
     documents.announce(job, out, *RESULTS, *([COMPONENTS] if how.components else []))
     documents.check_plots(job, out)
     project, block, allowed = _project_and_block(job, directory, limits, how)
@@ -116,21 +117,19 @@ def giant(
         written,
         asked,
         documents.data(found.result),
-        documents.charts(found.result, quiet=quiet),
+        documents.charts(found.result, quiet=job.quiet),
         summary=lambda: print_summary(found.document, "report.txt"),
         code=found.verdict.exit_code(strict=strict),
     )
 
 
-def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
-    """Return the output folder; reject one of another project."""
+def _check_output(out: Path, overwrite: bool) -> None:
+    """Reject the folder of another project as output folder."""
     from photogram.errors import InputError
     from photogram.giant.files import present_files
 
-    if out is None:
-        return default_out(directory, "-adjusted")
     if not out.is_dir():
-        return out
+        return
     present = present_files(out)
     inputs = [path.name for name in ("COMMON", "CAMERAS", "IMAGES") for path in present[name]]
     if inputs and not overwrite:
@@ -139,7 +138,6 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
         others = [path for path in present[name] if path.name != name]
         if inputs and others:
             raise InputError(phrase("command.second-file", name=name), file=others[0])
-    return out
 
 
 def _result_files(

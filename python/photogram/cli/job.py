@@ -5,12 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import fields, is_dataclass, replace
 from datetime import UTC, datetime
 from enum import Enum
-from functools import wraps
+from functools import partial, wraps
 from importlib.resources import as_file, files
 from inspect import Parameter, signature
 from pathlib import Path
@@ -54,8 +54,10 @@ class Writes(Enum):
     EITHER = "file or directory"
 
 
+Input = Annotated[Path, Reads.FILE]
 InputFile = Annotated[Path | None, Reads.FILE]
 OutputFile = Annotated[Path | None, Writes.FILE]
+Folder = Annotated[Path, Writes.DIRECTORY]
 OutputFolder = Annotated[Path | None, Writes.DIRECTORY]
 
 
@@ -84,7 +86,7 @@ class Job:
         self._failures = failures()
         self._resources = ExitStack()
         self._examples: list[Path] = []
-        self.quiet = quiet
+        self.quiet, self.is_example = quiet, False
 
     def __enter__(self) -> Job:
         self._failures.__enter__()
@@ -112,13 +114,6 @@ class Job:
         found = self._resources.enter_context(as_file(files("photogram").joinpath("examples", *example)))
         self._examples.append(found if found.is_dir() else found.parent)
         return found
-
-    def input(self, path: Path | None, *example: str) -> Path:
-        """Return an input, or a packaged example if none was specified."""
-        if path is None:
-            path = self.packaged(*example)
-            self.reads(path)
-        return path
 
     def shown(self, path: Path) -> Path:
         """Return a path for messages; a path of the package is relative."""
@@ -150,6 +145,11 @@ class Job:
     def writes(self, *files: Path) -> None:
         """Declare further outputs, and check them now."""
         self._outputs += [path for path in files if path not in self._outputs]
+        self._check()
+
+    def writes_inside(self, folder: Path) -> None:
+        """Declare an output folder, and check it now."""
+        self._directories.append(folder)
         self._check()
 
     def write(self, *results: Files | Callable[[], Files]) -> list[Path]:
@@ -346,14 +346,54 @@ def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tu
     return options, grouped
 
 
-def with_job(command: Callable[..., None]) -> Callable[..., None]:
-    """Run a command inside a :class:`Job`, its parameter `job`.
+def default_out(source: Path, ending: str, example: str = "") -> Path:
+    """Return the default output folder: name of the input, or of the example, with an ending.
 
-    The fields of a parameter that is a dataclass are options, except fields in a mark :class:`Without`. The
-    option `--example`, or `--plan` of views, replaces the first argument.
+    It is in the folder of the input, or in the current folder if that is read-only or the input is packaged.
     """
+    if example:
+        return Path(f"{example}{ending}")
+    place = Path(os.path.realpath(source))
+    parent = place.parent if os.access(place.parent, os.W_OK) else Path()
+    return parent / f"{place.name if place.is_dir() else place.stem}{ending}"
+
+
+def with_job(
+    *,
+    example: Sequence[str] | None = None,
+    ending: str = "",
+    name: str = "example",
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that runs a command inside a :class:`Job`, its parameter `job`.
+
+    The fields of a parameter that is a dataclass are options, except fields in a mark :class:`Without`. Each
+    command has the option `--quiet`.
+
+    Parameters
+    ----------
+    example
+        The packaged example, a directory of photogram.examples and a file in it, that the option `--example`
+        assigns to the first argument. Empty: the command makes its example. None: without the option.
+    ending
+        Ending of the default of `out`, after the name of the first argument; empty: without default.
+    name
+        Name of the example in this default.
+    """
+    return partial(_with_job, example=example, ending=ending, name=name)
+
+
+def _with_job(
+    command: Callable[..., None], *, example: Sequence[str] | None, ending: str, name: str
+) -> Callable[..., None]:
     own, grouped = _options(command)
     marked = roles(command)
+    first, several = own[0].name, "list" in str(own[0].annotation)
+    if example is not None:
+        own = [_optional(parameter) for parameter in own]
+        option = Parameter("example", Parameter.KEYWORD_ONLY, default=False, annotation=bool)
+        own.insert(1, declared(option, command.__name__))
+    quiet = Annotated[bool, typer.Option("--quiet", "-q")]
+    own.append(declared(Parameter("quiet", Parameter.KEYWORD_ONLY, default=False, annotation=quiet), "Job"))
 
     @wraps(command)
     def with_one(**values: Any) -> None:
@@ -364,8 +404,8 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
         if "example" in values:
             _arrange(own, values)
         found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
-        for name, role in marked.items():
-            given = values.get(name)
+        for path_name, role in marked.items():
+            given = values.get(path_name)
             paths = given if isinstance(given, list) else [given]
             found[role] += [Path(path) for path in paths if path is not None]
         job = Job(
@@ -373,12 +413,24 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
             found[Reads.PROJECT],
             found[Writes.FILE],
             found[Writes.DIRECTORY],
-            quiet=values.get("quiet", False),
             options=_given(own, values),
+            quiet=values.pop("quiet", False),
         )
         with job:
-            for name, (kind, fields) in grouped.items():
-                values[name] = _made(kind, fields, values)
+            if values.pop("example", False):
+                job.is_example = True
+                if example:
+                    path = job.packaged(example[0]).joinpath(*example[1:])
+                    values[first] = [path] if several else path
+                    if path.is_file() or marked[first] is Reads.PROJECT:
+                        job.reads(path)
+            if ending and (job.is_example or values[first]):
+                source = values[first][0] if several and values[first] else values[first]
+                shown = name if job.is_example else ""
+                values["out"] = values["out"] or default_out(source, ending, shown)
+                job.writes_inside(values["out"])
+            for group, (kind, fields) in grouped.items():
+                values[group] = _made(kind, fields, values)
             command(job=job, **values)
 
     with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)
@@ -386,13 +438,30 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
     return with_one
 
 
+def _optional(parameter: Parameter) -> Parameter:
+    """Return an argument that `--example` can replace, or an output with a default."""
+    if parameter.default is not Parameter.empty:
+        return parameter
+    kind, *marks = get_args(parameter.annotation)
+    return parameter.replace(default=None, annotation=Annotated[(kind | None, *marks)])
+
+
 def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> Any:
     """Return an object of a class of options; errors of its constructor name the option."""
     from photogram.errors import InputError
 
     names = {each.name: _option(each) for each in options}
+    parsers: dict[str, Any] = {each.name: each.metadata.get("parse") for each in fields(kind)}
+    given = {name: values.pop(name) for name in names if values.get(name) is not None}
+    for name in given:
+        try:
+            given[name] = parsers[name](given[name]) if parsers[name] else given[name]
+        except ValueError as error:
+            raise misuse(names[name], "form", form=str(error), value=given[name]) from None
+    for name in names:
+        values.pop(name, None)
     try:
-        return kind(**{name: values.pop(name) for name in names if name in values})
+        return kind(**given)
     except InputError as error:
         known = error.phrase.fields if error.phrase else {}
         if known.get("what") not in names:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection
-from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -18,7 +16,6 @@ OrderingName = Literal["auto", "input", "rcm", "amd", "dissection", "graph-disse
 AirModel = Literal["giant", "standard", "none"]
 WaterModel = Literal["giant", "snell", "none"]
 
-Quiet = Annotated[bool, typer.Option("--quiet", "-q")]
 Threads = Annotated[int | None, typer.Option(min=1)]
 
 
@@ -29,18 +26,6 @@ def check_alone(job: Job, option: str, others: Collection[str]) -> None:
     """Reject an option in combination with others; the message names them."""
     if typed := [name for name in job.given if name in others]:
         raise misuse(option, "conflict", options=typed)
-
-
-def default_out(source: Path, ending: str, is_example: bool = False) -> Path:
-    """Return the default output folder: name of the input with an ending.
-
-    It is in the folder of the input, or in the current folder if that is read-only or the input is packaged.
-    """
-    if is_example:
-        return Path(f"example{ending}")
-    place = Path(os.path.realpath(source))
-    parent = place.parent if os.access(place.parent, os.W_OK) else Path()
-    return parent / f"{place.name if place.is_dir() else place.stem}{ending}"
 
 
 def pair(text: str, option: str) -> tuple[int, int]:

@@ -7,29 +7,24 @@ from typing import TYPE_CHECKING, Literal
 
 from photogram.cli.console import print_document, print_remark
 from photogram.cli.documents import OfPrograms
-from photogram.cli.job import InputFile, Job, OutputFolder, with_job
-from photogram.cli.options import Quiet, default_out
+from photogram.cli.job import Folder, Input, Job, with_job
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
 
-EXAMPLE = ("perspective_center", "grid.deck")  # The packaged example, in photogram.examples
 
-
-@with_job
+@with_job(example=("perspective_center", "grid.deck"), ending="-resected")
 def perspective_center(
     job: Job,
     *,
-    deck: InputFile = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    deck: Input,
+    out: Folder,
     documents: OfPrograms,
     as_published: bool = False,
     weights: Literal["equal", "readings", "deviations"] = "equal",
     together: bool = False,
     calibrate: str | None = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Determine perspective centre, attitude and distortion of projectors from grid measurements.
 
@@ -38,9 +33,7 @@ def perspective_center(
     from photogram.perspective_center import run_deck
     from photogram.statistics.verdict import worst
 
-    deck = job.input(deck, *EXAMPLE)
-    folder = out or default_out(deck, "-resected", example)
-    pictures = documents.announce(job, folder, "listing.txt", picture="residuals")
+    pictures = documents.announce(job, out, "listing.txt", picture="residuals")
     unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
     run = run_deck(
         deck,
@@ -51,8 +44,8 @@ def perspective_center(
     )
     stopped = run.stop is not None
     job.finish(
-        _files(run, documents.json, folder, pictures),
-        documents.page(job, "perspective-center", folder, run.document) if run.results else {},
+        _files(run, documents.json, out, pictures),
+        documents.page(job, "perspective-center", out, run.document) if run.results else {},
         summary=lambda: _summarize(run),
         code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
     )

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.check import EXAMPLE as GALVESTON
+from photogram.cli.check import GALVESTON
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import output, print_remark
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import Job, OutputFolder, Reads, Without, with_job
-from photogram.cli.options import Quiet
 from photogram.cli.simulate import MotionOptions, OfPython, SpaceOptions
 from photogram.lazy_dataclasses import replace
 from photogram.network.simulation_options import ControlPattern, SimulationOptions
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 OfPlans = Without(*OfPython.names, "check_points", "blunders", "blunder_size")
 
 
-@with_job
+@with_job()
 def plan(
     job: Job,
     *,
@@ -39,7 +38,6 @@ def plan(
     against_position_sd: float | None = None,
     out: OutputFolder = None,
     documents: OfPrograms,
-    quiet: Quiet = False,
 ) -> None:
     """Predict the accuracy of a network before the flight for two patterns of control.
 

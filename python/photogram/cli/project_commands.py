@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from photogram.cli.console import print_sections
-from photogram.cli.job import InputFile, Job, OutputFile, Reads, Writes, with_job
-from photogram.cli.options import Quiet
-from photogram.cli.projects import EXAMPLE, Additions, described, project_path, read_project
+from photogram.cli.job import Input, Job, OutputFile, Reads, Writes, with_job
+from photogram.cli.projects import EXAMPLE, Additions, described, read_project
 from photogram.messages import counted, listed
 from photogram.words import phrase
 
@@ -19,15 +18,13 @@ if TYPE_CHECKING:
 CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 
 
-@with_job
+@with_job(example=EXAMPLE)
 def info(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
+    path: Input,
     json: OutputFile = None,
     added: Additions,
-    quiet: Quiet = False,
 ) -> None:
     """Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.
 
@@ -35,7 +32,7 @@ def info(
     """
     from photogram.io.json import to_json
 
-    project = read_project(job, project_path(job, path), added)
+    project = read_project(job, path, added)
     sections = [*described(project), *_asked(project)]
     job.finish(
         {} if json is None else {json: to_json(dict(sections))},
@@ -62,23 +59,20 @@ def _asked(project: Project) -> list[TitledLines]:
     return [("Accuracy statement", ["; ".join(said)])]
 
 
-@with_job
+@with_job(example=EXAMPLE)
 def convert(
     job: Job,
     *,
-    path: InputFile = None,
-    out: Annotated[Path | None, Writes.EITHER] = None,
-    example: bool = False,
+    path: Input,
+    out: Annotated[Path, Writes.EITHER],
     to: str | None = None,
     added: Additions,
-    quiet: Quiet = False,
 ) -> None:
     """Write a project in another format and list the data that the format cannot contain."""
-    assert out is not None
     from photogram.formats import cannot_hold, target
 
     chosen = target(out, to)
-    project = read_project(job, project_path(job, path), added)
+    project = read_project(job, path, added)
     lost = cannot_hold(project, chosen.format.name)
     sections = [
         *described(project),
@@ -88,7 +82,7 @@ def convert(
     job.finish(chosen.files(project), summary=lambda: print_sections(sections, "`photogram info`"))
 
 
-@with_job
+@with_job()
 def metadata(
     job: Job,
     path: Annotated[Path, Reads.FILE],
@@ -96,7 +90,6 @@ def metadata(
     photos_crs: str | None = None,
     mrk_antenna: bool = False,
     sd: list[str] | None = None,
-    quiet: Quiet = False,
 ) -> None:
     """List positions of photographs from their files: EXIF, XMP, .MRK, geo.txt ...; write a table.
 
@@ -129,13 +122,12 @@ SOURCES = {
 """Packaged examples, directories of photogram.examples."""
 
 
-@with_job
+@with_job()
 def new(
     job: Job,
     out: Annotated[Path, Writes.DIRECTORY],
     kind: Kind = "block",
     overwrite: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a small real project as tables with comments on their contents.
 

@@ -55,11 +55,6 @@ class Additions:
 NOTHING = Additions()
 
 
-def project_path(job: Job, path: Path | None) -> Path:
-    """Return the path of the user, or of the packaged example."""
-    return job.packaged(*EXAMPLE) if path is None else path
-
-
 def read_project(job: Job, path: Path, added: Additions) -> Project:
     """Read a project with additional data; its files become inputs of the job."""
     from photogram.formats import GnssFile, PhotoFiles, Wishes, read

@@ -12,7 +12,7 @@ from rich.markup import escape
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Without, Writes, with_job
-from photogram.cli.options import AirModel, Quiet, WaterModel
+from photogram.cli.options import AirModel, WaterModel
 from photogram.lazy_dataclasses import asdict, dataclass, replace
 from photogram.network.simulation_options import LineScanner, RollingShutter, SimulationOptions
 from photogram.words import phrase
@@ -103,7 +103,7 @@ def _hint(names: Iterable[str]) -> str:
     return ", ".join(f"--{name.replace('_', '-')}" for name in sorted(names))
 
 
-@with_job
+@with_job()
 def simulate(
     job: Job,
     *,
@@ -112,7 +112,6 @@ def simulate(
     space: SpaceOptions,
     moves: MotionOptions,
     overwrite: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a simulated block as a GIANT project, or as tables if cameras move, with its truth.
 
@@ -144,7 +143,7 @@ def simulate(
         f"{out}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
         f" {len(block.image_xy)} image points"
     )
-    if not quiet:
+    if not job.quiet:
         for message in remarks:
             print_remark(message)
     job.finish(written, summary=lambda: output.print(escape(size)))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from photogram.cli.adjust import result_at
 from photogram.cli.choices import Choices
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.job import InputFile, Job, OutputFolder, with_job
-from photogram.cli.options import Quiet, Threads, default_out
+from photogram.cli.job import Folder, Input, Job, with_job
+from photogram.cli.options import Threads
 from photogram.cli.projects import Additions
 from photogram.cli.statement_output import StatementOptions, stated, statement_files
 from photogram.words import phrase
@@ -21,13 +21,12 @@ if TYPE_CHECKING:
     from photogram.show.forms import TitledLines
 
 
-@with_job
+@with_job(example=("survey",), ending="-statement")
 def statement(
     job: Job,
     *,
-    path: InputFile = None,
-    example: bool = False,
-    out: OutputFolder = None,
+    path: Input,
+    out: Folder,
     wanted: StatementOptions,
     crs: str | None = None,
     added: Additions,
@@ -35,7 +34,6 @@ def statement(
     keep_all: bool = False,
     threads: Threads = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write an accuracy statement of a block by published standards: page, PDF, JSON document, tables.
 
@@ -44,15 +42,13 @@ def statement(
     survey, in the table of control or by --sd check=0.01. --example is the project of `photogram new --kind
     survey`.
     """
-    source = job.packaged("survey") if path is None else path
-    target = out or default_out(source, "-statement", example)
-    result, project = result_at(job, source, added, threads, choices=choices, keep_all=keep_all)
-    project = project or _project_beside(job, source, result)
+    result, project = result_at(job, path, added, threads, choices=choices, keep_all=keep_all)
+    project = project or _project_beside(job, path, result)
     asked = wanted.asked(project, added, result.block.linear_unit)
     assumed = () if project is None else project.lacks
     with job.status("stating"):
         found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
-        files = statement_files(job, found, target)
+        files = statement_files(job, found, out)
     job.finish(files, summary=lambda: print_sections(_summary(found), "statement.json"), code=found.exit)
 
 

@@ -12,8 +12,8 @@ import typer
 
 from photogram.cli.console import output, print_document, print_withheld
 from photogram.cli.documents import OfPrograms
-from photogram.cli.job import InputFile, Job, OutputFolder, Writes, with_job
-from photogram.cli.options import Quiet, Threads
+from photogram.cli.job import Input, InputFile, Job, OutputFolder, Writes, with_job
+from photogram.cli.options import Threads
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -35,17 +35,15 @@ class Effect(StrEnum):
     REFRACTION = "refraction"
 
 
-@with_job
+@with_job(example=("stellar", "plate.toml"))
 def stellar_camera(
     job: Job,
     *,
-    deck: InputFile = None,
-    example: bool = False,
+    deck: Input,
     out: OutputFolder = None,
     documents: OfPrograms,
     as_published: bool = False,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
 
@@ -56,8 +54,6 @@ def stellar_camera(
     from photogram.stellar import calibrate
     from photogram.stellar.cameras import camera_document
 
-    if deck is None:
-        deck = job.packaged("stellar") / "plate.toml"
     problems, inputs = _read(deck)
     job.reads(*inputs)
     pictures = documents.plot_format if documents.plots else ""
@@ -85,12 +81,11 @@ def stellar_camera(
     )
 
 
-@with_job
+@with_job(example=("exposures", "night.toml"))
 def exposures(
     job: Job,
     *,
-    night: InputFile = None,
-    example: bool = False,
+    night: Input,
     lens: Lens | None = None,
     common_scale: Annotated[bool | None, typer.Option("--common-scale/--two-scales")] = None,
     without: list[Effect] | None = None,
@@ -100,15 +95,12 @@ def exposures(
     documents: OfPrograms,
     threads: Threads = None,
     strict: bool = False,
-    quiet: Quiet = False,
 ) -> None:
     """Calibrate a digital camera, also an all-sky camera, by exposures of the stars (needs pyerfa)."""
     from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_file import inputs, read_night
 
-    if night is None:
-        night = job.packaged("exposures") / "night.toml"
     job.reads(*inputs(night))
     pictures = documents.plot_format if documents.plots else ""
     said = _said(lens, common_scale, without or [], any_roll, blind)
@@ -125,7 +117,7 @@ def exposures(
     )
 
 
-@with_job
+@with_job()
 def places(
     job: Job,
     out: Annotated[Path, Writes.FILE],
@@ -133,7 +125,6 @@ def places(
     catalogue: InputFile = None,
     epoch: float = 2000.0,
     faintest: float = 6.0,
-    quiet: Quiet = False,
 ) -> None:
     """Compute apparent positions of stars for a plate (needs pyerfa).
 

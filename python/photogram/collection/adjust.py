@@ -17,6 +17,7 @@ from photogram.adjustment.adjustment import (
 from photogram.adjustment.options import Ordering
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
+from photogram.arguments.arrays import truth_value
 from photogram.collection.core_arrays import collection_network, named
 from photogram.collection.result import AdjustedCollection
 from photogram.messages import Message, Undetermined
@@ -91,6 +92,7 @@ def adjust(
     KeyboardInterrupt
         If interrupted by Ctrl-C.
     """
+    truth_value("covariance", covariance)
     if tolerance is None:
         tolerance = 1e-8 if loss is None else 1e-6
     check_iteration(ordering, max_iterations, tolerance)

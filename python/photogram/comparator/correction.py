@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from photogram.arguments.arrays import argument_error, is_covariance
+from photogram.arguments.arrays import argument_error, is_covariance, truth_value
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats
 from photogram.comparator.polynomial import Frame, Polynomial, design
@@ -264,6 +264,7 @@ class Correction:
         InputError
             If the camera has another model, unit or an affine parameter.
         """
+        truth_value("weighted", weighted)
         deviations = _deviations(camera)
         frame = self.polynomial.frame if self.polynomial else Frame.metres()
         x0, y0 = np.linalg.solve(self.matrix, frame.centre_um) / MM

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.arrays import shaped, whole_number
+from photogram.arguments.arrays import shaped, truth_value, whole_number
 from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration, calibrate
 from photogram.comparator.case import exchanged
@@ -95,6 +95,7 @@ def simulate_calibration(
         If `operators` is empty, if the rotation is infinite, if the seed is negative, or if the errors have
         another shape.
     """
+    truth_value("left_handed", left_handed)
     if not operators or not math.isfinite(rotation_rad) or seed < 0:
         fields = {"operators": list(operators), "rotation": rotation_rad, "seed": seed}
         raise InputError(phrase("comparators.simulation", **fields))

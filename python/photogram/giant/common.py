@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from photogram.arguments.fields import Checked
 from photogram.giant.fields import format_deviations, format_real
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass
@@ -33,7 +34,7 @@ SWITCHES = (
 
 
 @dataclass
-class Common:
+class Common(Checked):
     """The job definition; the defaults correspond to a blank record.
 
     Attributes

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.giant.assembly import assemble
@@ -145,4 +146,5 @@ def write_project(project: Project, directory: str | os.PathLike[str], *, overwr
     OSError
         If the files cannot be written.
     """
+    truth_value("overwrite", overwrite)
     write_whole(project_files(project, path_of("directory", directory), overwrite=overwrite))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import length, shaped
+from photogram.arguments.arrays import length, shaped, truth_value
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -192,6 +192,7 @@ def viewing_directions(
 
     Arguments as in :func:`project`; with a spheroid the directions are geocentric.
     """
+    truth_value("photo_to_ground", photo_to_ground)
     directions = -photo_axes(attitudes, photo_to_ground)[:, :, 2]
     if spheroid is None:
         return directions
@@ -239,6 +240,7 @@ def project(
     ValueError
         If shapes or numbers of rows differ, or refraction has another linear unit (an InputError).
     """
+    truth_value("photo_to_ground", photo_to_ground)
     return _photocore.project(
         _floats(points),
         _floats(positions),

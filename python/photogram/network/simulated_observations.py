@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, number, shaped, whole_number
+from photogram.arguments.arrays import argument_error, number, shaped, truth_value, whole_number
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -177,6 +177,7 @@ def with_distances(
     InputError
         If an argument is outside its range, or there are not enough points.
     """
+    truth_value("unknown", unknown)
     _positive(sd=sd, scale=scale)
     truth = simulation.truth
     most = len(truth.point_ids) // 2

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import get_args
 
-from photogram.arguments.arrays import one_of
+from photogram.arguments.arrays import one_of, truth_value
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError, PhotogramError
 from photogram.lazy_dataclasses import dataclass, field
@@ -99,6 +99,8 @@ def run_deck(
     InputError
         If the deck cannot be read at all, or `together` and `as_published` are combined.
     """
+    truth_value("as_published", as_published)
+    truth_value("together", together)
     path = path_of("path", path)
     one_of("weights", weights, get_args(Weights))
     if together and as_published:

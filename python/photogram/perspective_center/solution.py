@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.adjustment.remarks import hidden
 from photogram.adjustment.resection import Observed, solve
-from photogram.arguments.arrays import one_of, shaped
+from photogram.arguments.arrays import one_of, shaped, truth_value
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass, replace
@@ -211,6 +211,7 @@ def determine(
     InputError
         If weights cannot be computed.
     """
+    truth_value("as_published", as_published)
     weight = _weights(grid, weights, model_sd)
     unknown = tuple(dict.fromkeys(unknown))
     for name in unknown:

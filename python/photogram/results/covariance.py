@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, names, value_field
+from photogram.arguments.arrays import argument_error, names, truth_value, value_field
 from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -316,6 +316,7 @@ class Covariances:
         OutOfMemoryError, KeyboardInterrupt
             As in :meth:`covariance`.
         """
+        truth_value("bias", bias)
         selected = self._adjusted.selected(unknowns)
         if any(kind == "step" for kind, _ in selected.rows):
             raise InputError(phrase("covariance.step"))

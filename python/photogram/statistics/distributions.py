@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import probability
+from photogram.arguments.arrays import probability, truth_value
 from photogram.errors import InputError
 from photogram.words import phrase
 
@@ -179,6 +179,7 @@ def benjamini_hochberg(
     dependent
         True to limit it under any dependence between the tests (Benjamini and Yekutieli 2001).
     """
+    truth_value("dependent", dependent)
     p = np.asarray(probabilities, dtype=np.float64)
     order = np.argsort(p, kind="stable")  # NaN last
     ranks = np.arange(1, np.count_nonzero(~np.isnan(p)) + 1)

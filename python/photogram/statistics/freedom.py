@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, is_covariance, numbers
+from photogram.arguments.arrays import argument_error, is_covariance, numbers, truth_value
 from photogram.arguments.arrays import probability as checked_probability
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -174,6 +174,7 @@ def coverage_factor(probability: float, freedom: float, truncated: bool = True) 
     InputError
         If the probability is invalid, or the degrees of freedom are not positive.
     """
+    truth_value("truncated", truncated)
     checked_probability("probability", probability)
     if not freedom > 0:
         raise argument_error("freedom", "positive", value=freedom)

@@ -21,6 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import log_chi_square, log_fisher
@@ -103,6 +104,7 @@ def group_tests(
     known
         True if the unit weight is known: chi-square decides; otherwise F.
     """
+    truth_value("known", known)
     r = np.asarray(blocks, dtype=np.float64)
     v = np.asarray(residuals, dtype=np.float64)
     there = ~np.isnan(v)
@@ -146,6 +148,7 @@ def parts_tests(
     parts
         Rows of each part.
     """
+    truth_value("known", known)
     r, v = np.asarray(block, dtype=np.float64), np.asarray(residuals, dtype=np.float64)
     kept = np.full((len(parts), len(v)), math.nan)
     for part, rows in enumerate(parts):

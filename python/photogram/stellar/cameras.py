@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.fields import Checked
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
@@ -131,6 +132,7 @@ class PlateCamera(Checked):
             Whether parameters are weighted by their full covariance; otherwise they are fixed. Fixed
             parameters remain fixed.
         """
+        truth_value("weighted", weighted)
         scale = np.array([_METRE ** _POWERS[UNITS[each]] for each in INTERIOR])
         values, covariance = self.values * scale, self.covariance * np.outer(scale, scale)
         if self.common_scale:
@@ -196,6 +198,7 @@ def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> C
     InputError
         If the file cannot be read, or is not a camera.
     """
+    truth_value("weighted", weighted)
     file = path_of("path", path)
     document = read_json(file)
     if "nonorthogonality_rad" in document or "correction" in document:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
@@ -119,6 +120,7 @@ class Result(Judged, Documented, Brief):
         weighted
             Whether parameters are weighted by their full covariance; otherwise they are fixed.
         """
+        truth_value("weighted", weighted)
         return PlateCamera.of(self).as_camera(name, weighted=weighted)
 
     @property

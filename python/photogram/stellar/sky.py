@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import shaped
+from photogram.arguments.arrays import shaped, truth_value
 from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -89,6 +89,7 @@ def refraction(
     InputError
         If arrays have other shapes.
     """
+    truth_value("observed", observed)
     air = air or Air()
     return _photocore.refraction(
         np.atleast_1d(shaped("zenith_distances", zenith_distances, np.shape(zenith_distances)[:1])),

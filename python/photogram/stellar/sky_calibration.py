@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import LARGEST_SD, length, shaped
+from photogram.arguments.arrays import LARGEST_SD, length, shaped, truth_value
 from photogram.arguments.fields import Checked
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
@@ -184,6 +184,8 @@ def calibrate_exposures(
     AdjustmentError
         If the stars do not determine the camera, or if the memory is insufficient.
     """
+    truth_value("common_scale", common_scale)
+    truth_value("weigh_stars", weigh_stars)
     processors = core_threads(threads)
     for name in sorted(set(fixed) - set(camera.names)):
         raise InputError(unknown_name("camera parameter", name, camera.names))

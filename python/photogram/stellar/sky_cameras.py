@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
@@ -194,6 +195,7 @@ class SkyCamera:
             Whether parameters are weighted by their full covariance; otherwise they are fixed. Fixed
             parameters remain fixed. With a common scale, fy equals fx within a ten-thousandth of a pixel.
         """
+        truth_value("weighted", weighted)
         names, model = self.names, self.facts.model
         values = dict(zip(names, self.values.tolist(), strict=True))
         if not (weighted and self.known.any()):

@@ -40,4 +40,4 @@ from .view_plan_document import plot_planned_views as plot_planned_views
 from .view_plan_result import PlannedView as PlannedView
 from .view_plan_result import ViewPlan as ViewPlan
 from .worth import Worth as Worth
-from .worth import WorthOptions as WorthOptions
+from .worth_options import WorthOptions as WorthOptions

@@ -16,12 +16,13 @@ from photogram.arguments.arrays import argument_error
 from photogram.arguments.types import Bools
 from photogram.errors import InputError, RankError, message_of
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.cross_validation import CrossValidation, Into, parts_agree, splits
+from photogram.targets.cross_validation import CrossValidation, parts_agree, splits
 from photogram.targets.housing import camera_number, housed_with, housing_of
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.suggestions import suggest_views
 from photogram.targets.uncertainty import uncertainty_map
-from photogram.targets.worth import Worth, WorthOptions
+from photogram.targets.worth import Worth
+from photogram.targets.worth_options import Into, WorthOptions
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

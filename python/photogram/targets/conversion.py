@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, is_covariance, number, whole_number
+from photogram.arguments.arrays import argument_error, is_covariance, number, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -201,6 +201,7 @@ def convert_lens(
         If the model is unknown or cannot image the source rays, or if the radius leaves too few pixels. If
         distances are not positive, or mix finite and infinite ones.
     """
+    truth_value("intrinsics_only", intrinsics_only)
     size = (whole_number("size", size[0]), whole_number("size", size[1]))
     apart = tuple(number("distance", each) for each in distances)
     if not apart or not all(each > 0 for each in apart):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 
@@ -56,8 +56,6 @@ class DifferenceTest:
         """Mean ratio of the differences to their standard deviations."""
         return math.sqrt(self.chi2 / self.dof)
 
-
-Into = Literal["odd", "halves"] | int
 
 RANK_TOLERANCE = 1e-6  # smaller relative cofactors of a change are due to the common priors
 

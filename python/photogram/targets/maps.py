@@ -13,7 +13,8 @@ from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import hull, outside
 from photogram.show.methods import Brief, Rows
-from photogram.targets.projection import DatumName, worst
+from photogram.targets.projection import worst
+from photogram.targets.worth_options import DatumName
 
 
 def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> tuple[Floats, Floats, Floats]:

@@ -7,7 +7,7 @@ T. It defines the motion tau = T db, (dt, w), of the camera axes for a change db
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import get_args
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -26,9 +26,7 @@ from photogram.targets.vision import (
     touched,
     unknown_of,
 )
-
-# Fixed: the corners of the camera, the mean of the boards, rays of the image, the axes of the camera
-DatumName = Literal["corners", "mean-frames", "image", "axes"]
+from photogram.targets.worth_options import DatumName
 
 POINTS_PER_BATCH = 4096
 

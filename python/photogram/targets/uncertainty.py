@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, length, shaped, value_field
+from photogram.arguments.arrays import argument_error, length, shaped, truth_value, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
@@ -17,7 +17,8 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import camera_number, housing_of, size_of
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
 from photogram.targets.motion_fit import Criterion, points_at
-from photogram.targets.projection import DatumName, datum_rows, projection_cofactors, worst
+from photogram.targets.projection import datum_rows, projection_cofactors, worst
+from photogram.targets.worth_options import DatumName
 from photogram.words import phrase
 
 IMAGE_GRID = (60, 40)  # rays that define the datum `image`
@@ -59,6 +60,7 @@ def projection_uncertainty(
     InputError
         If the camera does not exist, if the distance is not positive, or if arrays have other shapes.
     """
+    truth_value("noise_only", noise_only)
     where = shaped("pixels", pixels, (length("pixels", pixels), 2))
     number = camera_number(result, camera)
     housing, own = housing_of(result, number)
@@ -104,6 +106,7 @@ def uncertainty_map(
     InputError
         As in :func:`projection_uncertainty`, or if the image size is unknown.
     """
+    truth_value("noise_only", noise_only)
     number = camera_number(result, camera)
     size = size_of(result, number)
     columns, rows, pixels = image_grid(size, grid)
@@ -149,6 +152,7 @@ def uncertainty_against_distance(
     InputError
         As in :func:`projection_uncertainty`.
     """
+    truth_value("noise_only", noise_only)
     number = camera_number(result, camera)
     place = shaped("pixel", pixel, (2,))
     away = shaped("distances", distances, (length("distances", distances),))

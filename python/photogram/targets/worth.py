@@ -3,43 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
-from photogram.arguments.fields import Checked
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.targets.calibration_difference import CameraDifference
-from photogram.targets.cross_validation import CrossValidation, Into
+from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.new_views import Suggestions
-from photogram.targets.projection import DatumName
 from photogram.words import Phrase
-
-
-@dataclass(frozen=True)
-class WorthOptions(Checked):
-    """Options of the assessment of a calibration.
-
-    Attributes
-    ----------
-    distances
-        Distances of the maps, in the unit of the board; empty: infinity, and the median distance of the
-        boards.
-    datum, noise_only
-        Options of the maps.
-    cross_validate
-        Type of split; None: without cross-validation.
-    suggest
-        Number of suggested views.
-    grid
-        Grid of the maps, pixels across and down.
-    """
-
-    distances: Sequence[float] = ()
-    datum: DatumName = "corners"
-    noise_only: bool = False
-    cross_validate: Into | None = "odd"
-    suggest: int = 0
-    grid: tuple[int, int] = (60, 40)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

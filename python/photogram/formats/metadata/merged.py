@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from photogram.arguments.arrays import natural_order
+from photogram.arguments.arrays import natural_order, truth_value
 from photogram.errors import InputError
 from photogram.formats.cards import filled_lines
 from photogram.formats.control_lists import SYSTEMS
@@ -336,6 +336,7 @@ def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = Fals
     -----
     Section 6 of the specification of accuracy statements.
     """
+    truth_value("mrk_antenna", mrk_antenna)
     return found_in(Path(directory), antenna=mrk_antenna).metadata()
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools
 from photogram.giant.contents import Contents
 from photogram.giant.diagnostics import error_warnings
@@ -59,6 +60,7 @@ def listing(
     -------
     Lines with FORTRAN carriage control: a `1` in the first column begins a page.
     """
+    truth_value("as_published", as_published)
     space = Space(block.geographic, block.linear_unit)
     pages = [
         options_page(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.objects import require_kind
 from photogram.errors import AdjustmentError, InputError
 from photogram.io import json
@@ -272,6 +273,7 @@ def statement(
     OutOfMemoryError, KeyboardInterrupt
         As in :meth:`photogram.Result.covariances`.
     """
+    truth_value("strict", strict)
     require_kind("result", result, Result)
     options = Asked.checked(**asked)
     if not result.converged:
