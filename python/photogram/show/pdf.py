@@ -48,7 +48,7 @@ def _record(part: Any) -> Any:
     if isinstance(part, Phrase):
         return str(part)
     names = (each.name for each in fields(part) if each.name not in OMITTED)
-    record: dict[str, Any] = {name: getattr(part, name) for name in names}
+    record: dict[str, Any] = {name: getattr(part, name) for name in names} | {"kind": type(part).__name__}
     if isinstance(part, Drawing):
         # Width and height follow from the view box.
         record["markup"] = re.sub('^(<svg[^>]*) width="[^"]*"', r"\1", part.markup).replace(LETTERS, FONTS[0])

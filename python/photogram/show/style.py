@@ -37,18 +37,8 @@ SETTINGS: dict[str, Any] = {
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
     "legend.fontsize": 8.0,
     "legend.frameon": False,
-    "legend.title_fontsize": 8.0,
-    "svg.hashsalt": "photogram",
-    # Text is stored as text: plots are smaller and can be searched.
-    "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"],
 }
