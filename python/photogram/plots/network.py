@@ -52,8 +52,7 @@ def network(result: Any, *, plane: str | None = None) -> Plot:
     beyond = np.count_nonzero(view.known & ~view.inside)
     notes.append(f"{beyond} points lie beyond the picture" if beyond else "")
     marks += [*ellipses, *control, *_names(view, ends)]
-    title = drawn.title or "Network"
-    return view.plot(marks, title=title, notes=notes, bars=[*bars, *arrows])
+    return view.plot(marks, title=drawn.title or "Network", notes=notes, bars=[*bars, *arrows])
 
 
 class View:

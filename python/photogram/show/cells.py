@@ -10,24 +10,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.show import quantity
+from photogram.show import page, quantity
 from photogram.show.angles import degrees_written
-from photogram.show.page import (
-    Cell,
-    Column,
-    Document,
-    Drawing,
-    Facts,
-    Layers,
-    Part,
-    Remarks,
-    Section,
-    Table,
-    Text,
-    decimals_of,
-    number_text,
-    probability_written,
-)
+from photogram.show.page import Cell, Column, Document, Drawing, Facts, Part, Remarks, Text
 from photogram.show.quantity import Axis, Quantity, chosen, long
 
 _SIGNS = {
@@ -51,20 +36,16 @@ def unit_written(unit: str) -> str:
 
 
 def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Document:
-    """Return the visible parts of a document with formatted tables and drawn plots."""
-
-    def visible(sections: Sequence[Section]) -> list[Section]:
-        whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in sections]
-        return [section for section in whole if section.parts]
-
-    return replace(document, sections=visible(document.sections), details=visible(document.details))
+    """Return the visible sections of a document with formatted tables and drawn plots."""
+    whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in document.sections]
+    return replace(document, sections=[section for section in whole if section.parts], details=())
 
 
 def _written(parts: Sequence[Part], numeral: Callable[[str], str], draw: Draw) -> list[Any]:
     found: list[Any] = []
     for part in parts:
         match part:
-            case Layers():
+            case page.Layers():
                 layers = _written(part.parts, numeral, draw)
                 found += layers if len(layers) < 2 else [replace(part, parts=layers)]
             case Drawing():
@@ -89,7 +70,7 @@ def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
     pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations, numeral)]
     rows = [*zip(*(cells for _, cells in pairs), strict=True)]
-    return Table(part.title, [column for column, _ in pairs], rows, part.note)
+    return page.Table(part.title, [column for column, _ in pairs], rows, part.note)
 
 
 def _columns(
@@ -130,7 +111,7 @@ def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None
         return [each.decimals] * max(count, 1)
     found: list[int | None] = []
     for axis, column in zip(each.axes, np.reshape(by, (-1, count)).T, strict=True):
-        own = decimals_of(column * axis.factor) + (each.kind == "difference")
+        own = page.decimals_of(column * axis.factor) + (each.kind == "difference")
         if each.kind == "value" and axis.angle:
             own = min(own + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
         found.append(None if of_rows and mixed and not (column > 0).any() else own)
@@ -158,10 +139,10 @@ def _cell(each: Quantity, value: Any, axis: Axis, decimals: int | None) -> Cell:
     if each.words and value in each.words:
         return Cell(each.words[value])
     if each.kind == "probability":
-        return Cell(probability_written(value), value) if math.isfinite(value) else Cell("")
+        return Cell(page.probability_written(value), value) if math.isfinite(value) else Cell("")
     if each.kind == "value" and axis.angle == "dms" and math.isfinite(value):
         return Cell(degrees_written(value, decimals or 0), math.degrees(value))
-    return Cell(number_text(value, decimals, each.figures), None if isinstance(value, str) else value)
+    return Cell(page.number_text(value, decimals, each.figures), None if isinstance(value, str) else value)
 
 
 def _with_marks(cells: list[Cell], marked: Bools | None, numeral: Callable[[str], str]) -> Iterable[Cell]:

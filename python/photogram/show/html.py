@@ -26,7 +26,7 @@ def page_html(page: Document) -> bytes:
 
     It requires jinja2 (`pip install 'photogram[report]'`).
     """
-    page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title), details=()), inlined)
+    page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title)), inlined)
     tables = (part for part in page.parts(layers=True) if isinstance(part, Table))
     text = (
         _environment()

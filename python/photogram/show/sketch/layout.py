@@ -49,12 +49,6 @@ class Placed:
         found: Floats = [left, low] + part * [right - left, top - low]
         return found
 
-    def along(self, axis: int, values: Floats) -> Floats:
-        """Return the positions of values along an axis."""
-        places = np.tile(self.panel.limits[0], (len(values), 1))
-        places[:, axis] = values
-        return self.at(places)[:, axis]
-
     @property
     def ends(self) -> tuple[float, float]:
         """The right and the lower end of the panel with all its text."""
@@ -93,7 +87,9 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     ]
     _, tops, _, belows = (_largest(rows, own) for own in zip(*sides, strict=True))
     high = max((whole_high - head - tops.sum() - belows.sum()) / sketch.rows, MIN_SIDE)
-    sizes = np.array([_size(panel, wide, high) for panel in panels])
+    extents = np.array([np.abs(panel.limits[1] - panel.limits[0]) for panel in panels])
+    equal = extents * np.min([wide, high] / extents, axis=1, keepdims=True)
+    sizes = np.where([[panel.equal] for panel in panels], equal, [wide, high])
     heights = _largest(rows, sizes[:, 1])  # Panels lower than the available height do not leave a gap
     left = np.cumsum(lefts + rights + wide) - rights - wide
     top = head + np.cumsum(tops + belows + heights) - belows - heights
@@ -139,7 +135,8 @@ def _framed(
 def _axes(placed: Placed, margin: float, numbered: bool) -> tuple[list[Mark], float, float]:
     """Return axes with ticks, numbers and names; the width at the left, and the lower end."""
     panel, (left, top, right, low) = placed.panel, placed.box
-    x, y = (placed.along(axis, own.values) for axis, own in enumerate((placed.across, placed.up)))
+    x = placed.at(_at(placed.across.values, panel.limits[0, 1]))[:, 0]
+    y = placed.at(_at(panel.limits[0, 0], placed.up.values))[:, 1]
     numbers, wide, down = placed.across.texts, widest(placed.up.texts, NUMBER) + 7.0, low + 3.0
     found: list[Mark] = [Texts(_at(left - 6.0, y), placed.up.texts, NUMBER, anchor="end")]
     if not panel.bare:
@@ -271,14 +268,6 @@ def _ticks(panel: Panel, wide: float, high: float) -> list[Ticks]:
         else ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log, decimal=panel.decimal)
         for axis, (names, length, log) in enumerate(sides)
     ]
-
-
-def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
-    if not panel.equal:
-        return wide, high
-    across, up = np.abs(panel.limits[1] - panel.limits[0]).tolist()
-    scale = min(wide / across, high / up)
-    return scale * across, scale * up
 
 
 def _curves(panel: Panel) -> list[Floats]:
