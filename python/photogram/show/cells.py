@@ -81,10 +81,8 @@ def _columns(
         return
     axes, of = each.axes or (Axis(""),), each.of
     mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
-    decimals, values = (
-        _decimals(each, by, mixed),
-        np.reshape(each.outward(), (-1, 1 if of is not None else len(axes))),
-    )
+    decimals = _decimals(each, by, mixed)
+    values = np.reshape(each.outward(), (-1, len(axes) if of is None else 1))
     marked = None if each.marked is None else np.reshape(each.marked, values.shape)
     for k, column in enumerate(values.T):
         axis, rows = axes[k], np.full(len(column), k) if of is None else of
@@ -94,10 +92,8 @@ def _columns(
         ]
         head = each.head.format(axis.label or axis.name) if of is None else each.head
         unit = "° ′ ″" if each.kind == "value" and axis.angle == "dms" else unit_written(each.unit(axis))
-        yield (
-            Column(head, "" if mixed else unit),
-            _with_marks(cells, None if marked is None else marked[:, k], numeral),
-        )
+        own = None if marked is None else marked[:, k]
+        yield Column(head, "" if mixed else unit), _with_marks(cells, own, numeral)
 
 
 def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:

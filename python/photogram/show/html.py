@@ -45,8 +45,10 @@ def page_html(page: Document) -> bytes:
 def _environment() -> Environment:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
+    templates = files("photogram.show") / "templates"
     environment = Environment(
-        loader=FunctionLoader(_text),  # Templates of a package, also if it is zipped
+        # Templates of a package, also if it is zipped
+        loader=FunctionLoader(lambda name: (templates / name).read_text(encoding="utf-8")),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -54,10 +56,6 @@ def _environment() -> Environment:
     )
     environment.filters["coded"] = _coded
     return environment
-
-
-def _text(name: str) -> str:
-    return files("photogram.show").joinpath("templates", name).read_text(encoding="utf-8")
 
 
 def _coded(text: str) -> Markup:

@@ -70,22 +70,15 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     if not panels:
         return []
     rows, columns = np.divmod(there, sketch.columns)
-    lowest = _largest(columns, rows)[columns]
+    shown = (not sketch.shared) | (rows == _largest(columns, rows)[columns])
     whole_wide, whole_high = 72.0 * sketch.width, 72.0 * sketch.height
     heading = wrapped(sketch.title, HEAD, whole_wide - GAP)
-    head, cell = LEADING * HEAD * len(heading), (whole_wide / sketch.columns, whole_high / sketch.rows)
-    sides = [_framed(panel, (0.0, 0.0, 0.75 * cell[0], cell[1])).sides for panel in panels]
-    lefts, _, rights, _ = (_largest(columns, own) for own in zip(*sides, strict=True))
+    head, wide, high = LEADING * HEAD * len(heading), whole_wide / sketch.columns, whole_high / sketch.rows
+    guess, room = (0.0, 0.0, 0.75 * wide, high), 0.8 * wide
+    sides = [_framed(panel, guess, room, own).sides for panel, own in zip(panels, shown, strict=True)]
+    lefts, rights = (_largest(columns, [own[k] for own in sides]) for k in (0, 2))
+    tops, belows = (_largest(rows, [own[k] for own in sides]) for k in (1, 3))
     wide = max((whole_wide - lefts.sum() - rights.sum()) / sketch.columns, MIN_SIDE)
-    rooms = wide + rights[columns] - GAP
-    options = [
-        *zip(lefts[columns].tolist(), (not sketch.shared) | (rows == lowest), rooms.tolist(), strict=True)
-    ]
-    sides = [
-        _framed(panel, (0.0, 0.0, wide, cell[1]), *more).sides
-        for panel, more in zip(panels, options, strict=True)
-    ]
-    _, tops, _, belows = (_largest(rows, own) for own in zip(*sides, strict=True))
     high = max((whole_high - head - tops.sum() - belows.sum()) / sketch.rows, MIN_SIDE)
     extents = np.array([np.abs(panel.limits[1] - panel.limits[0]) for panel in panels])
     equal = extents * np.min([wide, high] / extents, axis=1, keepdims=True)
@@ -95,14 +88,13 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     top = head + np.cumsum(tops + belows + heights) - belows - heights
     corners = np.column_stack([left[columns], top[rows]])
     places = np.hstack([corners, corners + sizes]).tolist()
-    found = [_framed(panel, box, *more) for panel, box, more in zip(panels, places, options, strict=True)]
+    cells = zip(panels, places, shown, lefts[columns].tolist(), strict=True)
+    found = [_framed(panel, tuple(box), room, own, margin) for panel, box, own, margin in cells]
     title = _lines(corners[:, 0].min(), 0.5 * LEADING * HEAD, heading, HEAD)
     return [replace(found[0], frame=[title, *found[0].frame]), *found[1:]]
 
 
-def _framed(
-    panel: Panel, box: Box, margin: float = 0.0, numbered: bool = True, room: float = np.inf
-) -> Placed:
+def _framed(panel: Panel, box: Box, room: float, numbered: bool, margin: float = 0.0) -> Placed:
     """Compose what is around a box: texts within `room`, and the name of its axis at the left `margin`."""
     (left, top, right, low), above = box, box[1] - 8.0
     across, up = _ticks(panel, right - left, low - top)
