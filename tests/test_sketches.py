@@ -12,7 +12,6 @@ import pytest
 from example_scripts import load
 from photogram import adjust, collection, formats, simulate
 from photogram.giant import read_project
-from photogram.lazy_dataclasses import fields
 from photogram.show.sketch.layout import laid_out
 from photogram.show.sketch.letters import ticks, width, wrapped
 from photogram.show.sketch.marks import (
@@ -23,7 +22,6 @@ from photogram.show.sketch.marks import (
     Panel,
     Shades,
     Sketch,
-    Texts,
     contours,
     horizontal_line,
     rgb,
@@ -289,6 +287,7 @@ def test_names_of_panels_below_each_other_are_aligned():
     assert places[0] == places[1]
 
 
-@pytest.mark.parametrize("mark", [Ellipses, Mesh, Texts, Names])
-def test_marks_of_which_a_legend_shows_nothing_have_no_label(mark):
-    assert "label" not in {each.name for each in fields(mark)}
+def test_a_mark_without_a_sample_has_no_label():
+    mark = Names(np.array([[0.5, 0.5]]), ["one"], ["black"], label="names")
+    with pytest.raises(TypeError, match="Names"):
+        placed_on([[0.0, 0.0], [1.0, 1.0]], [mark], legend="beside")

@@ -14,7 +14,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.sketch import marks as shapes
 from photogram.show.sketch.letters import Ticks, ticks, widest, width, wrapped
-from photogram.show.sketch.marks import Labelled, Line, Mark, Panel, Polygons, Sketch, Texts, boxes
+from photogram.show.sketch.marks import Line, Mark, Panel, Polygons, Sketch, Texts, boxes
 from photogram.show.style import FAINT
 
 HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0  # Sizes of letters
@@ -172,7 +172,7 @@ def _legend(placed: Placed, down: float) -> tuple[Box | None, list[Mark]]:
     return (*at, *(at + size).tolist()), found
 
 
-def _sample(mark: Labelled, left: Floats) -> Labelled:
+def _sample(mark: Mark, left: Floats) -> Mark:
     """Return the sample of a mark for a legend, to the right of a point."""
     line, aside = left + np.array([[0.0, 0.0], [SWATCH, 0.0]]), np.array([0.0, 3.0])
     match mark:

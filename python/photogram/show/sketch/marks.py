@@ -19,13 +19,7 @@ class Mark:
     """An element of a panel; marks of a higher `layer` cover others."""
 
     layer: float = 2.0
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Labelled(Mark):
-    """A mark that is listed in the legend if it has a `label`."""
-
-    label: str = ""
+    label: str = ""  # In the legend: of markers, lines, arrows and polygons
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +47,7 @@ class Shades:
 
 
 @dataclass(frozen=True, eq=False)
-class Markers(Labelled):
+class Markers(Mark):
     """Small symbols at (n, 2) points."""
 
     places: Floats
@@ -70,7 +64,7 @@ class Markers(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class Line(Labelled):
+class Line(Mark):
     """A line through (n, 2) points, or several lines; `dash` style."""
 
     places: Floats | Sequence[Floats]
@@ -86,7 +80,7 @@ class Line(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class Arrows(Labelled):
+class Arrows(Mark):
     """Arrows from (n, 2) points by vectors; shaft `width` in panels."""
 
     places: Floats
@@ -96,7 +90,7 @@ class Arrows(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class Polygons(Labelled):
+class Polygons(Mark):
     """Closed outlines through (v, 2) points; without an edge they are one area, with holes."""
 
     places: Floats | Sequence[Floats]
@@ -290,8 +284,8 @@ class Panel:
     decimal: str = "."  # Decimal sign
 
     @property
-    def labelled(self) -> list[Labelled]:
-        return [mark for mark in self.marks if isinstance(mark, Labelled) and mark.label]
+    def labelled(self) -> list[Mark]:
+        return [mark for mark in self.marks if mark.label]
 
     def even(self, places: Floats) -> Floats:
         """Return (..., 2) positions with logarithms along logarithmic axes."""

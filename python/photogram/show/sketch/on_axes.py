@@ -152,7 +152,7 @@ def draw(mark: marks.Mark, axes: Any) -> None:
     """Draw a mark on axes with final limits; `Names` after the layout."""
     from matplotlib.collections import EllipseCollection, PolyCollection
 
-    given: dict[str, Any] = {"zorder": mark.layer, "label": getattr(mark, "label", "") or None}
+    given: dict[str, Any] = {"zorder": mark.layer, "label": mark.label or None}
     match mark:
         case marks.Markers():
             _markers(mark, axes, given)
