@@ -184,7 +184,7 @@ def _sample(mark: Mark, left: Floats) -> Mark:
             return replace(mark, places=boxes(line[:1] - aside, line[1:] + aside))
         case Line():
             return replace(mark, places=line)
-    raise TypeError(f"a legend has no sample of {type(mark).__name__}")
+    raise TypeError(f"the legend does not draw {type(mark).__name__}")
 
 
 def _colour_bar(shades: shapes.Shades, left: float, top: float, low: float, decimal: str) -> list[Mark]:
