@@ -16,7 +16,16 @@ from photogram.show.cells import written
 from photogram.show.forms import MAX_ROWS, fact_lines, record, summary, text
 from photogram.show.html import page_html
 from photogram.show.page import Document, Fact, Layers, Section, probability_written
-from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each, records, units
+from photogram.show.quantity import (
+    Axis,
+    Quantity,
+    Table,
+    component,
+    members_of_each,
+    of_each,
+    records,
+    unit_comments,
+)
 
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
 AXES = (Axis.turned("omega", "deg"), Axis.of("s", "mm / m"), Axis.of("b1", "mm"))
@@ -103,7 +112,8 @@ def test_only_columns_with_a_dimension_have_a_unit():
     assert ("control", first.removeprefix("# ")) in list(notes.iter_rows(values_only=True))
     for what, table in TABLES.items():
         numbers = {each.name for each in table(result) if each.kind == "number" and each.name}
-        named = [name for names in units(table(result)).values() for name in names]
+        comments = [line.removeprefix("unit of ") for line in unit_comments(table(result))]
+        named = [name for line in comments for name in line.rpartition(": ")[0].split(", ")]
         assert not [name for name in named if name.split("_")[0] in numbers], what
 
 

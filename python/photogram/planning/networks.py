@@ -31,8 +31,7 @@ from photogram.show.page import (
     significant,
 )
 from photogram.show.quantity import Axis, Quantity, Table, chosen, component, members, of_each, records
-from photogram.show.sketch.letters import NOWHERE
-from photogram.show.sketch.marks import Mark, Markers, Panel, Shades, around
+from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality
@@ -418,14 +417,14 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
     known = {mark.label for mark in panels[-1].labelled}
     labelled = {mark.label: mark for panel in panels for mark in panel.marks if isinstance(mark, Markers)}
     more = [replace(mark, places=NOWHERE) for label, mark in labelled.items() if label not in {"", *known}]
-    panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside")
+    panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside", shades=shades)
     width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()
     stacked = width > _MAX_SIDE_BY_SIDE * height
     rows, columns = (len(panels), 1) if stacked else (1, len(panels))
     across = max(2 * _PANEL_INCHES if stacked else min(_PANEL_INCHES, _PANEL_INCHES * width / height), 3.5)
     up = min(across * height / width, _PANEL_INCHES)
     size = columns * (across + 0.5) + 3.0, rows * (up + 1.0) + 0.4
-    return Plot(*size, panels, columns, shades)
+    return Plot(*size, panels, columns)
 
 
 def _panel(pattern: Pattern, limits: Floats, shades: Shades) -> Panel:

@@ -28,7 +28,7 @@ def correlations(result: Any) -> Plot:
     panels = first_panels("correlations", "cameras", cameras, MAX_CAMERAS, _matrix)
     columns = min(2, len(panels))
     side = 2.2 + 0.36 * max(len(panel.up_names) for panel in panels)
-    return Plot(columns * side + 0.9, -(-len(panels) // columns) * (side + 0.2), panels, columns, SHADES)
+    return Plot(columns * (side + 0.9), -(-len(panels) // columns) * (side + 0.2), panels, columns)
 
 
 def _matrix(each: Correlated) -> Panel:
@@ -42,7 +42,7 @@ def _matrix(each: Correlated) -> Panel:
             f"{value:.2f}".replace("0.", ".", 1) if abs(value) < 0.995 else f"{value:.3f}" for value in values
         ]
         colours = ["white" if abs(value) > 0.7 else "black" for value in values]
-        marks.append(Texts(np.column_stack([columns, rows]).astype(float), texts, colours, 6.5))
+        marks.append(Texts(np.column_stack([columns, rows]).astype(float), texts, 6.5, colours, "middle"))
     return Panel(
         np.array([[first, last], [last, first]]),
         marks,
@@ -52,4 +52,5 @@ def _matrix(each: Correlated) -> Panel:
         up_names=each.names,
         turned=max(map(len, each.names)) > 3,
         bare=True,
+        shades=SHADES,
     )

@@ -11,23 +11,8 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.plots.picture_data import Pictured, Plan
 from photogram.plots.selection import thinned
-from photogram.show.sketch.letters import NOWHERE
-from photogram.show.sketch.marks import (
-    Arrows,
-    Ellipses,
-    Line,
-    Mark,
-    Markers,
-    Names,
-    Panel,
-    Polygons,
-    ScaleBar,
-    Shades,
-    ellipse_axes,
-    error_bars,
-    hexadecimal,
-    rgb,
-)
+from photogram.show.sketch import marks as shapes
+from photogram.show.sketch.marks import Mark, Markers, Panel, ScaleBar
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION, round_length
 
@@ -67,8 +52,7 @@ def network(result: Any, *, plane: str | None = None) -> Plot:
     beyond = np.count_nonzero(view.known & ~view.inside)
     notes.append(f"{beyond} points lie beyond the picture" if beyond else "")
     marks += [*ellipses, *control, *_names(view, ends)]
-    title = drawn.title or "Network"
-    return view.plot(marks, title=title, notes=notes, bars=[*bars, *arrows])
+    return view.plot(marks, title=drawn.title or "Network", notes=notes, bars=[*bars, *arrows])
 
 
 class View:
@@ -167,7 +151,7 @@ def _footprints(view: View, outlines: Floats, notes: list[str]) -> list[Mark]:
     inside = float(np.clip(0.4 / len(chosen), 0.003, 0.06))
     edge = float(np.clip(25.0 / len(chosen), 0.5, 0.7))
     shown = view.flat(outlines[chosen])
-    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, label="footprint of a photo")]
+    return [shapes.Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, label="footprint of a photo")]
 
 
 def _photos(view: View, notes: list[str]) -> list[Mark]:
@@ -190,12 +174,13 @@ def _points(view: View, notes: list[str]) -> list[Mark]:
     chosen, note = thinned("points", rows, MAX_POINTS)
     notes.append(note)
     size = float(np.sqrt(np.clip(9000.0 / len(chosen), 2.0, 14.0)))
-    colours = rgb(Shades(0.0, 1.0, ""), np.linspace(0.82 if len(there) > 1 else 0.0, 0.0, len(there)))
+    shares = np.linspace(0.82 if len(there) > 1 else 0.0, 0.0, len(there))
+    colours = shapes.rgb(shapes.Shades(0.0, 1.0, ""), shares)
     marks = list[Mark]()
     for colour, number in zip(colours, there, strict=True):
         own = view.points[chosen[every[chosen] == number]]
         label = f"{_class(number, plan.rays[rows])} ({int((classes == number).sum()):,})"
-        marks.append(Markers(own, "o", size, hexadecimal(colour), label=label))
+        marks.append(Markers(own, "o", size, shapes.hexadecimal(colour), label=label))
     return marks
 
 
@@ -213,7 +198,7 @@ def _ellipses(drawn: Pictured, view: View, notes: list[str]) -> tuple[list[Mark]
     covariances = drawn.covariances(rows)[:, pair][:, :, pair]
     good = np.isfinite(covariances).all(axis=(1, 2))
     rows, covariances = rows[good], covariances[good]
-    axes_of, angles = ellipse_axes(covariances)
+    axes_of, angles = shapes.ellipse_axes(covariances)
     axes_of *= np.sqrt(-2.0 * np.log(1.0 - CONFIDENCE))
     if not len(rows) or not axes_of[:, 0].any():
         return [], []
@@ -235,7 +220,7 @@ def _ellipses(drawn: Pictured, view: View, notes: list[str]) -> tuple[list[Mark]
     places, worst = view.points[rows[shown]], int(np.argmax(axes_of[:, 0]))
     largest = f"{axes_of[worst, 0]:.3g}{view.unit}, point {view.plan.point_ids[rows[worst]]}"
     notes.append(f"largest semi-axis of an ellipse: {largest}")
-    marks: list[Mark] = [Ellipses(places, scale * axes_of[shown], angles[shown], BLUE, 0.8, layer=4.0)]
+    marks: list[Mark] = [shapes.Ellipses(places, scale * axes_of[shown], angles[shown], BLUE, 0.8, layer=4.0)]
     return marks, [view.bar(scale, BLUE, f"semi-axes of error ellipses, {CONFIDENCE:.0%}")]
 
 
@@ -279,17 +264,17 @@ def vectors(
     `size` is a usual length, `name` of one difference; `meaning` is written at the scale bar.
     """
     if not size:
-        return [], [], NOWHERE
+        return [], [], shapes.NOWHERE
     out, marks = differences[:, view.axes[2]], list[Mark]()
     scale = round_length(0.08 * view.extent / size)
     places, moved = view.points[rows], scale * np.nan_to_num(view.flat(differences))
     if (long := np.hypot(*moved.T) > 0).any():
         label = f"{name} in plan"
-        marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label=label, layer=6.0))
+        marks.append(shapes.Arrows(places[long], moved[long], VERMILION, 0.0035, label=label, layer=6.0))
     if (high := np.isfinite(out) & (out != 0)).any():
         label, feet = f"{name} in height, + upwards", places[high]
-        bars = error_bars(feet, feet[:, 1], feet[:, 1] + scale * out[high])
-        marks.append(Line(bars, PURPLE, 2.2, label=label, layer=5.5))
+        bars = shapes.error_bars(feet, feet[:, 1], feet[:, 1] + scale * out[high])
+        marks.append(shapes.Line(bars, PURPLE, 2.2, label=label, layer=5.5))
     between = np.concatenate([places + moved, places + 0.5 * moved])
     return marks, [view.bar(scale, VERMILION, meaning)], between
 
@@ -308,4 +293,4 @@ def _names(view: View, ends: Floats) -> list[Mark]:
     places = np.concatenate([view.points[control], view.photos[:photos]])
     texts = [*(plan.point_ids[row] for row in control.tolist()), *plan.photo_ids[:photos]]
     colours = [INK] * len(control) + [SOFT] * photos
-    return [Names(places, texts, colours, ends)] if texts else []
+    return [shapes.Names(places, texts, colours, ends)] if texts else []

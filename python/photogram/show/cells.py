@@ -10,24 +10,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.show import quantity
+from photogram.show import page, quantity
 from photogram.show.angles import degrees_written
-from photogram.show.page import (
-    Cell,
-    Column,
-    Document,
-    Drawing,
-    Facts,
-    Layers,
-    Part,
-    Remarks,
-    Section,
-    Table,
-    Text,
-    decimals_of,
-    number_text,
-    probability_written,
-)
+from photogram.show.page import Cell, Column, Document, Drawing, Facts, Part, Remarks, Text
 from photogram.show.quantity import Axis, Quantity, chosen, long
 
 _SIGNS = {
@@ -51,20 +36,16 @@ def unit_written(unit: str) -> str:
 
 
 def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Document:
-    """Return the visible parts of a document with formatted tables and drawn plots."""
-
-    def visible(sections: Sequence[Section]) -> list[Section]:
-        whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in sections]
-        return [section for section in whole if section.parts]
-
-    return replace(document, sections=visible(document.sections), details=visible(document.details))
+    """Return the visible sections of a document with formatted tables and drawn plots."""
+    whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in document.sections]
+    return replace(document, sections=[section for section in whole if section.parts], details=())
 
 
 def _written(parts: Sequence[Part], numeral: Callable[[str], str], draw: Draw) -> list[Any]:
     found: list[Any] = []
     for part in parts:
         match part:
-            case Layers():
+            case page.Layers():
                 layers = _written(part.parts, numeral, draw)
                 found += layers if len(layers) < 2 else [replace(part, parts=layers)]
             case Drawing():
@@ -89,19 +70,20 @@ def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
     pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations, numeral)]
     rows = [*zip(*(cells for _, cells in pairs), strict=True)]
-    return Table(part.title, [column for column, _ in pairs], rows, part.note)
+    return page.Table(part.title, [column for column, _ in pairs], rows, part.note)
 
 
 def _columns(
     each: Quantity, by: Floats | None, numeral: Callable[[str], str]
 ) -> Iterator[tuple[Column, Iterable[Cell]]]:
-    axes, of = each.axes, each.of
-    if each.kind == "name" or not axes:
-        yield Column(each.head, text=each.kind == "name"), _with_marks(_plain(each), each.marked, numeral)
+    if each.kind == "name":
+        yield Column(each.head, text=True), _with_marks(_names(each), each.marked, numeral)
         return
+    axes, of = each.axes or (Axis(""),), each.of
     mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
-    decimals, marked = _decimals(each, by, mixed), each.marked
+    decimals = _decimals(each, by, mixed)
     values = np.reshape(each.outward(), (-1, len(axes) if of is None else 1))
+    marked = None if each.marked is None else np.reshape(each.marked, values.shape)
     for k, column in enumerate(values.T):
         axis, rows = axes[k], np.full(len(column), k) if of is None else of
         cells = [
@@ -109,12 +91,9 @@ def _columns(
             for value, row in zip(column.tolist(), rows.tolist(), strict=True)
         ]
         head = each.head.format(axis.label or axis.name) if of is None else each.head
-        own = None if marked is None else np.reshape(marked, values.shape)[:, k]
-        yield Column(head, "" if mixed else _unit(each, axis)), _with_marks(cells, own, numeral)
-
-
-def _unit(each: Quantity, axis: Axis) -> str:
-    return "° ′ ″" if each.kind == "value" and axis.angle == "dms" else unit_written(each.unit(axis))
+        unit = "° ′ ″" if each.kind == "value" and axis.angle == "dms" else unit_written(each.unit(axis))
+        own = None if marked is None else marked[:, k]
+        yield Column(head, "" if mixed else unit), _with_marks(cells, own, numeral)
 
 
 def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:
@@ -123,16 +102,12 @@ def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None
     None if unknown: in a column of several components without standard deviation.
     """
     count, of_rows = len(each.axes), each.of is not None
-    if (
-        each.decimals is not None
-        or each.kind == "number"
-        or by is None
-        or (of_rows and each.kind == "deviation")
-    ):
-        return [each.decimals] * count
+    measured = each.kind in ("value", "difference") or (each.kind == "deviation" and not of_rows)
+    if each.decimals is not None or by is None or not measured or not count:
+        return [each.decimals] * max(count, 1)
     found: list[int | None] = []
     for axis, column in zip(each.axes, np.reshape(by, (-1, count)).T, strict=True):
-        own = decimals_of(column * axis.factor) + (each.kind == "difference")
+        own = page.decimals_of(column * axis.factor) + (each.kind == "difference")
         if each.kind == "value" and axis.angle:
             own = min(own + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
         found.append(None if of_rows and mixed and not (column > 0).any() else own)
@@ -141,19 +116,7 @@ def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None
     return found
 
 
-def _plain(each: Quantity) -> list[Cell]:
-    """Return names, and numbers without an axis."""
-    if each.kind == "probability":
-        values = np.asarray(each.values, dtype=float).tolist()
-        return [Cell(probability_written(p), p) if math.isfinite(p) else Cell("") for p in values]
-    plain = np.asarray(each.values)
-    if each.kind != "name":
-        shown = plain if each.seen is None else np.where(each.seen, plain, np.nan)
-        texts = [number_text(value, each.decimals, each.figures) for value in shown.tolist()]
-        return [
-            Cell(text, None if isinstance(value, str) else value)
-            for text, value in zip(texts, shown.tolist(), strict=True)
-        ]
+def _names(each: Quantity) -> list[Cell]:
     if each.axes and each.of is not None:  # Components with units if these differ
         mixed = len({axis.small for axis in each.axes}) > 1
         names = [
@@ -161,19 +124,21 @@ def _plain(each: Quantity) -> list[Cell]:
             for axis in each.axes
         ]
         return [Cell(names[k]) for k in each.of.tolist()]
+    names = [str(name) for name in np.asarray(each.values).tolist()]
     if each.link is None:
-        return [Cell(str(name)) for name in plain.tolist()]
-    ids = [f"{each.link.kind}-{row}" for row in each.link.rows.tolist()]
-    pairs = zip(map(str, plain.tolist()), ids, strict=True)
+        return [Cell(name) for name in names]
+    pairs = zip(names, (f"{each.link.kind}-{row}" for row in each.link.rows.tolist()), strict=True)
     return [Cell(name, id=own) if each.link.here else Cell(name, goes_to=own) for name, own in pairs]
 
 
-def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cell:
+def _cell(each: Quantity, value: Any, axis: Axis, decimals: int | None) -> Cell:
     if each.words and value in each.words:
         return Cell(each.words[value])
+    if each.kind == "probability":
+        return Cell(page.probability_written(value), value) if math.isfinite(value) else Cell("")
     if each.kind == "value" and axis.angle == "dms" and math.isfinite(value):
         return Cell(degrees_written(value, decimals or 0), math.degrees(value))
-    return Cell(number_text(value, decimals, each.figures), value)
+    return Cell(page.number_text(value, decimals, each.figures), None if isinstance(value, str) else value)
 
 
 def _with_marks(cells: list[Cell], marked: Bools | None, numeral: Callable[[str], str]) -> Iterable[Cell]:

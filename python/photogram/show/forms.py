@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -44,47 +45,39 @@ def to_json(document: Document) -> bytes:
 
 def text(document: Document) -> str:
     """Return the text report: verdict, next steps, highlights, sections."""
-    judged = [
-        (title, [textwrap.fill(sentence, WIDTH) for sentence in sentences])
-        for title, sentences in _judged(document)
+    parts = [
+        f"photogram {_photocore.__version__}  {document.what}  {document.title}".rstrip().translate(PLAIN)
     ]
-    parts = [f"photogram {_photocore.__version__}  {document.what}  {document.title}".rstrip()]
-    parts += [
-        "\n".join([title, "-" * len(title), *lines]) for title, lines in [*judged, *_sections(document, ())]
-    ]
-    return "\n\n".join(parts).translate(PLAIN) + "\n"
+    for title, lines in titled_lines(document, width=WIDTH):
+        parts.append("\n".join([title, "-" * len(title), *lines]))
+    return "\n\n".join(parts) + "\n"
 
 
-def titled_lines(document: Document, *keys: str) -> list[TitledLines]:
+def titled_lines(document: Document, *keys: str, width: int = sys.maxsize) -> list[TitledLines]:
     """Return titles and lines: verdict, next steps, key figures, sections.
 
-    Without keys, all sections are returned; with keys, sections are without introduction.
+    Without keys, all sections are returned; with keys, sections are without introduction. `width` is the
+    maximum number of characters of a line of the verdict.
     """
-    titled = [*_judged(document), *_sections(document, keys)]
-    return [(title.translate(PLAIN), [line.translate(PLAIN) for line in lines]) for title, lines in titled]
-
-
-def _judged(document: Document) -> list[TitledLines]:
-    titled: list[tuple[str, list[object]]] = [
-        (f"{document.first}, {judgement.on}".removesuffix(", "), [judgement.headline, *judgement.lines])
-        for judgement in document.judgements
+    sentences: list[tuple[str, Sequence[object]]] = [
+        (f"{document.first}, {one.on}".removesuffix(", "), [one.headline, *one.lines])
+        for one in document.judgements
     ]
-    titled.append(("What to do next", [*document.advice]))
-    return [
-        (title, [f"{text[:1].upper()}{text[1:]}".removesuffix(".") + "." for text in map(str, lines)])
-        for title, lines in titled
-        if lines
-    ]
-
-
-def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
+    titled: list[TitledLines] = []
+    for title, lines in [*sentences, ("What to do next", document.advice)]:
+        ended = (f"{line[:1].upper()}{line[1:]}".removesuffix(".") + "." for line in map(str, lines))
+        titled.append((title, [textwrap.fill(line, width) for line in ended]))
+    titled.append(("Key figures", fact_lines([*document.head, *document.highlights])))
     every = [each for each in (*document.sections, *document.details) if each.key in keys or not keys]
-    titled = [("Key figures", fact_lines([*document.head, *document.highlights]))]
-    for section in formatted(replace(document, sections=every, details=())).sections:
+    for section in formatted(replace(document, sections=every)).sections:
         parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
         intro = textwrap.wrap("" if keys else section.intro, WIDTH)
         titled.append((section.title, _spaced([intro, *parts]) if parts else []))
-    return [(title, "\n".join(lines).split("\n")) for title, lines in titled if lines]
+    return [
+        (title.translate(PLAIN), "\n".join(lines).translate(PLAIN).split("\n"))
+        for title, lines in titled
+        if lines
+    ]
 
 
 def _spaced(parts: Iterable[list[str]]) -> list[str]:

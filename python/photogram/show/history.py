@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.show import quantity
 from photogram.show.cells import unit_written
+from photogram.show.forms import record
 from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Document, Drawing, Section, layered
 from photogram.show.page import about as explanation
@@ -24,19 +25,6 @@ if TYPE_CHECKING:
     from photogram.statistics.verdict import Verdict
 
 ACROSS = 3  # Number of charts in a row
-
-
-def history_part(history: History, whose: str, about: str = "", **members: object) -> Document:
-    """Return the document of a history: changes, introduction, values, members."""
-    own = quantity.members(history, "occasions", "times", "tests", "level", "limit")
-    names, p = ("variance", "degrees_of_freedom"), "probability_above"
-    constancy = quantity.members(history.constancy, *names, probability=p)
-    return Document(
-        what="",
-        title=whose,
-        sections=[Section.of(series(history, about)), Section.of(values(history))],
-        members={**members, **own, "constancy": constancy},
-    )
 
 
 def series(history: History, about: str = "") -> Table:
@@ -96,18 +84,29 @@ def history_document(
     what: str,
     calibrations: Table,
     histories: Mapping[str, History],
-    parts: Sequence[Document],
     verdict: Verdict,
+    kind: str,
+    parts: Mapping[str, Mapping[str, object]],
     *,
+    about: str = "",
     more: Sequence[Section] = (),
+    members: Mapping[str, object],
     **fields: Any,
 ) -> Document:
     """Return the document of dated calibrations, with changes and `more`.
 
-    `parts` are the documents of the histories; their tables become layers. `fields` are further fields.
+    The JSON member `kind` contains the histories, each with its further members in `parts`. `about` explains
+    the changes; `fields` are further fields.
     """
     days = next(column.values for column in calibrations.columns if column.member == "day")
-    changes = layered("", "", parts).sections
+    documents, names = [], ("variance", "degrees_of_freedom")
+    for whose, own in histories.items():
+        constancy = quantity.members(own.constancy, *names, probability="probability_above")
+        own_members = quantity.members(own, "occasions", "times", "tests", "level", "limit")
+        tables = [Section.of(series(own, about)), Section.of(values(own))]
+        whole = {**parts[whose], **own_members, "constancy": constancy}
+        documents.append(Document("", whose, sections=tables, members=whole))
+    changes = layered("", "", documents).sections
     charts = [
         Drawing(f"charts-{k}", name, "", partial(control_charts, own, name[:1].upper() + name[1:]))
         for k, (name, own) in enumerate(histories.items())
@@ -125,6 +124,11 @@ def history_document(
             *changes[1:],
             tests_section(verdict),
         ],
+        members={
+            "verdict": verdict.document(),
+            kind: {part.title: record(part) for part in documents},
+            **members,
+        },
         **fields,
     )
 

@@ -54,7 +54,6 @@ class Table:
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]
     note: str = ""
-    kind: str = field(default="table", init=False)
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,6 @@ class Facts:
 
     caption: str
     facts: Sequence[Fact]
-    kind: str = field(default="facts", init=False)
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,6 @@ class Drawing:
     caption: str
     sketch: Callable[[], Plot | None]
     markup: str = ""  # The drawn plot
-    kind: str = field(default="figure", init=False)
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,6 @@ class Layers:
 
     name: str
     parts: Sequence[Drawing | Table | quantity.Table]
-    kind: str = field(default="layers", init=False)
 
 
 @dataclass(frozen=True)
@@ -103,7 +99,6 @@ class Text:
     """A paragraph."""
 
     text: str
-    kind: str = field(default="text", init=False)
 
 
 @dataclass(frozen=True)
@@ -112,7 +107,6 @@ class Remarks:
 
     sentences: Sequence[str]
     most: int = 12
-    kind: str = field(default="remarks", init=False)
 
 
 Part = Table | quantity.Table | Facts | Drawing | Layers | Text | Remarks

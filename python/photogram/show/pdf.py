@@ -33,7 +33,7 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
 
     `author` is a property of the file.
     """
-    titled = formatted(replace(page, title=page.title or page.what, details=()), inlined)
+    titled = formatted(replace(page, title=page.title or page.what), inlined)
     footer = f"{page.what} – {page.title}" if page.title else page.what
     record = _record(titled) | {"author": author or [], "footer": footer, "fonts": FONTS, "longest": LONGEST}
     data = json.dumps(record, default=_record, ensure_ascii=False)
@@ -48,7 +48,7 @@ def _record(part: Any) -> Any:
     if isinstance(part, Phrase):
         return str(part)
     names = (each.name for each in fields(part) if each.name not in OMITTED)
-    record: dict[str, Any] = {name: getattr(part, name) for name in names}
+    record: dict[str, Any] = {name: getattr(part, name) for name in names} | {"kind": type(part).__name__}
     if isinstance(part, Drawing):
         # Width and height follow from the view box.
         record["markup"] = re.sub('^(<svg[^>]*) width="[^"]*"', r"\1", part.markup).replace(LETTERS, FONTS[0])

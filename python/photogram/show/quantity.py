@@ -94,9 +94,9 @@ class Quantity:
             return {"dms": "", "deg": "deg"}.get(axis.angle, axis.unit)
         return axis.small
 
-    def outward(self) -> Floats:
+    def outward(self) -> Any:
         """Return numbers in report units; angles in degrees only for `deg`."""
-        values = np.asarray(self.values, dtype=float)
+        values = np.asarray(self.values, dtype=float if self.axes or self.kind == "probability" else None)
         if self.seen is not None:
             values = np.where(self.seen, values, np.nan)
         if self.kind in ("value", "deviation", "difference") and self.axes:
@@ -228,17 +228,12 @@ def frame(table: Quantities) -> dict[str, Any]:
     return {name: values for name, _, values in _columns(table)}
 
 
-def units(table: Quantities) -> dict[str, list[str]]:
-    """Return column names of `frame` by unit, if not in the name."""
+def unit_comments(table: Quantities) -> list[str]:
+    """Return one line per unit of the columns of `frame`, if not in the name."""
     names: dict[str, list[str]] = {}
     for name, unit, _ in _columns(table):
         names.setdefault(unit, []).append(name)
-    return {unit: own for unit, own in names.items() if unit}
-
-
-def unit_comments(table: Quantities) -> list[str]:
-    """Return one line per unit of the columns of `frame`."""
-    return [f"unit of {', '.join(names)}: {unit}" for unit, names in units(table).items()]
+    return [f"unit of {', '.join(own)}: {unit}" for unit, own in names.items() if unit]
 
 
 def _columns(table: Quantities) -> Iterator[tuple[str, str, Any]]:

@@ -21,10 +21,8 @@ PURPLE = "#cc79a7"
 ORANGE = "#e69f00"
 SKY = "#56b4e9"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)  # Colours of categories, in this order
-INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"
-SOFT = "#5c5c5c"
-"""Colour of secondary text: contrast 6.7 to 1 on white; FAINT, for lines, has 3.4."""
-"""Colours of normal, marked and auxiliary elements."""
+INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"  # Colours of normal, marked and auxiliary elements
+SOFT = "#5c5c5c"  # Colour of secondary text: contrast 6.7 to 1 on white; FAINT, for lines, has 3.4
 DPI = 120  # Dots per inch of PNG files
 MATPLOTLIB = "matplotlib", "plots in formats other than SVG", "plots"  # Package, its use, and its extra
 
@@ -37,18 +35,8 @@ SETTINGS: dict[str, Any] = {
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
     "legend.fontsize": 8.0,
     "legend.frameon": False,
-    "legend.title_fontsize": 8.0,
-    "svg.hashsalt": "photogram",
-    # Text is stored as text: plots are smaller and can be searched.
-    "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"],
 }

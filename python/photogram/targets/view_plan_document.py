@@ -13,7 +13,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.hull import hull
 from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
 from photogram.show.quantity import Axis, Quantity, Table, of_each
-from photogram.show.sketch.marks import Mark, Markers, Panel, Polygons
+from photogram.show.sketch.marks import Mark, Markers, Panel, Polygons, boxes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.drawing import in_pixels
@@ -109,14 +109,15 @@ def plot_planned_views(plan: ViewPlan) -> Plot:
     panels = list[Panel]()
     for number in range(len(plan.views)):
         own = corners.xy[corners.picture == number]
+        panel = in_pixels(size)
         marks: list[Mark] = [
+            Polygons(boxes(panel.limits[:1], panel.limits[1:]), "white", 1.0, FAINT, 1.0, 1.6),
             Polygons(hull(own)[np.newaxis], FAINT, 0.5, BLUE, 0.5, 1.0),
             Markers(own, ".", 2.5, BLUE),
         ]
         if corners.point[corners.picture == number][0] == 0:
             marks.append(Markers(own[:1], "o", 5.0, VERMILION))
-        title = f"{number + 1}"
-        panels.append(replace(in_pixels(size), marks=marks, title=title, across="", up="", unnumbered=True))
+        panels.append(replace(panel, marks=marks, title=f"{number + 1}", across="", up="", bare=True))
     every = [*panels, *[None] * (rows * PANELS_PER_ROW - len(panels))]
     return Plot(
         PANEL_INCHES * PANELS_PER_ROW, rows * (0.3 + PANEL_INCHES * size[1] / size[0]), every, PANELS_PER_ROW

@@ -42,11 +42,12 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: 
             f"correction in {'xy'[axis]}",
             *OF_COMPARATOR,
             equal=True,
+            shades=shades if axis else None,
         )
         for axis in range(2)
     ]
     title = f"Nonlinear correction{whose}; dots are the places measured"
-    return Plot(10.5, 4.9, panels, 2, shades, title=title)
+    return Plot(10.5, 4.9, panels, 2, title=title)
 
 
 def distorted_grid(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:

@@ -10,7 +10,6 @@ import numpy as np
 from photogram.comparator.pictures.vectors import ACCENT, MAIN
 from photogram.show.sketch.marks import Line, Panel, Polygons, Texts, boxes
 from photogram.show.sketch.plot import Plot
-from photogram.show.style import INK
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
@@ -60,7 +59,7 @@ def variance_bars(calibration: Calibration) -> Plot:
     texts = [f"{components[name]:.3f} µm, {share:.0f} %" for name, share in every]
     marks = [
         Polygons(_bars(values, places), MAIN, 0.75, MAIN, 0.0, 0.0),
-        Texts(np.column_stack([values + 0.01 * right, places]), texts, [INK] * len(names), 8.0, "start"),
+        Texts(np.column_stack([values + 0.01 * right, places]), texts, 8.0),
     ]
     title = f"Components of the error: {components['total']:.3f} µm before calibration"
     limits = np.array([[0.0, -0.5], [right, len(names) - 0.5]])

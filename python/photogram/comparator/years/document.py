@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.tables import UM, XY
-from photogram.show.forms import record
-from photogram.show.history import history_document, history_part
+from photogram.show.history import history_document
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity, Table, members, of_each
 from photogram.statistics.findings import Findings, Tested
@@ -101,12 +100,8 @@ def comparison_findings(comparison: Comparison) -> Findings:
 
 def comparison_document(comparison: Comparison) -> Document:
     """Return the document of a comparison."""
-    together, verdict = comparison.together, comparison.verdict
+    together = comparison.together
     given = {plate: grid.sigma_um or 0.0 for plate, grid in together.grids.items()}
-    parts = [
-        history_part(own, name, **members(comparison.ranges[name], "centre_um", "half_range_um"))
-        for name, own in comparison.histories.items()
-    ]
     grids = [
         members(grid, "points", "sigma_um", "adopted", plate="number")
         | {
@@ -122,8 +117,9 @@ def comparison_document(comparison: Comparison) -> Document:
         "Calibrations of comparators over years",
         calibrations(comparison),
         comparison.histories,
-        parts,
-        verdict,
+        comparison.verdict,
+        "comparators",
+        {name: members(own, "centre_um", "half_range_um") for name, own in comparison.ranges.items()},
         highlights=[
             Fact(
                 f"Grid {plate}, a coordinate",
@@ -138,9 +134,7 @@ def comparison_document(comparison: Comparison) -> Document:
             Section("pointing", "Pointing of the operators, all calibrations", [pointing]),
         ],
         members={
-            "verdict": verdict.document(),
             "covariance": together.covariance,
-            "comparators": {part.title: record(part) for part in parts},
             "sigma0": together.test.factor,
             "degrees_of_freedom": together.test.degrees_of_freedom,
             "grids": grids,

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.show.forms import record
-from photogram.show.history import history_document, history_part
+from photogram.show.history import history_document
 from photogram.show.page import Document, Fact
 from photogram.show.quantity import Axis, Quantity, Table
 from photogram.statistics.findings import Findings, Tested
@@ -65,25 +64,19 @@ def comparison_findings(comparison: CameraComparison) -> Findings:
 
 def comparison_document(comparison: CameraComparison) -> Document:
     """Return the document of a comparison."""
-    verdict, angles = comparison.verdict, comparison.angles
-    parts = [
-        history_part(own, name, FIGURES, angle_rad=angles[name]) for name, own in comparison.histories.items()
-    ]
     return history_document(
         "Calibrations of cameras over years",
         calibrations(comparison),
         comparison.histories,
-        parts,
-        verdict,
+        comparison.verdict,
+        "cameras",
+        {name: {"angle_rad": angle} for name, angle in comparison.angles.items()},
+        about=FIGURES,
         highlights=[
             Fact(f"{name[:1].upper()}{name[1:]} compared up to", f"{math.degrees(angle):.1f}", "°")
-            for name, angle in angles.items()
+            for name, angle in comparison.angles.items()
         ],
-        members={
-            "verdict": verdict.document(),
-            "cameras": {part.title: record(part) for part in parts},
-            "remarks": [*map(str, comparison.remarks)],
-        },
+        members={"remarks": [*map(str, comparison.remarks)]},
     )
 
 

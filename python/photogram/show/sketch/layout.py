@@ -1,26 +1,32 @@
-"""Layout of panels: margins follow from text widths, boxes use the rest.
+"""Layout of panels: axes, text and legends as marks around boxes that use the rest.
 
 All units are points, from the upper left corner, downwards.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.sketch.letters import Box, Ticks, ticks, widest, width, wrapped
-from photogram.show.sketch.marks import Line, Markers, Panel, Polygons, Sketch
+from photogram.show.sketch import marks as shapes
+from photogram.show.sketch.letters import Ticks, ticks, widest, width, wrapped
+from photogram.show.sketch.marks import Line, Mark, Panel, Polygons, Sketch, Texts, boxes
+from photogram.show.style import FAINT
 
 HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0  # Sizes of letters
-HEAD_LINE, TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 15.0, 13.0, 9.6, 11.5, 12.0
+LEADING = 1.38  # Distance of lines of text, in sizes of their letters
+TICK = 3.5  # Length of the ticks of an axis
 SWATCH = 16.0  # Width of the sample of a mark in a legend
+SIDES = ((0, 0), (2, 2), (2, 0), (0, 2), (0, 1), (2, 1), (1, 0), (1, 2))  # Of a point, in the order of trial
 GAP = 8.0  # Between unrelated items
 COLOUR_BAR = 62.0  # Width of a colour bar with its numbers and name
 MIN_SIDE = 40.0  # Of a box
-NO_TICKS = Ticks(np.empty(0), [])
+
+Box: TypeAlias = tuple[float, float, float, float]  # Left, upper, right and lower side
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,16 +34,12 @@ class Placed:
     """A panel and its position."""
 
     panel: Panel
-    box: Box = (0.0, 0.0, 0.0, 0.0)  # Left, upper, right and lower side of the area between the axes
-    # Ticks of the axes; `numbered`: whether the horizontal axis has numbers
-    across: Ticks = NO_TICKS
-    up: Ticks = NO_TICKS
-    numbered: bool = False
-    # Lines of title and notes
-    title: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    # Width of the numbers at the left of all panels in its column
-    beside: float = 0.0
+    box: Box  # Left, upper, right and lower side of the area between the axes
+    across: Ticks = Ticks(np.empty(0), [])  # Ticks of the axes
+    up: Ticks = Ticks(np.empty(0), [])
+    frame: Sequence[Mark] = ()  # Axes, text, legend and colour bar, in points
+    sides: Box = (0.0, 0.0, 0.0, 0.0)  # Widths and heights that these require around the box
+    legend: Box | None = None
 
     def at(self, places: Floats) -> Floats:
         """Return (..., 2) positions in the units of the axes as points of the plot."""
@@ -48,107 +50,192 @@ class Placed:
         return found
 
     @property
-    def scale(self) -> float:
-        return (self.box[2] - self.box[0]) / float(abs(self.panel.limits[1, 0] - self.panel.limits[0, 0]))
-
-    @property
-    def above(self) -> float:
-        """Height of title and bars over the box."""
-        return 6.0 + TITLE_LINE * len(self.title) + BAR_LINE * len(self.panel.bars)
-
-    @property
-    def axis_below(self) -> float:
-        """Height of the numbers and of the name of the axis below the box."""
-        panel, numbers = self.panel, 0.0
-        if self.numbered:
-            turned = widest(panel.across_names, NUMBER) if panel.turned else 0.0
-            numbers = 5.0 + max(turned, NUMBER + 2.0)
-        return numbers + (LABEL + 5.0 if panel.across else 0.0) + 3.0
-
-    @property
-    def below(self) -> float:
-        """Height of axis and legend below the box, down to its notes."""
-        return self.axis_below + (self.legend_size[1] + GAP / 2 if self.panel.legend == "below" else 0.0)
-
-    @property
-    def legend_size(self) -> tuple[float, float]:
-        """Width and height of a legend with one mark per line."""
-        labels = [mark.label for mark in self.panel.labelled]
-        return SWATCH + 6.0 + widest(labels, LEGEND), LEGEND_LINE * len(labels)
-
-    @property
-    def legend(self) -> Box:
-        """Left, upper, right and lower side of the legend: outside the box, or in its emptiest corner."""
-        (left, top, right, low), (wide, high) = self.box, self.legend_size
-        if self.panel.legend in ("beside", "below"):
-            x, y = (right + GAP, top) if self.panel.legend == "beside" else (left, low + self.axis_below)
-            return x, y, x + wide, y + high
-        curves = self.at(np.concatenate([np.empty((0, 2)), *_curves(self.panel)]))
-        inner = left + GAP / 2, top + GAP / 2, right - wide - GAP / 2, low - high - GAP / 2
-        corners = [(x, y) for y in (inner[1], inner[3]) for x in (inner[2], inner[0])]
-        x, y = min(corners, key=lambda corner: _inside(curves, corner, self.legend_size))
-        return x, y, x + wide, y + high
-
-    @property
-    def right_side(self) -> float:
-        """Right side of the box, or of the legend beside it."""
-        return self.legend[2] if self.panel.legend == "beside" else self.box[2]
-
-    @property
-    def end(self) -> tuple[float, float]:
-        """Right and lower limit of the panel with all its text."""
-        (left, _, right, low), panel = self.box, self.panel
-        ends = [
-            left + max(widest(self.title, TITLE), widest(self.notes, NOTE)),
-            right + 0.5 * widest(self.across.texts[-1:], NUMBER),
-            0.5 * (left + right + width(self.across.named(panel.across), LABEL)),
-            self.right_side + (GAP + COLOUR_BAR if panel.shades else 0.0),
-            left + self.legend_size[0] if panel.legend == "below" else 0.0,
-            *(left + self.scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars),
-        ]
-        down = low + self.below + NOTE_LINE * len(self.notes)
-        return max(ends), max(down, self.legend[3]) if panel.legend == "beside" else down
+    def ends(self) -> tuple[float, float]:
+        """The right and the lower end of the panel with all its text."""
+        parts, rights = {"start": 1.0, "middle": 0.5, "end": 0.0}, [self.box[2] + self.sides[2]]
+        for mark in self.frame:
+            if isinstance(mark, Texts) and not mark.turned:
+                sizes = np.array([parts[mark.anchor] * width(text, mark.size) for text in mark.texts])
+                rights += (mark.places[:, 0] + sizes).tolist()
+        return max(rights), self.box[3] + self.sides[3]
 
 
-def heading(sketch: Sketch) -> list[str]:
-    return wrapped(sketch.title, HEAD, 72.0 * sketch.width - GAP)
+POINTS = Placed(Panel(np.array([[0.0, 1e4], [1e4, 0.0]])), (0.0, 0.0, 1e4, 1e4))  # Of marks in points
 
 
 def laid_out(sketch: Sketch) -> list[Placed]:
-    """Return the panels of a plot with their positions."""
+    """Return the panels of a plot with their positions; the first has the heading of the plot."""
+    there = [k for k, panel in enumerate(sketch.panels) if panel is not None]
     panels = [_opened(panel) for panel in sketch.panels if panel is not None]
     if not panels:
         return []
-    there = [k for k, panel in enumerate(sketch.panels) if panel is not None]
     rows, columns = np.divmod(there, sketch.columns)
+    shown = (not sketch.shared) | (rows == _largest(columns, rows)[columns])
     whole_wide, whole_high = 72.0 * sketch.width, 72.0 * sketch.height
-    sides = [_sides(panel, whole_wide / sketch.columns, whole_high / sketch.rows) for panel in panels]
-    numbers, names, rights = (_largest(columns, own) for own in np.transpose(sides))
-    lefts, bar = numbers + names, COLOUR_BAR if sketch.shades else 0.0
-    wide = max((whole_wide - lefts.sum() - rights.sum() - bar) / sketch.columns, MIN_SIDE)
-    found = []
-    for panel, row, column in zip(panels, rows, columns, strict=True):
-        room = wide + float(rights[column]) - GAP
-        notes = tuple(line for note in panel.notes for line in wrapped(note, NOTE, room))
-        numbered = not sketch.shared or row == rows[columns == column].max()
-        title = tuple(wrapped(panel.title, TITLE, room))
-        found.append(Placed(panel, numbered=bool(numbered), title=title, notes=notes))
-    head = HEAD_LINE * len(heading(sketch))
-    tops = _largest(rows, [each.above for each in found])
-    belows = _largest(rows, [each.below + NOTE_LINE * len(each.notes) + GAP for each in found])
+    heading = wrapped(sketch.title, HEAD, whole_wide - GAP)
+    head, wide, high = LEADING * HEAD * len(heading), whole_wide / sketch.columns, whole_high / sketch.rows
+    guess, room = (0.0, 0.0, 0.75 * wide, high), 0.8 * wide
+    sides = [_framed(panel, guess, room, own).sides for panel, own in zip(panels, shown, strict=True)]
+    lefts, rights = (_largest(columns, [own[k] for own in sides]) for k in (0, 2))
+    tops, belows = (_largest(rows, [own[k] for own in sides]) for k in (1, 3))
+    wide = max((whole_wide - lefts.sum() - rights.sum()) / sketch.columns, MIN_SIDE)
     high = max((whole_high - head - tops.sum() - belows.sum()) / sketch.rows, MIN_SIDE)
-    sizes = np.array([_size(panel, wide, high) for panel in panels])
+    extents = np.array([np.abs(panel.limits[1] - panel.limits[0]) for panel in panels])
+    equal = extents * np.min([wide, high] / extents, axis=1, keepdims=True)
+    sizes = np.where([[panel.equal] for panel in panels], equal, [wide, high])
     heights = _largest(rows, sizes[:, 1])  # Panels lower than the available height do not leave a gap
     left = np.cumsum(lefts + rights + wide) - rights - wide
     top = head + np.cumsum(tops + belows + heights) - belows - heights
     corners = np.column_stack([left[columns], top[rows]])
-    boxes = np.hstack([corners, corners + sizes]).tolist()
-    axes = [_ticks(panel, *size) for panel, size in zip(panels, sizes.tolist(), strict=True)]
-    besides = _largest(columns, [widest(up.texts, NUMBER) for _, up in axes])[columns].tolist()
+    places = np.hstack([corners, corners + sizes]).tolist()
+    cells = zip(panels, places, shown, lefts[columns].tolist(), strict=True)
+    found = [_framed(panel, tuple(box), room, own, margin) for panel, box, own, margin in cells]
+    title = _lines(corners[:, 0].min(), 0.5 * LEADING * HEAD, heading, HEAD)
+    return [replace(found[0], frame=[title, *found[0].frame]), *found[1:]]
+
+
+def _framed(panel: Panel, box: Box, room: float, numbered: bool, margin: float = 0.0) -> Placed:
+    """Compose what is around a box: texts within `room`, and the name of its axis at the left `margin`."""
+    (left, top, right, low), above = box, box[1] - 8.0
+    across, up = _ticks(panel, right - left, low - top)
+    placed = Placed(panel, box, across, up)
+    marks, wide, down = _axes(placed, margin, numbered)
+    legend, entries = _legend(placed, down)
+    side = right + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
+    if legend and panel.legend == "beside":
+        side = legend[2] + GAP
+    elif legend and panel.legend == "below":
+        down = legend[3] + GAP / 2
+    if panel.shades:
+        marks += _colour_bar(panel.shades, side + GAP, top, low, panel.decimal)
+        side += COLOUR_BAR
+    notes = [line for note in panel.notes for line in wrapped(note, NOTE, room)]
+    marks.append(_lines(left, down + 0.5 * LEADING * NOTE, notes, NOTE))
+    down = max(down + LEADING * NOTE * len(notes), legend[3] if legend else 0.0) + GAP
+    scale = (right - left) / float(abs(panel.limits[1, 0] - panel.limits[0, 0]))
+    for length, colour, meaning in reversed(panel.bars):
+        end = left + scale * length
+        marks += [Line(_at([left, end], above), colour, 2.5), _lines(end + 5.0, above, [meaning], LEGEND)]
+        above -= LEADING * LEGEND
+    title = wrapped(panel.title, TITLE, room)
+    above -= LEADING * TITLE * len(title)
+    marks.append(_lines(left, above + LEADING * TITLE - 4.0, title, TITLE))
+    sides = wide, top - above - 2.0, side + GAP - right, down - low
+    return replace(placed, frame=[*marks, *entries], sides=sides, legend=legend)
+
+
+def _axes(placed: Placed, margin: float, numbered: bool) -> tuple[list[Mark], float, float]:
+    """Return axes with ticks, numbers and names; the width at the left, and the lower end."""
+    panel, (left, top, right, low) = placed.panel, placed.box
+    x = placed.at(_at(placed.across.values, panel.limits[0, 1]))[:, 0]
+    y = placed.at(_at(panel.limits[0, 0], placed.up.values))[:, 1]
+    numbers, wide, down = placed.across.texts, widest(placed.up.texts, NUMBER) + 7.0, low + 3.0
+    found: list[Mark] = [Texts(_at(left - 6.0, y), placed.up.texts, NUMBER, anchor="end")]
+    if not panel.bare:
+        ticks_across = np.stack([_at(x, low), _at(x, low + TICK)], axis=1)
+        ticks_up = np.stack([_at(left, y), _at(left - TICK, y)], axis=1)
+        sides = np.array([[left, top], [left, low], [right, low]])
+        found.append(Line([sides, *ticks_across, *ticks_up], FAINT, 0.8))
+    if panel.up:
+        wide = margin or wide + LABEL + 6.0
+        at = _at(left - wide + 6.8, (top + low) / 2)
+        found.append(Texts(at, [panel.up], LABEL, anchor="middle", turned=True))
+    if numbered and panel.turned:
+        found.append(Texts(_at(x, low + 5.0), numbers, NUMBER, anchor="end", turned=True))
+        down += 5.0 + widest(numbers, NUMBER)
+    elif numbered:
+        found.append(Texts(_at(x, low + 9.1), numbers, NUMBER, anchor="middle"))
+        down += NUMBER + 7.0
+    if panel.across:
+        down += LABEL + 5.0
+        found.append(Texts(_at((left + right) / 2, down - 8.2), [panel.across], LABEL, anchor="middle"))
+    return found, wide, down
+
+
+def _legend(placed: Placed, down: float) -> tuple[Box | None, list[Mark]]:
+    """Return the legend, one mark per line: outside the box, or in its emptiest corner."""
+    marks, (left, top, right, low) = placed.panel.labelled, placed.box
+    if not placed.panel.legend or not marks:
+        return None, []
+    names, line = [mark.label for mark in marks], LEADING * LEGEND
+    size = np.array([SWATCH + 6.0 + widest(names, LEGEND), line * len(marks)])
+    at, found = [right + GAP, top] if placed.panel.legend == "beside" else [left, down], list[Mark]()
+    if placed.panel.legend == "best":
+        curves = placed.at(np.concatenate([shapes.NOWHERE, *_curves(placed.panel)]))
+        corners = np.array([[right, top], [left, top], [right, low], [left, low]])
+        corners = corners + np.where(corners > placed.box[:2], -GAP / 2 - size, GAP / 2)
+        inside = ((curves > corners[:, None]) & (curves < (corners + size)[:, None])).all(axis=2)
+        at = corners[inside.sum(axis=1).argmin()].tolist()
+        found.append(Polygons(boxes(_at(*at), _at(*at) + size), "white", 0.85))
+    found += [_sample(mark, _at(at[0], at[1] + line * (k + 0.5))) for k, mark in enumerate(marks)]
+    found.append(_lines(at[0] + SWATCH + 6.0, at[1] + 0.5 * line, names, LEGEND))
+    return (*at, *(at + size).tolist()), found
+
+
+def _sample(mark: Mark, left: Floats) -> Mark:
+    """Return the sample of a mark for a legend, to the right of a point."""
+    line, aside = left + np.array([[0.0, 0.0], [SWATCH, 0.0]]), np.array([0.0, 3.0])
+    match mark:
+        case shapes.Markers():
+            return replace(mark, places=line.mean(axis=0)[None], size=max(mark.size, 4.0), values=None)
+        case shapes.Arrows():
+            return replace(mark, places=line[:1], vectors=line[1:] - line[:1], width=1.3e-4)
+        case Polygons():
+            return replace(mark, places=boxes(line[:1] - aside, line[1:] + aside))
+        case Line():
+            return replace(mark, places=line)
+    raise TypeError(f"the legend does not draw {type(mark).__name__}")
+
+
+def _colour_bar(shades: shapes.Shades, left: float, top: float, low: float, decimal: str) -> list[Mark]:
+    """Return a colour bar with numbers and its name at the right."""
+    right, colours = left + 9.0, shades.values((np.arange(64) + 0.5) / 64)
+    values = ticks(np.array([shades.low, shades.high]), low - top, NUMBER, log=shades.log, decimal=decimal)
+    y = low - shades.parts(values.values) * (low - top)
+    name = _at(left + COLOUR_BAR - 11.0, (top + low) / 2)
     return [
-        replace(each, box=tuple(box), across=across, up=up, beside=beside)
-        for each, box, (across, up), beside in zip(found, boxes, axes, besides, strict=True)
+        shapes.Mesh(np.array([[left, low], [right, top]]), colours[:, np.newaxis], shades),
+        Line(np.stack([_at(right, y), _at(right + TICK, y)], axis=1), FAINT, 0.8),
+        Texts(_at(right + 6.0, y), values.texts, NUMBER),
+        Texts(name, [shades.label], LABEL, anchor="middle", turned=True),
     ]
+
+
+def _at(x: Any, y: Any) -> Floats:
+    return np.column_stack(np.broadcast_arrays(x, y))
+
+
+def _lines(left: float, y: float, texts: Sequence[str], size: float) -> Texts:
+    """Return lines of text, the first at a height."""
+    return Texts(_at(left, y + LEADING * size * np.arange(len(texts))), texts, size)
+
+
+def free_names(
+    mark: shapes.Names, at: Floats, avoid: Floats, size: float, room: Box, taken: list[Box]
+) -> Iterator[tuple[int, Box]]:
+    """Yield rows and boxes of names that fit at one of eight sides of their points, or at their centre.
+
+    Boxes are within `room`. They cover none of the points `at` (unless centred) and `avoid`, and none of the
+    boxes `taken`, to which they are added. `size` is the letter size; y increases upwards.
+    """
+    obstacles = avoid if mark.centred else np.concatenate([at, avoid])
+    gap, high = 4.0 / 7.0 * size, 8.0 / 7.0 * size
+    for row, (text, (x, y)) in enumerate(zip(mark.texts, at.tolist(), strict=True)):
+        wide = width(text, size) + 0.8 / 7.0 * size
+        across, up = (x + gap, x - wide / 2, x - gap - wide), (y + gap, y - high / 2, y - gap - high)
+        for i, j in ((1, 1),) if mark.centred else SIDES:
+            box = left, low, right, top = across[i], up[j], across[i] + wide, up[j] + high
+            inside = room[0] <= left and right <= room[2] and room[1] <= low and top <= room[3]
+            if not inside or ((obstacles > [left, low]) & (obstacles < [right, top])).all(axis=1).any():
+                continue
+            if not any(overlap(box, other) for other in taken):
+                taken.append(box)
+                yield row, box
+                break
+
+
+def overlap(one: Box, other: Box) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def _largest(groups: Any, values: Any) -> Floats:
@@ -165,50 +252,25 @@ def _opened(panel: Panel) -> Panel:
     return replace(panel, limits=np.stack([first - room, last + room])) if room.any() else panel
 
 
-def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float, float]:
-    """Return widths of numbers, left names and right elements of a cell."""
-    across, up = _ticks(panel, 0.75 * wide, high)
-    named = LABEL + 6.0 if up.named(panel.up) else 0.0
-    right = GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
-    if panel.legend == "beside":
-        right = GAP + Placed(panel).legend_size[0] + GAP
-    return widest(up.texts, NUMBER) + 7.0, named, right + COLOUR_BAR if panel.shades else right
-
-
-def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
-    if panel.unnumbered:
-        return NO_TICKS, NO_TICKS
+def _ticks(panel: Panel, wide: float, high: float) -> list[Ticks]:
     sides = ((panel.across_names, wide, panel.log_across), (panel.up_names, high, panel.log_up))
-    across, up = (
+    return [
         Ticks(np.arange(len(names), dtype=float), list(names))
-        if names
+        if names or panel.bare
         else ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log, decimal=panel.decimal)
         for axis, (names, length, log) in enumerate(sides)
-    )
-    return across, up
-
-
-def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
-    if not panel.equal:
-        return wide, high
-    across, up = np.abs(panel.limits[1] - panel.limits[0]).tolist()
-    scale = min(wide / across, high / up)
-    return scale * across, scale * up
+    ]
 
 
 def _curves(panel: Panel) -> list[Floats]:
     """Return (n, 2) points that a legend should not cover; straight lines have points between their ends."""
-    ends, found = np.sort(panel.limits, axis=0), list[Floats]()
+    limits, found = np.sort(panel.limits, axis=0), list[Floats]()
     for mark in panel.marks:
         if isinstance(mark, Line):
-            lines = (np.clip(line, *ends) for line in mark.lines)
+            lines = (np.clip(line, *limits) for line in mark.lines)
             found += [np.linspace(line[0], line[-1], 60) if len(line) == 2 else line for line in lines]
-        elif isinstance(mark, Markers):
+        elif isinstance(mark, shapes.Markers):
             found.append(mark.places)
         elif isinstance(mark, Polygons):
             found.extend(mark.places)
     return found
-
-
-def _inside(places: Floats, corner: tuple[float, float], size: tuple[float, float]) -> int:
-    return int(((places > corner) & (places < np.add(corner, size))).all(axis=1).sum())

@@ -9,8 +9,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.sketch.letters import NOWHERE
 from photogram.show.style import BLUE, INK, VERMILION, need
+
+NOWHERE = np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -18,13 +19,7 @@ class Mark:
     """An element of a panel; marks of a higher `layer` cover others."""
 
     layer: float = 2.0
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Labelled(Mark):
-    """A mark that is listed in the legend if it has a `label`."""
-
-    label: str = ""
+    label: str = ""  # In the legend: of markers, lines, arrows and polygons
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +37,8 @@ class Shades:
 
     def parts(self, values: Floats) -> Floats:
         """Return relative positions of values, 0 and 1 at the ends."""
-        if self.log:
-            return np.asarray(np.log(values / self.low) / np.log(self.high / self.low))
-        return (values - self.low) / (self.high - self.low)
+        low, high, own = (np.log(x) if self.log else x for x in (self.low, self.high, values))
+        return np.asarray((own - low) / (high - low))
 
     def values(self, parts: Floats) -> Floats:
         if self.log:
@@ -53,7 +47,7 @@ class Shades:
 
 
 @dataclass(frozen=True, eq=False)
-class Markers(Labelled):
+class Markers(Mark):
     """Small symbols at (n, 2) points."""
 
     places: Floats
@@ -70,7 +64,7 @@ class Markers(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class Line(Labelled):
+class Line(Mark):
     """A line through (n, 2) points, or several lines; `dash` style."""
 
     places: Floats | Sequence[Floats]
@@ -86,7 +80,7 @@ class Line(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class Arrows(Labelled):
+class Arrows(Mark):
     """Arrows from (n, 2) points by vectors; shaft `width` in panels."""
 
     places: Floats
@@ -96,7 +90,7 @@ class Arrows(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class Polygons(Labelled):
+class Polygons(Mark):
     """Closed outlines through (v, 2) points; without an edge they are one area, with holes."""
 
     places: Floats | Sequence[Floats]
@@ -135,13 +129,14 @@ class Mesh(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Texts(Mark):
-    """Words at (n, 2) points, which are their `start`, `middle` or `end`."""
+    """Words at (n, 2) points, which are their `start`, `middle` or `end`; upwards if `turned`."""
 
     places: Floats
     texts: Sequence[str]
-    colours: Sequence[str]
     size: float
-    anchor: str = "middle"
+    colours: str | Sequence[str] = INK
+    anchor: str = "start"
+    turned: bool = False
     layer: float = field(default=3.0, kw_only=True)
 
 
@@ -204,16 +199,11 @@ MAPS = {
 }
 
 
-def stops(name: str) -> tuple[Floats, Floats]:
-    """Return (n,) positions from 0 to 1 and (n, 3) colours, 0 to 255, of a map."""
-    places, colours = MAPS[name]
-    return np.array(places) / 255.0, np.array([list(bytes.fromhex(each)) for each in colours.split()], float)
-
-
 def rgb(shades: Shades, values: Floats) -> Indices:
     """Return (..., 3) red, green, blue, 0 to 255; clipped at the ends."""
-    places, colours = stops(shades.map)
-    parts = shades.parts(values)
+    places, written = MAPS[shades.map]
+    colours = np.array([list(bytes.fromhex(colour)) for colour in written.split()])
+    parts = 255.0 * shades.parts(values)
     return np.stack([np.interp(parts, places, own) for own in colours.T], axis=-1).round().astype(np.int64)
 
 
@@ -287,9 +277,7 @@ class Panel:
     across_names: Sequence[str] = ()
     up_names: Sequence[str] = ()
     turned: bool = False  # Whether names of the horizontal axis are vertical
-    # Without lines of axes; without numbers
-    bare: bool = False
-    unnumbered: bool = False
+    bare: bool = False  # Without axes and numbers; names remain
     # Logarithmic axes
     log_across: bool = False
     log_up: bool = False
@@ -297,8 +285,8 @@ class Panel:
     decimal: str = "."  # Decimal sign
 
     @property
-    def labelled(self) -> list[Labelled]:
-        return [mark for mark in self.marks if isinstance(mark, Labelled) and mark.label]
+    def labelled(self) -> list[Mark]:
+        return [mark for mark in self.marks if mark.label]
 
     def even(self, places: Floats) -> Floats:
         """Return (..., 2) positions with logarithms along logarithmic axes."""
@@ -315,7 +303,6 @@ class Sketch:
     height: float
     panels: Sequence[Panel | None]
     columns: int = 1
-    shades: Shades | None = None  # Colour bar of all panels
     shared: bool = False  # Numbers across only below the lowest panel of a column
     title: str = ""
 

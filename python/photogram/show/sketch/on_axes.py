@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.show.sketch import marks
-from photogram.show.sketch.layout import NAME, NOTE
-from photogram.show.sketch.letters import free_names
+from photogram.show.sketch.layout import NAME, NOTE, NUMBER, free_names
 from photogram.show.sketch.marks import Panel, Sketch
 from photogram.show.style import FAINT, INK, styled
 from photogram.words import phrase
@@ -21,6 +19,7 @@ LEGENDS: dict[str, dict[str, Any]] = {
     "below": {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "borderaxespad": 4.5},
     "best": {"loc": "best"},
 }
+TICKS: dict[str, Any] = {"color": FAINT, "labelsize": NUMBER, "labelcolor": INK}
 ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 
@@ -37,23 +36,26 @@ def on_axes(sketch: Sketch, ax: Any) -> None:
         every: list[Any] = np.atleast_1d(np.asarray(ax, dtype=object)).ravel().tolist()
         if len(every) != len(panels):
             raise InputError(phrase("plot.axes", panels=len(panels), axes=len(every)))
-        drawn = [(axes, panel) for axes, panel in zip(every, panels, strict=True) if panel is not None]
+        names = []
         for axes, panel in zip(every, panels, strict=True):
             axes.set_visible(panel is not None)
             if panel is not None:
                 _panel(axes, panel)
+                names += [(axes, mark) for mark in panel.marks if isinstance(mark, marks.Names)]
         whole = every[0].get_figure()
         whole.align_ylabels()
-        if sketch.shades is not None:
-            _colour_bar([axes for axes, _ in drawn], sketch.shades)
         if sketch.title:
             whole.suptitle(sketch.title, fontsize=11, x=0.01, horizontalalignment="left")
-        _names(drawn)
+        # Legends and axes with equal scales have their final positions in the second layout.
+        for axes, _ in names[:1] * 2:
+            lay_out(axes.figure)
+        for axes, mark in names:
+            _names(axes, mark)
 
 
 def _panel(axes: Any, panel: Panel) -> None:
     # Ticks are created when the figure is drawn, outside the context of the style.
-    axes.tick_params(color=FAINT, labelsize=8.0, labelcolor=INK)
+    axes.tick_params(**TICKS)
     axes.set(xlim=panel.limits[:, 0], ylim=panel.limits[:, 1], xlabel=panel.across, ylabel=panel.up)
     if panel.equal:
         axes.set_aspect("equal", anchor="NW")
@@ -61,39 +63,32 @@ def _panel(axes: Any, panel: Panel) -> None:
         axes.locator_params(nbins=6)
     if panel.across:
         axes.tick_params(labelbottom=True)
-    for axis, log, names in (
-        (axes.xaxis, panel.log_across, panel.across_names),
-        (axes.yaxis, panel.log_up, panel.up_names),
-    ):
+    sides = (panel.log_across, panel.across_names), (panel.log_up, panel.up_names)
+    for axis, (log, names) in zip((axes.xaxis, axes.yaxis), sides, strict=True):
         if log:
-            axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+            axes.set(**{f"{axis.axis_name}scale": "log"})
             _ratios(axis)
         elif panel.decimal != ".":
             axis.set_major_formatter(lambda value, _: f"{value:.10g}".replace(".", panel.decimal))
-        if names:
-            turn = 90 if panel.turned and axis is axes.xaxis else 0
-            axis.set_ticks(range(len(names)), names, rotation=turn)
-    if panel.unnumbered:
-        axes.set(xticks=[], yticks=[])
+        if names or panel.bare:
+            axis.set_ticks(range(len(names)), names, rotation=90 * (panel.turned and axis is axes.xaxis))
     if panel.bare:
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)
     for mark in panel.marks:
         draw(mark, axes)
     _around(axes, panel)
-    if panel.shades is not None:
-        _colour_bar([axes], panel.shades)
 
 
 def _around(axes: Any, panel: Panel) -> None:
-    """Add the legend, the scale bars and title above the axes, and the notes below."""
-    from matplotlib.collections import PathCollection
+    """Add the legend, the scale bars and title above the axes, the colour bar, and the notes below."""
+    from matplotlib.cm import ScalarMappable
     from matplotlib.transforms import ScaledTranslation
 
     if panel.legend:
         legend = axes.legend(**LEGENDS[panel.legend])
         for handle in legend.legend_handles:
-            if isinstance(handle, PathCollection):
+            if hasattr(handle, "set_sizes"):
                 handle.set_sizes(np.maximum(handle.get_sizes(), 16.0))
     left, right = axes.get_xlim()
     outside = {"textcoords": "offset points", "color": INK, "annotation_clip": False, "fontsize": NOTE}
@@ -106,6 +101,12 @@ def _around(axes: Any, panel: Panel) -> None:
     axes.set_title(panel.title, pad=8.0 + 12.0 * len(panel.bars))
     if notes := "\n".join(filter(None, panel.notes)):
         axes.annotate(notes, (0, 0), (0, -34 if panel.across else -22), "axes fraction", va="top", **outside)
+    if panel.shades:
+        colours, look = ScalarMappable(**_colours(panel.shades)), {"aspect": 30, "shrink": 0.85}
+        bar = axes.get_figure().colorbar(colours, ax=axes, label=panel.shades.label, **look)
+        bar.ax.tick_params(**TICKS)
+        if panel.shades.log:
+            _ratios(bar.ax.yaxis)
 
 
 def _ratios(axis: Any) -> None:
@@ -117,39 +118,26 @@ def _ratios(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _colour_bar(axes: list[Any], shades: marks.Shades) -> None:
-    from matplotlib.cm import ScalarMappable
-
-    look = {"label": shades.label, "aspect": 30, "shrink": 0.85}
-    bar = axes[0].get_figure().colorbar(ScalarMappable(**_colours(shades)), ax=axes, **look)
-    if shades.log:
-        _ratios(bar.ax.yaxis)
-
-
 def _colours(shades: marks.Shades) -> dict[str, Any]:
-    from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
+    from matplotlib.colors import ListedColormap, LogNorm, Normalize
 
-    places, colours = marks.stops(shades.map)
-    steps = [*zip(places.tolist(), (colours / 255.0).tolist(), strict=True)]
-    norm = (LogNorm if shades.log else Normalize)(shades.low, shades.high)
-    return {"cmap": LinearSegmentedColormap.from_list(shades.map, steps), "norm": norm}
+    colours = marks.rgb(shades, shades.values(np.linspace(0.0, 1.0, 256))) / 255.0
+    return {
+        "cmap": ListedColormap(colours),
+        "norm": (LogNorm if shades.log else Normalize)(shades.low, shades.high),
+    }
 
 
-def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
-    named = [(axes, mark) for axes, panel in drawn for mark in panel.marks if isinstance(mark, marks.Names)]
-    # Legends and axes with equal scales have their final positions in the second layout.
-    for axes, _ in named[:1] * 2:
-        lay_out(axes.figure)
-    for axes, mark in named:
-        point, at = axes.figure.dpi / 72.0, axes.transData.transform(mark.places)
-        room, avoid = axes.get_window_extent().extents, axes.transData.transform(mark.avoid)
-        # The boxes that matplotlib draws are wider than the words.
-        for row, box in free_names(mark.texts, at, avoid, 1.1 * NAME * point, room, [], mark.centred):
-            shift = (box[0] - at[row, 0]) / point + 0.4, (box[1] - at[row, 1]) / point + 1.8
-            look = {"textcoords": "offset points", "fontsize": NAME, "color": mark.colours[row]}
-            name = axes.annotate(mark.texts[row], mark.places[row], shift, **look)
-            name.set_in_layout(False)
-            name.set_bbox({"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 0.4})
+def _names(axes: Any, mark: marks.Names) -> None:
+    point, at = axes.figure.dpi / 72.0, axes.transData.transform(mark.places)
+    room, avoid = axes.get_window_extent().extents, axes.transData.transform(mark.avoid)
+    # The boxes that matplotlib draws are wider than the words.
+    for row, box in free_names(mark, at, avoid, 1.1 * NAME * point, room, []):
+        shift = (box[0] - at[row, 0]) / point + 0.4, (box[1] - at[row, 1]) / point + 1.8
+        look = {"textcoords": "offset points", "fontsize": NAME, "color": mark.colours[row]}
+        name = axes.annotate(mark.texts[row], mark.places[row], shift, **look)
+        name.set_in_layout(False)
+        name.set_bbox({"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 0.4})
 
 
 def lay_out(whole: Any) -> None:
@@ -162,7 +150,9 @@ def lay_out(whole: Any) -> None:
 
 def draw(mark: marks.Mark, axes: Any) -> None:
     """Draw a mark on axes with final limits; `Names` after the layout."""
-    given: dict[str, Any] = {"zorder": mark.layer, "label": getattr(mark, "label", "") or None}
+    from matplotlib.collections import EllipseCollection, PolyCollection
+
+    given: dict[str, Any] = {"zorder": mark.layer, "label": mark.label or None}
     match mark:
         case marks.Markers():
             _markers(mark, axes, given)
@@ -177,17 +167,29 @@ def draw(mark: marks.Mark, axes: Any) -> None:
             given |= {"color": mark.colours, "width": mark.width, "headwidth": 3.5, "headlength": 4.5}
             plain = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
             axes.quiver(*mark.places.T, *mark.vectors.T, **plain, **given)
-        case marks.Polygons() | marks.Ellipses():
-            _outlines(mark, axes, given)
+        case marks.Polygons():
+            edge = (mark.edge, mark.edge_opacity) if mark.edge else "none"
+            known = [outline[np.isfinite(outline).all(axis=1)] for outline in mark.places]
+            given |= {
+                "facecolors": (mark.face, mark.face_opacity),
+                "edgecolors": edge,
+                "linewidths": mark.width,
+            }
+            given["rasterized"] = len(known) > MAX_VECTOR_MARKS / 5
+            axes.add_collection(PolyCollection(known, **given), autolim=False)
+        case marks.Ellipses():
+            edge = "none" if mark.fill else mark.colour
+            given |= {"facecolors": (mark.colour, mark.fill), "edgecolors": edge, "linewidths": mark.width}
+            given |= {"units": "xy", "offsets": mark.places, "offset_transform": axes.transData}
+            wide, high = 2 * mark.semi_axes.T
+            axes.add_collection(EllipseCollection(wide, high, mark.angles, **given), autolim=False)
         case marks.Mesh():
-            (left, low), (right, high) = mark.corners
-            rows, columns = mark.values.shape
-            x, y = np.linspace(left, right, columns + 1), np.linspace(low, high, rows + 1)
-            look = {"zorder": mark.layer, **_colours(mark.shades)}
-            axes.pcolormesh(x, y, np.ma.masked_invalid(mark.values), rasterized=True, **look)
+            given |= _colours(mark.shades)
+            axes.pcolorfast(*mark.corners.T, np.ma.masked_invalid(mark.values), **given)
         case marks.Texts():
             look = {"ha": ALIGNED[mark.anchor], "va": "center", "fontsize": mark.size}
-            for (x, y), text, colour in zip(mark.places.tolist(), mark.texts, mark.colours, strict=True):
+            colours = np.broadcast_to(mark.colours, len(mark.texts))
+            for (x, y), text, colour in zip(mark.places.tolist(), mark.texts, colours, strict=True):
                 axes.text(x, y, text, color=colour, **look)
         case _ if not isinstance(mark, marks.Names):
             raise TypeError(f"the renderer for matplotlib does not draw {type(mark).__name__}")
@@ -205,22 +207,3 @@ def _markers(mark: marks.Markers, axes: Any, given: dict[str, Any]) -> None:
     else:
         given["color"] = mark.colour
     axes.scatter(*places.T, **given)
-
-
-def _outlines(mark: marks.Polygons | marks.Ellipses, axes: Any, given: dict[str, Any]) -> None:
-    from matplotlib.collections import EllipseCollection, PolyCollection
-
-    drawn: Any
-    if isinstance(mark, marks.Polygons):
-        given["facecolors"] = mark.face, mark.face_opacity
-        given["edgecolors"] = (mark.edge, mark.edge_opacity) if mark.edge else "none"
-        given["rasterized"] = len(mark.places) > MAX_VECTOR_MARKS / 5
-        known = [outline[np.isfinite(outline).all(axis=1)] for outline in mark.places]
-        drawn = PolyCollection(known, linewidths=mark.width, **given)
-    else:
-        given["facecolors"] = mark.colour, mark.fill
-        given["edgecolors"] = "none" if mark.fill else mark.colour
-        given |= {"units": "xy", "offsets": mark.places, "offset_transform": axes.transData}
-        wide, high = 2 * mark.semi_axes.T
-        drawn = EllipseCollection(wide, high, mark.angles, linewidths=mark.width, **given)
-    axes.add_collection(drawn, autolim=False)
