@@ -7,7 +7,7 @@ from pathlib import Path
 import lazy_loader
 
 from photogram.formats.format import Format, later
-from photogram.io.files import reading
+from photogram.io import files
 
 TITLE = "control network (ISIS)"
 HEAD = 1 << 16  # Bytes that identify a network
@@ -18,7 +18,7 @@ def _recognises(path: Path) -> bool:
         return False
     from photogram.formats.isis.reading import is_network
 
-    with reading(path), path.open("rb") as file:
+    with files.reading(path), path.open("rb") as file:
         return is_network(file.read(HEAD))
 
 
