@@ -407,13 +407,13 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
             pairs, codes = np.unique(codes * len(more) + own, return_inverse=True)
             names = [f"{names[pair // len(more)]}, {more[pair % len(more)]}" for pair in pairs.tolist()]
             parents = dict.fromkeys(names, "other images")
-    images = names, np.stack([codes, codes], axis=1)
-    points = ["control"], np.zeros(of.point_observed.shape, dtype=np.int64)
+    images: _Labels = names, np.stack([codes, codes], axis=1)
+    points: _Labels = ["control"], np.zeros(of.point_observed.shape, dtype=np.int64)
     if "component" in bases:
         along = [[f"{name}, {axis}" for name in names] for axis in "xy"]
         parents |= {each: name for part in along for each, name in zip(part, names, strict=True)}
         images = [*along[0], *along[1]], np.stack([codes, codes + len(names)], axis=1)
-        points = ["control, plan", "control, height"], points[1] + [0, 0, 1]
+        points = ["control, plan", "control, height"], points[1] + np.array([0, 0, 1])
         parents |= dict.fromkeys(points[0], "control")
     photos = [*of.stations], np.broadcast_to(np.arange(len(of.stations)), of.photo_observed.shape)
     parents |= dict.fromkeys(of.stations, "stations")
