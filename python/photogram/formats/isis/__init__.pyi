@@ -5,3 +5,5 @@ from .network import points_of as points_of
 from .reading import read_network as read_network
 from .writing import binary_network as binary_network
 from .writing import network_text as network_text
+
+TITLE: str
