@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from golden_data import golden
+from photogram.arguments.arrays import by_occurrence
 from photogram.statistics import (
     bonferroni,
     critical_tau,
@@ -198,3 +199,8 @@ def test_sizes():
         one = group_tests(blocks[:1], draws[rows, :1].T, omegas[0], 14, known=False)
         assert one.fisher[0] == pytest.approx(fisher[0])
         assert (log_fisher(fisher, m, 14 - m) < math.log(0.01)).mean() == pytest.approx(0.01, abs=0.0025)
+
+
+def test_numbers_are_listed_by_first_occurrence():
+    assert by_occurrence(np.array([3, 1, 3, 0, 1])).tolist() == [3, 1, 0]
+    assert by_occurrence(np.empty(0, dtype=np.int64)).tolist() == []

@@ -8,6 +8,8 @@ from typer.testing import CliRunner
 
 from photogram import InputError
 from photogram.cli import app
+from photogram.cli.console import print_remark
+from photogram.cli.job import Job
 from photogram.io.writing import check_outputs
 
 EXAMPLES = Path(str(files("photogram") / "examples"))
@@ -43,3 +45,20 @@ def test_another_name_of_an_input_is_known(tmp_path):
     check_outputs([tmp_path / "new"], [tmp_path / "a", tmp_path / "missing"])
     with pytest.raises(InputError, match="must not be written over the input"):
         check_outputs([tmp_path / "link"], [tmp_path / "a"])
+
+
+def test_results_are_computed_in_turn_and_written_together(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+
+    def later():
+        assert not first.exists()
+        return {second: b"2"}
+
+    with Job() as job:
+        assert job.write({first: b"1"}, later) == [first, second]
+    assert (first.read_bytes(), second.read_bytes()) == (b"1", b"2")
+
+
+def test_names_between_colons_are_no_emoji(capsys):
+    print_remark("a:smile:b")
+    assert "a:smile:b" in capsys.readouterr().err

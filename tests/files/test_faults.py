@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from faults import faulty
 
-from photogram.io.writing import OutputSet, write_whole
+from photogram.io.writing import MOST_PENDING, OutputSet, write_whole
 
 NAMES = ("a", "b", "made/new/c", "there/d")
 EXAMPLE = Path(str(files("photogram") / "examples" / "absolute_orientation"))
@@ -44,6 +44,16 @@ def state(directory):
 
 def leftovers(directory):
     return [path for path in directory.rglob("*") if path.name.startswith(".photogram")]
+
+
+def test_more_files_than_wait_for_the_disk_are_written_or_none(tmp_path, monkeypatch):
+    files = {tmp_path / str(number): b"new" for number in range(3 * MOST_PENDING)}
+    with faulty(monkeypatch, 5 * MOST_PENDING) as system, pytest.raises(OSError, match="space"):
+        write_whole(files)
+    assert system.failed in {"open", "write", "fsync"}
+    assert not [*tmp_path.iterdir()]
+    write_whole(files)
+    assert {path.read_bytes() for path in files} == {b"new"}
 
 
 @pytest.mark.parametrize("how", ["at once", "piece by piece"])

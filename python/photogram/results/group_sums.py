@@ -410,7 +410,7 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
         along = [[f"{name}, {axis}" for name in names] for axis in "xy"]
         parents |= {each: name for part in along for each, name in zip(part, names, strict=True)}
         images = [*along[0], *along[1]], np.stack([codes, codes + len(names)], axis=1)
-        points = ["control, plan", "control, height"], points[1] + [0, 0, 1]
+        points = ["control, plan", "control, height"], points[1] + np.array([0, 0, 1])
         parents |= dict.fromkeys(points[0], "control")
     photos = [*of.stations], np.broadcast_to(np.arange(len(of.stations)), of.photo_observed.shape)
     parents |= dict.fromkeys(of.stations, "stations")

@@ -381,8 +381,9 @@ def block_facts(block: Block, places: Floats) -> Facts:
     facts: Facts = {"widths": [], "readouts": []}
     of_images = cameras[block.image_photos]
     low, high = (np.full((max(len(block.cameras), 1), 2), end) for end in (math.inf, -math.inf))
-    np.minimum.at(low, of_images, block.image_xy)
-    np.maximum.at(high, of_images, block.image_xy)
+    for axis in (0, 1):  # Faster than both together
+        np.minimum.at(low[:, axis], of_images, block.image_xy[:, axis])
+        np.maximum.at(high[:, axis], of_images, block.image_xy[:, axis])
     for camera, (width, height) in enumerate((high - low).tolist()):
         facts["widths"].append(width if width > 0 else math.nan)
         digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0

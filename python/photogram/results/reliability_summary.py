@@ -108,16 +108,19 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
     suspects, tests = found.suspects, found.tests
     two, points = _points(suspects, tests)
     checked = tests.least > TESTABLE
-    pairs = [each for each in found.pairs_on(points, LIMIT) if checked[each[0]] and checked[each[1]]]
+    first, second, rho = np.reshape(found.pairs_on(points, LIMIT), (-1, 3)).T
+    first, second = first.astype(np.int64), second.astype(np.int64)
     # Rounding does not define an order: equal values remain in the order of their numbers.
-    pairs.sort(key=lambda pair: (-round(pair[2], 9), pair[:2]))
+    order = np.lexsort((second, first, -rho.round(9)))
+    order = order[checked[first[order]] & checked[second[order]]]
+    largest = [each[order[:PAIRS]].tolist() for each in (first, second, rho)]
     return ReliabilitySummary(
         **{name: getattr(found, name) for name in ("level", "power", "known", "standing", "downweighted")},
         kinds=_kinds(found),
         weakest=_weakest(found, heights=heights),
         two_rays=two,
-        pairs=tuple(found.named(*pair) for pair in pairs[:PAIRS]),
-        pairs_found=len(pairs),
+        pairs=tuple(map(found.named, *largest)),
+        pairs_found=len(order),
         points_looked_into=len(points),
         suspects=suspects,
         tests=tests,

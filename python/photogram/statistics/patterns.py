@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import bounds
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
@@ -125,10 +126,13 @@ def frame_pattern(
 
 def _cells(xy: Floats, count: int) -> Indices:
     """Return (m,) cells of observations, `count` per direction over their extent."""
-    low, high = xy.min(axis=0), xy.max(axis=0)
+    low, high = bounds(xy)
     width = np.where(high > low, high - low, 1.0)
-    places = np.minimum((count * (xy - low) / width).astype(np.int64), count - 1)
-    return np.asarray(places[:, 0] * count + places[:, 1])
+    across, up = (
+        np.minimum((count * (values - least) / whole).astype(np.int64), count - 1)
+        for values, least, whole in zip(xy.T, low, width, strict=True)
+    )
+    return np.asarray(across * count + up)
 
 
 def _summed(groups: Indices, values: Floats) -> Floats:

@@ -102,9 +102,8 @@ def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> l
     """Return the sampled trajectory of each row."""
     own = tables.rows("trajectory_positions")
     groups = _rows_of(own, places)
-    velocities = own.vectors(VELOCITY)
-    check_complete(own, VELOCITY, velocities)
-    times, values = _times(own, groups), np.column_stack([own.given(AXES), velocities])
+    times, values = _times(own, groups), np.column_stack([own.given(AXES), own.vectors(VELOCITY)])
+    check_complete(own, VELOCITY, values[:, 3:])
     positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
     attitudes = _turned(tables, "trajectory_attitudes", places)
     joined = [table.words(f"{of}interpolation", get_args(Interpolation)) for of in ("", "attitude_")]
