@@ -15,10 +15,10 @@ import photogram
 from photogram.arguments.types import Floats
 from photogram.cli import calibrate as calibrating
 from photogram.cli.calibrate import CornerBasisName
-from photogram.cli.calibration_options import ShapeName
 from photogram.formats import to_files
 from photogram.formats.targets.calibrations import adjusted_project
 from photogram.targets import read
+from photogram.targets.choices import Shape
 
 from .projects import Files
 
@@ -51,7 +51,7 @@ def board_run(place: Path, rng: Random, quiet: bool) -> list[str]:
         if rng.random() < 0.1:
             given["sync"] = "none"
     if rng.random() < 0.2:
-        given["shape"] = rng.choice(get_args(ShapeName))
+        given["shape"] = rng.choice(get_args(Shape))
     if rng.random() < 0.1:
         given["regularise"] = "mrcal"
     if rng.random() < 0.1:

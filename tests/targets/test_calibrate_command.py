@@ -110,9 +110,9 @@ def test_outliers_as_mrcal_marks_them(left):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--board", "9x6"], "requires --spacing"),
+        (["--board", "9x6"], "requires spacing"),
         (["--board", "9by6", "--spacing", "25"], "must be two numbers"),
-        (["--spacing", "25"], "requires --board"),
+        (["--spacing", "25"], "requires board"),
         (["--sd", "control=1"], "images=S"),
         (["--snoop", "--loss", "huber"], "must not be combined with --loss"),
         (["--model", "pinhole9"], "pinhole"),

@@ -67,7 +67,7 @@ def test_knots_are_read_again_as_they_were_written(lens, tmp_path):
     [
         (["--to", "opencv9"], 1, "opencv9"),
         (["--to", "opencv5", "--knots", "9"], 2, "two numbers"),
-        (["--to", "opencv5", "--distance", "near"], 2, "commas"),
+        (["--to", "opencv5", "--distance", "near"], 2, "a list of distances"),
         (["--to", "opencv5", "--distance", "1,inf"], 1, str(phrase("targets.infinite"))),
         (["--to", "opencv5", "--plots"], 2, "--out"),
     ],

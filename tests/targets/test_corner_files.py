@@ -10,7 +10,7 @@ from seen_boards import seen
 from golden_data import shared
 from message_codes import described, refusal
 from photogram import Camera, InputError
-from photogram.targets import Board, read
+from photogram.targets import Board, CalibrationOptions, read
 from photogram.targets.corner_files import holds_targets, read_table, read_vnl, sorted_files
 from photogram.targets.corner_views import Grouping, grouped
 from photogram.targets.mrcal_model import read_model
@@ -352,3 +352,12 @@ def test_a_calibration_needs_a_camera_for_each_name():
         given.replace(cameras=[Camera("brown", {"c": 100.0})] * 2)
     with refusal("error.at what=sensors message=error.empty"):
         given.replace(sensors=None)
+
+
+def test_a_chessboard_by_its_numbers_of_corners():
+    with pytest.raises(InputError) as raised:
+        CalibrationOptions(board=(10, 10))
+    assert raised.value.phrase.fields["what"] == "board"
+    path = shared("targets", "mrcal_corners.vnl")
+    found = read(path, CalibrationOptions(board=(10, 10), spacing=0.077), size=(6000, 3376), model="opencv4")
+    assert found.board == Board(columns=10, rows=10, spacing=0.077)

@@ -13,9 +13,8 @@ import typer
 from photogram.arguments.fields import option
 from photogram.cli.calibration_options import (
     NOT_GOOD_ENOUGH,
-    CalibrationInput,
-    PriorName,
     appraised,
+    read_calibration,
 )
 from photogram.cli.choices import LossName
 from photogram.cli.command_classes import misuse
@@ -34,6 +33,8 @@ from photogram.cli.job import (
 )
 from photogram.cli.options import Snooping, Threads, check_alone
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.targets.calibration_options import CalibrationOptions
+from photogram.targets.choices import Regularisation
 from photogram.targets.worth_options import WorthOptions, distances_of
 
 if TYPE_CHECKING:
@@ -78,17 +79,17 @@ class Planned:
             raise misuse("--field, --focal, --away", "requires", options="--plan")
         return self.plan_views is not None
 
-    def made(self, job: Job, seen: CalibrationInput, worth: WorthOptions, need: float | None) -> ViewPlan:
+    def made(self, job: Job, seen: CalibrationOptions, worth: WorthOptions, need: float | None) -> ViewPlan:
         """Return the plan of views of a board for a nominal camera."""
         from photogram.targets import nominal_camera, plan_views
 
         for name in job.given:
             if name not in TAKEN.split():
                 raise misuse(name, "conflict", options="--plan")
-        size = seen.size_of_pictures
+        size = seen.size
         if size is None or (self.view_field is None) == (self.focal is None):
             raise misuse("--plan", "requires", options="--size, and --field or --focal")
-        more = {} if (knots := seen.knots_of_lens) is None else {"knots": knots}
+        more = {} if (knots := seen.knots) is None else {"knots": knots}
         camera = nominal_camera(size, seen.model, field=self.view_field, focal=self.focal, **more)
         with job.status("planning views") as status:
             return plan_views(
@@ -96,7 +97,7 @@ class Planned:
                 _board(seen),
                 size,
                 worth.distances,
-                sd0=seen.sd0() or CORNER_SD,
+                sd0=seen.sd0 or CORNER_SD,
                 views=self.plan_views or 0,
                 need=need or 0.0,
                 away=self.away,
@@ -106,7 +107,7 @@ class Planned:
     def run(
         self,
         job: Job,
-        seen: CalibrationInput,
+        seen: CalibrationOptions,
         worth: WorthOptions,
         need: float | None,
         documents: Documents,
@@ -135,14 +136,17 @@ class Planned:
         )
 
 
-def _board(seen: CalibrationInput) -> Board:
+def _board(seen: CalibrationOptions) -> Board:
     """Return the board of `--board`."""
+    from photogram.targets import Board
     from photogram.targets.board_files import read_board
 
-    given = seen.given_board()
-    if given is None:
+    if isinstance(seen.board, tuple):
+        board = Board(columns=seen.board[0], rows=seen.board[1], spacing=seen.spacing or 0.0)
+    elif isinstance(seen.board, Path):
+        board = read_board(seen.board)
+    else:
         raise misuse("--plan", "requires", options="--board")
-    board = read_board(given) if isinstance(given, Path) else given
     changes = {"unit": seen.unit, "shape": seen.shape}
     return board.replace(**{name: value for name, value in changes.items() if value})
 
@@ -154,11 +158,11 @@ def calibrate(
     path: Input,
     out: Folder,
     documents: OfPrograms,
-    seen: CalibrationInput,
+    seen: CalibrationOptions,
     loss: LossName = "none",
     snoop: bool = False,
     snooping: Snooping,
-    outliers: PriorName | None = None,
+    outliers: Regularisation | None = None,
     to: list[str] | None = None,
     components: list[CornerBasisName] | None = None,
     max_bias_ratio: MaxBiasRatio = None,
@@ -184,7 +188,7 @@ def calibrate(
     documents.check_plots(job, out)
     job.reads_inside(path)
     with job.status("reading corners, finding first values") as status:
-        calibration = seen.read(path, None if status is None else status.update)
+        calibration = read_calibration(path, seen, None if status is None else status.update)
     for message in calibration.messages if not job.quiet else ():
         print_remark(str(message))
     how: dict[str, Any] = {"loss": None if loss == "none" else loss, "outliers": outliers}
@@ -194,7 +198,7 @@ def calibrate(
         worth,
         need,
         compare_with,
-        lambda other: seen.read(other).adjust(**how, threads=threads),
+        lambda other: read_calibration(other, seen).adjust(**how, threads=threads),
     )
     weights = _weights(job, found, components or [], threads)
     document = _document(found, weights)

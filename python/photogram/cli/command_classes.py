@@ -69,17 +69,18 @@ def option_of(field: Field[Any], kind: type) -> Parameter:
         hint |= None
     if name := field.metadata.get("name"):
         hint = Annotated[hint, typer.Option(name)]
-    low, high = (field.metadata.get(name, math.inf) for name in ("low", "high"))
+    low, high = (field.metadata.get(name, limit) for name, limit in (("low", -math.inf), ("high", math.inf)))
     if hint is int:
         limits = (("min", low), ("max", high))
         closed: dict[str, Any] = {name: limit for name, limit in limits if isinstance(limit, int)}
         hint = Annotated[int, typer.Option(**closed)] if closed else int
     parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=hint)
     parameter = declared(parameter, kind.__name__)
-    if hint in (float, float | None) and max(-low, high) < UNLIMITED:
-        sign = "<" if field.metadata["open"] else "<="
+    if hint in (float, float | None) and -low < UNLIMITED:
+        sign = "" if field.metadata["open"] else "="
+        interval = f"x>{sign}{low:g}" if high > UNLIMITED else f"{low:g}<{sign}x<{sign}{high:g}"
         _, info = get_args(parameter.annotation)
-        info.metavar = f"{info.metavar or '<float>'} [{low:g}{sign}x{sign}{high:g}]"
+        info.metavar = f"{info.metavar or '<float>'} [{interval}]"
     return parameter
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photogram.arguments.fields import option
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_document
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, with_job
-from photogram.cli.options import pair
 from photogram.lazy_dataclasses import dataclass
+from photogram.targets.calibration_options import pair
+from photogram.targets.worth_options import distances_of
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -27,27 +30,24 @@ class LensFit:
     """Options for the fit of a lens."""
 
     radius: Annotated[float, typer.Option(min=1.0, show_default=False)] = math.inf
-    distances: Annotated[str, typer.Option("--distance")] = "inf"
+    distances: Sequence[float] = option((), kind=str, parse=distances_of, name="--distance")
     intrinsics_only: bool = False
-    knot_grid: Annotated[str, typer.Option("--knots")] = "30x20"
+    knots: tuple[int, int] | None = option(None, kind=str, parse=pair)
+    size: tuple[int, int] | None = option(None, kind=str, parse=pair)
 
     def converted(self, camera: Camera, to: str, size: tuple[int, int]) -> Conversion:
         """Fit the lens."""
         from photogram.targets import convert_lens
+        from photogram.targets.lens_fit import KNOTS
 
-        try:
-            distances = [float(each) for each in self.distances.split(",")]
-        except ValueError:
-            form = "numbers separated by commas"
-            raise misuse("--distance", "form", form=form, value=self.distances) from None
         return convert_lens(
             camera,
             to,
             size,
             radius=self.radius,
-            distances=distances,
+            distances=self.distances or (math.inf,),
             intrinsics_only=self.intrinsics_only,
-            knots=pair(self.knot_grid, "--knots"),
+            knots=self.knots or KNOTS,
         )
 
 
@@ -58,7 +58,6 @@ def convert_lens(
     path: Annotated[Path, Reads.FILE],
     to: str,
     camera: str | None = None,
-    size: str | None = None,
     fit: LensFit,
     tolerance: float | None = None,
     out: OutputFolder = None,
@@ -73,7 +72,7 @@ def convert_lens(
     if plots and out is None:
         raise misuse("--plots", "requires", options="--out DIR")
     source, known = _camera(job, path, camera)
-    extent = known if size is None else pair(size, "--size")
+    extent = fit.size or known
     if extent is None:
         raise misuse("--size", "no-size", file=path)
     with job.status("fitting the lens"):

@@ -26,12 +26,3 @@ def check_alone(job: Job, option: str, others: Collection[str]) -> None:
     """Reject an option in combination with others; the message names them."""
     if typed := [name for name in job.given if name in others]:
         raise misuse(option, "conflict", options=typed)
-
-
-def pair(text: str, option: str) -> tuple[int, int]:
-    """Return two numbers with an x between them."""
-    first, x, second = text.lower().partition("x")
-    if not (x and first.strip().isdecimal() and second.strip().isdecimal()):
-        form = "two numbers such as 10x7" + (", or an existing file" if option == "--board" else "")
-        raise misuse(option, "form", form=form, value=text)
-    return int(first), int(second)

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from photogram.arguments.fields import option
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark
 from photogram.cli.job import InputFile, Job, Without
 from photogram.cli.projects import Additions
-from photogram.lazy_dataclasses import dataclass, fields
+from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -23,20 +24,31 @@ if TYPE_CHECKING:
     from photogram.words import Phrase
 
 
+def _standards(text: str) -> tuple[str, ...]:
+    return tuple(each.strip() for each in text.split(",") if each.strip())
+
+
+def _reasons(texts: Sequence[str]) -> dict[str, str]:
+    reasons = [text.partition("=") for text in texts]
+    if not all(equals and point.strip() and reason.strip() for point, equals, reason in reasons):
+        raise ValueError('POINT="reason"')
+    return {point.strip(): reason.strip() for point, _, reason in reasons}
+
+
 @dataclass(frozen=True)
 class StatementOptions:
     """Options of an accuracy statement; a project can define them, too."""
 
-    standard: str | None = None
+    standards: tuple[str, ...] | None = option(None, kind=str, parse=_standards, name="--standard")
     class_h: str | None = None
     class_v: str | None = None
     class_3d: str | None = None
     area: str | None = None
-    without: list[str] | None = None
+    without: Mapping[str, str] | None = option(None, kind=list[str], parse=_reasons)
     independent: Literal["yes", "same-base", "no"] | None = None
     language: Literal["en", "de"] | None = None
     text: InputFile = None
-    budget: list[str] | None = None
+    budgets: tuple[str, ...] | None = option(None, kind=list[str], parse=tuple, name="--budget")
     coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None
     project: str | None = None
     client: str | None = None
@@ -44,63 +56,46 @@ class StatementOptions:
     surveyor: str | None = None
     date: str | None = None
 
+    @property
+    def given(self) -> dict[str, Any]:
+        """Options of the user by name."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
     def check_alone(self) -> None:
         """Reject these options for a command without a statement."""
-        given = [each.name for each in fields(self) if getattr(self, each.name) is not None]
-        if given:
-            raise misuse(f"--{given[0].replace('_', '-')}", "requires", options="--statement")
+        for name in self.given:
+            raise misuse(f"--{name.replace('_', '-')}", "requires", options="--statement")
 
     def asked(self, project: Project | None, added: Additions, unit: str) -> dict[str, Any]:
-        """Return checked settings of a statement from options or project."""
+        """Return checked settings of a statement from options or project; lengths are in a unit."""
+        from photogram.formats.plain.keys import read_sentences
         from photogram.formats.supplements import deviations
-        from photogram.results.statement.request import Asked
+        from photogram.results.statement.request import Asked, length_of
 
         declared = {} if project is None else project.statement
-        own = self.options(unit)
-        asked = {**declared, **own, "classes": {**declared.get("classes", {}), **own.get("classes", {})}}
+        own = self.given
+        names = [name for name in own if name.startswith("class_")]
+        classes = {name.removeprefix("class_"): length_of(own.pop(name), unit) for name in names}
+        asked = {**declared, **own, "classes": {**declared.get("classes", {}), **classes}}
+        if self.area is not None:
+            asked["area"] = length_of(self.area, unit, area=True)
+        if self.text is not None:
+            asked["text"] = read_sentences(self.text)
         sd = deviations(added.sd or []).get("check")
         if sd is not None:
             asked["sd"] = sd
         Asked.checked(**asked)
         return asked
 
-    def options(self, unit: str) -> dict[str, Any]:
-        """Return arguments of :meth:`photogram.Result.statement` for a unit."""
-        from photogram.formats.plain.keys import read_sentences
-        from photogram.results.statement.request import length_of
-
-        sizes = {"h": self.class_h, "v": self.class_v, "3d": self.class_3d}
-        classes = {name: length_of(size, unit) for name, size in sizes.items() if size is not None}
-        found: dict[str, Any] = {
-            "standards": self.standard
-            and tuple(each.strip() for each in self.standard.split(",") if each.strip()),
-            "classes": classes or None,
-            "area": None if self.area is None else length_of(self.area, unit, area=True),
-            "without": dict(map(_reason, self.without)) if self.without else None,
-            "independent": self.independent,
-            "language": self.language,
-            "text": None if self.text is None else read_sentences(self.text),
-            "budgets": tuple(self.budget) if self.budget else None,
-            "coverage": self.coverage,
-        }
-        found |= {name: getattr(self, name) for name in ("project", "client", "firm", "surveyor", "date")}
-        return {name: value for name, value in found.items() if value is not None}
-
 
 OfHead = Annotated[
     StatementOptions,
     Without(
-        "standard", "class_3d", "area", "without", "independent", "language", "text", "budget", "coverage"
+        *("standards", "class_3d", "area", "without", "independent", "language", "text", "budgets"),
+        "coverage",
     ),
 ]
 """Options for the head of the page and the classes, for projects of other programs."""
-
-
-def _reason(given: str) -> tuple[str, str]:
-    point, equals, reason = given.partition("=")
-    if not (equals and point.strip() and reason.strip()):
-        raise misuse("--without", "form", form='POINT="reason"', value=given)
-    return point.strip(), reason.strip()
 
 
 def stated(

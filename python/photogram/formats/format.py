@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
@@ -107,7 +107,7 @@ class Wishes:
     """
 
     cameras: Path | None = None
-    pixel_origin: str | None = None
+    pixel_origin: Literal["corner", "center"] | None = None
     model: int | None = None
     angles: str | None = None
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)

@@ -36,6 +36,7 @@ __all__ = [
 ]
 
 Interpolation = Literal["linear", "hermite", "lagrange"]
+AttitudeInterpolation = Literal["linear", "lagrange"]
 PositionAxes = Literal["table", "orbit", "flight"]
 Angles = Literal["vector", "zxz"]
 BasisRow = tuple[str, int, list[float]]
@@ -145,7 +146,7 @@ class Table:
     attitudes: Floats
     velocities: Floats | None = None
     interpolation: Interpolation = "linear"
-    attitude_interpolation: Literal["linear", "lagrange"] = "linear"
+    attitude_interpolation: AttitudeInterpolation = "linear"
 
     def __post_init__(self) -> None:
         check_fields(self)

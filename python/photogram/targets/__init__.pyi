@@ -4,6 +4,7 @@ from .board import Board as Board
 from .calibration import Calibration as Calibration
 from .calibration import simulate_corners as simulate_corners
 from .calibration_difference import CameraDifference as CameraDifference
+from .calibration_options import CalibrationOptions as CalibrationOptions
 from .calibration_result import Calibrated as Calibrated
 from .conversion import Conversion as Conversion
 from .conversion import convert_lens as convert_lens

@@ -28,10 +28,10 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.methods import Brief, Rows
+from photogram.targets.choices import Shape
 from photogram.words import phrase
 
 BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric_circles", "points"]
-Shape = Literal["held", "bend", "points"]  # estimated: none, centre-line deflections, every point
 
 MAX_POINTS = 100_000
 MAX_LENGTH = 1e50  # in the unit of the board; fourth powers of lengths remain finite

@@ -16,10 +16,10 @@ from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.targets.board import Board
+from photogram.targets.choices import ViewBy
 from photogram.targets.corners import Corners
 from photogram.words import phrase
 
-ViewBy = Literal["name", "time"]
 Size = tuple[int, int]
 
 

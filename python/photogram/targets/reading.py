@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import get_args
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from photogram.arguments.arrays import one_of
+from photogram.arguments.fields import options_of
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.knots import KNOTTED
-from photogram.targets.board import Board, Shape
+from photogram.targets.board import Board
 from photogram.targets.board_files import picture_size, read_board
 from photogram.targets.calibration import Calibration
+from photogram.targets.calibration_options import CalibrationOptions
 from photogram.targets.corner_files import Form, files_at, is_picture, sorted_files
-from photogram.targets.corner_views import Grouping, Measured, ViewBy, grouped
+from photogram.targets.corner_views import Grouping, Measured, grouped
 from photogram.targets.corners import Corners
 from photogram.targets.detection import detected
 from photogram.targets.first_calibration import first_values
@@ -27,29 +27,18 @@ from photogram.targets.lens_fit import KNOTS
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz
 from photogram.targets.regularisation import with_knot_sd
-from photogram.targets.start import Regularisation, Synchronisation
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets.keywords import CalibrationKeywords
 
 
 def read(
     path: Path,
+    options: CalibrationOptions | None = None,
     *,
-    board: Board | Path | None = None,
-    shape: Shape | None = None,
-    unit: str | None = None,
-    model: str | None = None,
-    knots: tuple[int, int] | None = None,
-    knot_sd: tuple[float, float] | None = None,
-    cameras: Sequence[str] = (),
-    views: ViewBy = "name",
-    within: float = 0.005,
-    sync: Synchronisation = "known",
-    offsets: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-    pixel_origin: str = "center",
-    size: tuple[int, int] | None = None,
-    sd0: float | None = None,
-    regularise: Regularisation | None = None,
     progress: Callable[[str], None] | None = None,
+    **changes: Unpack[CalibrationKeywords],
 ) -> Calibration:
     """Read board corners or detect them in photographs, and compute initial values.
 
@@ -59,27 +48,12 @@ def read(
         A corner file (`.vnl` and `.cameramodel` of mrcal, tables, YAML, XML, JSON or `.npz` of OpenCV), or a
         folder. The folder contains such files, or photographs (requires `pip install 'photogram[targets]'`),
         and a board description.
-    board
-        The board, or a file that describes it. None: the board in the folder or in the corner file.
-    shape, unit
-        Override the values of the board.
-    model
-        Lens model as in :func:`first_values`.
-    knots, knot_sd
-        For a splined lens: number of knots along columns and rows (30, 20). Standard deviations of the zero
-        priors, radial and tangential, in units of the stereographic image (1, 0.1).
-    cameras, views, within, pixel_origin, size
-        Grouping of images and pixel convention: see docs/targets.md.
-    sync
-        `known`: images of one view are simultaneous. `none`: each has its own pose. `offset`: images have
-        times by camera clocks with unknown offsets.
-    offsets
-        Prior clock offsets by camera name: seconds, and their standard deviations. 0 is fixed, infinite is
-        free (the default, from 0).
-    sd0, regularise
-        As in :class:`Calibration`.
+    options
+        The options; None: the defaults.
     progress
         Called with the photograph that is searched for the board.
+    **changes
+        Fields of :class:`photogram.targets.CalibrationOptions` with other values.
 
     Raises
     ------
@@ -88,28 +62,29 @@ def read(
         invalid. The message names file and record.
     """
     path = path_of("path", path)
-    one_of("views", views, get_args(ViewBy))
-    one_of("pixel_origin", pixel_origin, ("corner", "center"))
+    chosen = options_of(CalibrationOptions, options, changes)
+    board, shape, sync, regularise = chosen.board, chosen.shape, chosen.sync, chosen.regularise
     models, boards, corners = sorted_files(path)
     described = [board] if isinstance(board, Path) else boards if board is None else []
+    if isinstance(board, tuple):
+        assert chosen.spacing is not None
+        board = Board(columns=board[0], rows=board[1], spacing=chosen.spacing)
     own = board if isinstance(board, Board) else _only_board(described)
-    size = size or next(map(picture_size, described), None)
-    if knots is not None and (models or model != KNOTTED):
+    size = chosen.size or next(map(picture_size, described), None)
+    if chosen.knots is not None and (models or chosen.model != KNOTTED):
         raise InputError(phrase("targets.knots-of", model=KNOTTED))
     if models:
         calibration = _of_models(path, models, corners, own)
-        prior = None if knot_sd and not regularise else regularise or calibration.regularise
-        cameras_of_model = with_knot_sd(calibration.cameras, knot_sd, prior)
-        if sync != "known" or offsets:
+        prior = None if chosen.knot_sd and not regularise else regularise or calibration.regularise
+        cameras_of_model = with_knot_sd(calibration.cameras, chosen.knot_sd, prior)
+        if sync != "known" or chosen.offsets:
             raise InputError(phrase("targets.model-has-views", name=models[0].name), file=path)
         messages = [*calibration.messages, *_not_used(calibration.corners)]
         board = calibration.board if shape is None else calibration.board.replace(shape=shape)
         return calibration.replace(
-            cameras=cameras_of_model, regularise=prior, sd0=sd0, messages=messages, board=board
+            cameras=cameras_of_model, regularise=prior, sd0=chosen.sd0, messages=messages, board=board
         )
-    how = Grouping(
-        cameras, views, within, sync == "none", size, "corner" if pixel_origin == "corner" else "center"
-    )
+    how = Grouping(chosen.cameras, chosen.views, chosen.within, sync == "none", size, chosen.pixel_origin)
     pictures = [] if corners else [each for each in files_at(path) if is_picture(each)]
     if pictures and own is None:
         raise InputError(phrase("targets.no-board"), file=path)
@@ -117,31 +92,31 @@ def read(
         found = detected(path, pictures, own, progress)
     else:
         found = _measured(path, corners, own)
-    assumed = [Message(phrase("targets.unit"), found.path)] if own is None and unit is None else []
+    assumed = [Message(phrase("targets.unit"), found.path)] if own is None and chosen.unit is None else []
     own = found.board if own is None else own
     if own is None:
         raise InputError(phrase("targets.no-board"), file=path)
     if shape is not None:
         own = own.replace(shape=shape)
-    if unit is not None:
-        own = own.replace(unit=unit)
+    if chosen.unit is not None:
+        own = own.replace(unit=chosen.unit)
     seen, remarks = grouped(found, how)
     with at_place(Place(path)):
-        start = first_values(own, seen, model, knots or KNOTS)
+        start = first_values(own, seen, chosen.model, chosen.knots or KNOTS)
     poses = start.picture_poses if sync == "none" else start.poses
     calibration = Calibration(
         board=own,
         corners=start.corners,
-        cameras=with_knot_sd(start.cameras, knot_sd, regularise),
+        cameras=with_knot_sd(start.cameras, chosen.knot_sd, regularise),
         poses=poses,
         sensors=None if sync == "none" else start.sensors,
         references=None if sync == "none" else start.references,
-        sd0=sd0,
+        sd0=chosen.sd0,
         sync=sync,
         regularise=regularise,
         messages=[*assumed, *found.messages, *remarks, *_not_used(seen), *start.remarks],
     )
-    return calibration.with_offsets(offsets) if offsets else calibration
+    return calibration.with_offsets(chosen.offsets) if chosen.offsets else calibration
 
 
 def _not_used(corners: Corners) -> list[Message]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Self, get_args
+from typing import Any, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,14 +22,12 @@ from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.show.methods import Brief, Rows, few
-from photogram.targets.board import Board, Shape
+from photogram.targets.board import Board
+from photogram.targets.choices import Regularisation, Shape, Synchronisation
 from photogram.targets.corners import Corners
 from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.vision import FLIP, photo_poses
 from photogram.words import phrase
-
-Synchronisation = Literal["known", "none", "offset"]
-Regularisation = Literal["mrcal"]
 
 BOARD = "board"  # name of the bend among the common unknowns
 CLOCK = "of "  # prefix of the camera in the name of its clock offset

@@ -16,7 +16,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
-from photogram.network.trajectories import Interpolation
+from photogram.network.trajectories import AttitudeInterpolation, Interpolation
 from photogram.words import Phrase, phrase
 
 RECORDS = 64  # Intervals for sampling polynomials; interpolation by eight neighbours is exact to rounding
@@ -143,7 +143,7 @@ class Turns:
 
     times: Floats
     matrices: Floats
-    interpolation: Interpolation | None = None
+    interpolation: AttitudeInterpolation | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,11 +24,11 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import LineSensor, Timed
 from photogram.network.projecting import projected
-from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
+from photogram.network.trajectories import AttitudeInterpolation, Basis, Table, Trajectory
 from photogram.words import phrase
 
 _DOWN = np.array([1.0, -1.0])  # Factors of x, y, between y up and y down
-_JOINED: dict[str, Interpolation] = {"csm": "lagrange", "isis": "linear"}
+_JOINED: dict[str, AttitudeInterpolation] = {"csm": "lagrange", "isis": "linear"}
 """Interpolation of records that do not specify it."""
 _STEPS = 5  # Iterations until a shift and the line of the shift agree: shifts are less than a line
 _EDGE = 1e-6  # Tolerance for rounding at the edge of a framelet, rows

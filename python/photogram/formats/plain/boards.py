@@ -12,8 +12,8 @@ from photogram.formats.plain.tables import Tables, made
 from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
-from photogram.targets.board import Board, BoardKind, Shape
-from photogram.targets.start import Regularisation
+from photogram.targets.board import Board, BoardKind
+from photogram.targets.choices import Regularisation, Shape
 from photogram.words import phrase
 
 ASSUMED = "sd of corners assumed"
