@@ -196,8 +196,7 @@ class Hypotheses:
     def common(self, rivals: float = -math.inf) -> list[int]:
         """Return rows of common errors that explain more than single values, the likeliest first."""
         odds, sets = self.log_odds, range(len(self.sets))
-        found = [k for k in sets if self.code[k] != "bending" and self.probability[k] < DETECTION[0]]
-        found = [k for k in found if not self._is_absurd(k)]
+        found = [k for k in sets if self.code[k] != "bending" and self._is_significant(k)]
         found.sort(key=lambda row: -odds[row])
         if not found or odds[found[0]] < max(self.single_odds, rivals):
             return []
@@ -205,12 +204,17 @@ class Hypotheses:
             return []
         return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
-    def _is_absurd(self, row: int) -> bool:
-        """Whether the error of a set has no plausible size and leaves a notable part unexplained."""
-        plausible = self.sets[row]["plausible"]
+    def _is_significant(self, row: int) -> bool:
+        """Whether the test of a set rejects, and its error has a plausible size or explains nearly all.
+
+        Errors without a plausible size are the terms of distortion, which have a level together.
+        """
+        plausible, level = self.sets[row]["plausible"], DETECTION[0]
         sizes = np.abs(self.estimate[row, : len(plausible)]) / plausible
-        least = (ABSURD_PART if (sizes > ABSURD).any() else 0.0) if plausible else UNKNOWN_PART
-        return bool(self.statistic[row] < least * self.excess)
+        least = ABSURD_PART if (sizes > ABSURD).any() else 0.0
+        if not plausible:
+            level, least = level / sum(not each["plausible"] for each in self.sets), UNKNOWN_PART
+        return bool(self.probability[row] < level and self.statistic[row] >= least * self.excess)
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first."""
