@@ -19,6 +19,12 @@ pub enum PoseNumbers {
     Vectors,
 }
 
+impl Default for PoseNumbers {
+    fn default() -> Self {
+        Self::Angles(RotationSense::GroundToPhoto)
+    }
+}
+
 /// Pose with the derivatives with respect to its unknowns.
 #[derive(Debug, Clone, Copy)]
 pub struct Orientation {

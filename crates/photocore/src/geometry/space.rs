@@ -4,9 +4,10 @@ use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::Ellipsoid;
 
 /// Coordinate system in which positions of photos and points are given and adjusted.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ObjectSpace {
     /// X, Y, Z.
+    #[default]
     Rectangular,
     /// Longitude, latitude (radians) and height; attitudes refer to the local vertical frame at each station.
     Geographic(Ellipsoid),

@@ -87,8 +87,8 @@ impl<'a> NetworkAdjustment<'a> {
                 &own
             }
         };
-        let mut watch: Option<Watch<'_>> = self.watch.take();
-        self.adjusted(threads, watch.as_deref_mut().unwrap_or(&mut adjustment::go_on))
+        let watch = self.watch.take();
+        self.adjusted(threads, watch.unwrap_or(&mut adjustment::go_on))
     }
 
     fn adjusted(&self, threads: &Threads, watch: Watch<'_>) -> Result<Solution, NetworkError> {

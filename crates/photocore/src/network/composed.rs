@@ -10,7 +10,7 @@ use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Mounted, Station, Stations};
 use crate::geometry::{Orientation, POSE, Vector3};
-use crate::normals::{Cofactors, GroupRows, Layout};
+use crate::normals::{Cofactors, Layout};
 use crate::sorting::sort_by;
 
 impl Bundle {
@@ -79,24 +79,6 @@ impl Bundle {
             composed.iter().for_each(|composed| photos[photo].orientation = composed.orientation);
         }
         Some(Mounted { own, composed })
-    }
-
-    /// Writes the equations of an image with corrections into `rows`. It is not inlined, so that plain images do not pay for it; `own` is
-    /// reused storage for the pose.
-    #[inline(never)]
-    pub(super) fn observe_bent(
-        &self,
-        stations: &Stations,
-        group: usize,
-        local: usize,
-        rows: &mut GroupRows<'_>,
-        own: &mut Composed,
-    ) {
-        if !self.passages.is_empty() {
-            return self.observe_passing(stations, group, local, rows, own);
-        }
-        let timed = self.compose_timed(stations, group, own);
-        stations.write(self.space, timed.then_some(&*own), &self.images[group], local, rows);
     }
 
     /// Returns the point of an image with corrections, in the axes of its photo.

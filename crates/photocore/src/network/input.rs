@@ -8,7 +8,7 @@ use super::mounts::{Mount, Trajectory};
 use super::observations::Observation;
 use super::passages::Passage;
 use crate::adjustment;
-use crate::geometry::{self, ObjectSpace, POSE, PoseNumbers, Refraction, RotationSense};
+use crate::geometry::{self, ObjectSpace, POSE, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
 /// Initial values and prior information of a photo.
@@ -105,8 +105,8 @@ pub struct Image {
     pub sd: [f64; 2],
 }
 
-/// A network of photos.
-#[derive(Debug, Clone)]
+/// A network of photos. Default: empty, in rectangular space, with poses in angles from ground to photo.
+#[derive(Debug, Clone, Default)]
 pub struct Network {
     /// Coordinates of positions and points.
     pub space: ObjectSpace,
@@ -140,26 +140,6 @@ impl Network {
     /// Returns an empty network: rectangular space, poses in angles from ground to photo, images free of refraction.
     pub fn new() -> Self {
         Self::default()
-    }
-}
-
-impl Default for Network {
-    fn default() -> Self {
-        Self {
-            space: ObjectSpace::Rectangular,
-            poses: PoseNumbers::Angles(RotationSense::GroundToPhoto),
-            refraction: None,
-            cameras: vec![],
-            photos: vec![],
-            points: vec![],
-            images: vec![],
-            observations: vec![],
-            commons: vec![],
-            mounts: vec![],
-            trajectories: vec![],
-            image_times: vec![],
-            passages: vec![],
-        }
     }
 }
 
@@ -227,8 +207,8 @@ impl Default for Screens {
     }
 }
 
-/// Options of the adjustment of a network.
-#[derive(Debug, Clone, Copy)]
+/// Options of the adjustment of a network. Default: strict least squares of constrained photos, points from the intersection of their rays.
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Options {
     /// Convergence criteria, method and results to compute.
     pub adjustment: adjustment::Options,
@@ -248,23 +228,6 @@ pub struct Options {
     pub minimum: Option<Minimum>,
     /// Screens that may exclude points and photos.
     pub screens: Screens,
-}
-
-impl Default for Options {
-    /// Strict least squares of constrained photos, points from the intersection of their rays.
-    fn default() -> Self {
-        Self {
-            adjustment: adjustment::Options::default(),
-            ordering: Ordering::Auto,
-            unit_variance: UnitVariance::default(),
-            start: Start::default(),
-            hold_unused: false,
-            memory: None,
-            reserved: 0,
-            minimum: None,
-            screens: Screens::default(),
-        }
-    }
 }
 
 /// Final state of an adjustment, sufficient to restore it.

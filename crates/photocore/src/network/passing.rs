@@ -212,8 +212,26 @@ impl Bundle {
         ImageColumns { slots, main, poses, camera, all }
     }
 
+    /// Writes the equations of an image with corrections into `rows`. It is not inlined, so that plain images do not pay for it; `own` is
+    /// reused storage for the pose.
+    #[inline(never)]
+    pub(super) fn observe_bent(
+        &self,
+        stations: &Stations,
+        group: usize,
+        local: usize,
+        rows: &mut GroupRows<'_>,
+        own: &mut Composed,
+    ) {
+        if !self.passages.is_empty() {
+            return self.observe_passing(stations, group, local, rows, own);
+        }
+        let timed = self.compose_timed(stations, group, own);
+        stations.write(self.space, timed.then_some(&*own), &self.images[group], local, rows);
+    }
+
     /// Writes the equations of an image with corrections, starting from the equations of pose, point and camera.
-    pub(super) fn observe_passing(
+    fn observe_passing(
         &self,
         stations: &Stations,
         group: usize,

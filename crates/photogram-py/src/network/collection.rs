@@ -3,9 +3,7 @@
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::camera::ModelFacts;
 use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers};
-use photocore::network::{
-    Camera, Network, NetworkError as Failure, Options, Photo, Screens, Start, UnitVariance,
-};
+use photocore::network::{Camera, Network, NetworkError as Failure, Options, Photo, Start};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -173,13 +171,11 @@ pub fn collection_network(
             threads: 0,
         },
         ordering: named_ordering(ordering)?,
-        unit_variance: UnitVariance::Constrained,
         start: Start::Given,
         hold_unused: true,
         memory,
         reserved: LOADED,
-        minimum: None,
-        screens: Screens::default(),
+        ..Options::default()
     };
     Ok(CollectionNetwork { network, options, unknowns })
 }

@@ -54,13 +54,33 @@ pub trait BackwardModel: Copy {
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]>;
 
     /// See [`CameraModel::radius`]; a function of the measured position.
-    fn radius(&self, measured: [f64; 2]) -> f64;
-
-    /// See [`CameraModel::fold`].
-    fn fold(&self) -> f64;
+    fn radius(&self, _measured: [f64; 2]) -> f64 {
+        0.0
+    }
 
     /// See [`CameraModel::radial_limit`].
-    fn radial_limit(&self) -> Option<RadialLimit>;
+    fn radial_limit(&self) -> Option<RadialLimit> {
+        None
+    }
+
+    /// Returns the central perspective with the same principal distance.
+    fn perspective(&self) -> Perspective {
+        Perspective { principal_distance: self.principal_distance() }
+    }
+
+    /// Returns g - c u/u3, the partials of c u/u3 - g, and the partials of g with respect to the measured position.
+    #[inline(always)]
+    fn compared(&self, u: &Vector3, measured: [f64; 2]) -> ([f64; 2], Image<Self::Parameters>, Matrix2) {
+        let Corrected { xy, by_measured, by_parameters } = self.correct(measured);
+        let Image { xy: ideal, by_u, by_parameters: by_distance } = self.perspective().linearize(u);
+        let mut own = by_parameters;
+        for row in 0..2 {
+            own[row].as_mut().iter_mut().for_each(|partial| *partial = -*partial);
+            own[row].as_mut()[0] = by_distance[row][0];
+        }
+        let residual = [xy[0] - ideal[0], xy[1] - ideal[1]];
+        (residual, Image { xy: ideal, by_u, by_parameters: own }, by_measured)
+    }
 }
 
 impl<T: BackwardModel> CameraModel for T {
@@ -120,10 +140,6 @@ impl<T: BackwardModel> CameraModel for T {
         BackwardModel::radius(self, measured)
     }
 
-    fn fold(&self) -> f64 {
-        BackwardModel::fold(self)
-    }
-
     fn correction(&self, measured: [f64; 2]) -> Option<[f64; 2]> {
         Some(self.correct(measured).xy)
     }
@@ -132,30 +148,3 @@ impl<T: BackwardModel> CameraModel for T {
         BackwardModel::radial_limit(self)
     }
 }
-
-/// Functions common to all backward cameras.
-trait Compared: BackwardModel {
-    fn perspective(&self) -> Perspective {
-        Perspective { principal_distance: self.principal_distance() }
-    }
-
-    /// Returns g - c u/u3, the partials of c u/u3 - g, and the partials of g with respect to the measured position.
-    #[inline(always)]
-    fn compared(
-        &self,
-        u: &Vector3,
-        measured: [f64; 2],
-    ) -> ([f64; 2], Image<<Self as BackwardModel>::Parameters>, Matrix2) {
-        let Corrected { xy, by_measured, by_parameters } = self.correct(measured);
-        let Image { xy: ideal, by_u, by_parameters: by_distance } = self.perspective().linearize(u);
-        let mut own = by_parameters;
-        for row in 0..2 {
-            own[row].as_mut().iter_mut().for_each(|partial| *partial = -*partial);
-            own[row].as_mut()[0] = by_distance[row][0];
-        }
-        let residual = [xy[0] - ideal[0], xy[1] - ideal[1]];
-        (residual, Image { xy: ideal, by_u, by_parameters: own }, by_measured)
-    }
-}
-
-impl<T: BackwardModel> Compared for T {}

@@ -93,10 +93,6 @@ impl CameraModel for Bal {
         (u.x / u.z).hypot(u.y / u.z)
     }
 
-    fn fold(&self) -> f64 {
-        self.radial_part().fold()
-    }
-
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.radial_part().limit()
     }

@@ -165,10 +165,6 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
         x.hypot(y)
     }
 
-    fn fold(&self) -> f64 {
-        self.terms.lens().radial.fold()
-    }
-
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.terms.lens().radial.limit()
     }

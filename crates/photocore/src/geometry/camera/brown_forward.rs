@@ -110,10 +110,6 @@ impl CameraModel for BrownForward {
         x.hypot(y)
     }
 
-    fn fold(&self) -> f64 {
-        self.terms.lens().radial.fold()
-    }
-
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.terms.lens().radial.limit()
     }

@@ -154,10 +154,6 @@ impl CameraModel for Cahvor {
         self.bent(u, &self.axis()[0]).square.max(0.0).sqrt()
     }
 
-    fn fold(&self) -> f64 {
-        self.radial().fold()
-    }
-
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.radial().limit()
     }

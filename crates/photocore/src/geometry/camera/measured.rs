@@ -84,10 +84,6 @@ impl<C: NamedCamera> CameraModel for Measured<C> {
         CameraModel::radius(&self.0, u, measured)
     }
 
-    fn fold(&self) -> f64 {
-        CameraModel::fold(&self.0)
-    }
-
     fn correction(&self, measured: [f64; 2]) -> Option<[f64; 2]> {
         self.0.correction(measured)
     }

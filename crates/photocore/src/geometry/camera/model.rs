@@ -98,7 +98,7 @@ pub trait CameraModel: Clone {
 
     /// Returns the radius at which the radial part folds back; infinite if it is one-to-one. It is the same for all images.
     fn fold(&self) -> f64 {
-        f64::INFINITY
+        self.radial_limit().map_or(f64::INFINITY, |limit| limit.radius)
     }
 
     /// Returns the corrected position of a measured one; None for a forward camera.

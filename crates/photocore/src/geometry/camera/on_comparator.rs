@@ -136,10 +136,6 @@ impl BackwardModel for OnComparator {
         (x - self.principal_point[0]).hypot(y - self.principal_point[1])
     }
 
-    fn fold(&self) -> f64 {
-        self.terms.lens().radial.fold()
-    }
-
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.terms.lens().radial.limit()
     }

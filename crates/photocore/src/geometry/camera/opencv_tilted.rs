@@ -137,10 +137,6 @@ impl CameraModel for OpencvTilted {
         self.lens.radius(u, measured)
     }
 
-    fn fold(&self) -> f64 {
-        self.lens.fold()
-    }
-
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.lens.radial_limit()
     }

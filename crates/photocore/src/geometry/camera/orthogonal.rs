@@ -1,7 +1,7 @@
 //! Corrections that are orthogonal over the image format: the 12 of Ebner (1976) and the 44 of Gruen (1978).
 
 use super::backward::{BackwardModel, Corrected};
-use super::inverse::{RadialLimit, way_back};
+use super::inverse::way_back;
 use super::model::{Unit, parameters};
 
 /// P_0 to P_4 of one coordinate, with derivatives.
@@ -191,18 +191,5 @@ where
             let Corrected { xy, by_measured, .. } = self.correct(measured);
             (xy, by_measured)
         })
-    }
-
-    /// The corrections contain no radial part.
-    fn radius(&self, _: [f64; 2]) -> f64 {
-        0.0
-    }
-
-    fn fold(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    fn radial_limit(&self) -> Option<RadialLimit> {
-        None
     }
 }

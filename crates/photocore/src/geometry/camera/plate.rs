@@ -120,10 +120,6 @@ impl CameraModel for Plate {
         x.hypot(y)
     }
 
-    fn fold(&self) -> f64 {
-        self.radial().fold()
-    }
-
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.radial().limit()
     }

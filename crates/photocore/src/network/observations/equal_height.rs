@@ -29,10 +29,6 @@ impl ObservationModel for EqualHeight {
         Touches::points(&self.points)
     }
 
-    fn rows(&self) -> usize {
-        1
-    }
-
     fn precision(&self) -> Precision {
         Precision::Deviations(vec![self.sd])
     }

@@ -97,6 +97,7 @@ pub struct Fiducial {
 
 impl ObservationModel for Fiducial {
     const NAME: &'static str = "fiducial";
+    const ROWS: usize = 2;
 
     /// Indices: mark, then film (see [`crate::network::Passage`]); values: reading, approximate position, numbers of the film.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -116,10 +117,6 @@ impl ObservationModel for Fiducial {
         let film = self.film.commons(self.film.cell(self.near));
         let all = film.into_iter().chain([(self.mark, CommonKind::Fiducial)]);
         Touches { commons: all.map(|(own, kind)| (own, Some(kind))).collect(), ..Touches::default() }
-    }
-
-    fn rows(&self) -> usize {
-        2
     }
 
     fn precision(&self) -> Precision {

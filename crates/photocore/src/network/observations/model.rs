@@ -11,6 +11,8 @@ use crate::network::commons::CommonKind;
 pub trait ObservationModel: Sized {
     /// Name of the type in reports.
     const NAME: &'static str;
+    /// Number of components, if it is the same for all observations of the type.
+    const ROWS: usize = 1;
 
     /// Returns an observation from indices and numbers; None if their counts are wrong.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self>;
@@ -24,7 +26,9 @@ pub trait ObservationModel: Sized {
     }
 
     /// Returns the number of components.
-    fn rows(&self) -> usize;
+    fn rows(&self) -> usize {
+        Self::ROWS
+    }
 
     /// Returns the number of parameters of a shared parameter of any type, by its index in [`Touches::commons`].
     fn components(&self, _common: usize) -> usize {

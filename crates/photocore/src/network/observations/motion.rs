@@ -25,6 +25,7 @@ pub struct Velocity {
 
 impl ObservationModel for Velocity {
     const NAME: &'static str = "velocity";
+    const ROWS: usize = 3;
 
     /// Values: velocity, l if fixed; shared parameter: lever arm.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -40,10 +41,6 @@ impl ObservationModel for Velocity {
 
     fn moves(&self) -> bool {
         true
-    }
-
-    fn rows(&self) -> usize {
-        3
     }
 
     fn precision(&self) -> Precision {
@@ -88,6 +85,7 @@ pub struct Rate {
 
 impl ObservationModel for Rate {
     const NAME: &'static str = "rate";
+    const ROWS: usize = 3;
 
     /// Values: rate, then B if fixed, row by row; shared parameters: boresight, bias.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -105,10 +103,6 @@ impl ObservationModel for Rate {
 
     fn moves(&self) -> bool {
         true
-    }
-
-    fn rows(&self) -> usize {
-        3
     }
 
     fn precision(&self) -> Precision {
@@ -158,6 +152,7 @@ pub struct Smoothness {
 
 impl ObservationModel for Smoothness {
     const NAME: &'static str = "smoothness";
+    const ROWS: usize = 3;
 
     /// Values: observed sum, then the factors.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -170,10 +165,6 @@ impl ObservationModel for Smoothness {
 
     fn touches(&self) -> Touches {
         Touches { commons: self.coefficients.iter().map(|&own| (own, None)).collect(), ..Touches::default() }
-    }
-
-    fn rows(&self) -> usize {
-        3
     }
 
     fn precision(&self) -> Precision {

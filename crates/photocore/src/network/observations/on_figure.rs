@@ -34,10 +34,6 @@ impl ObservationModel for OnPlane {
         Touches::points(&[self.point]).and(Some(self.plane), CommonKind::Plane)
     }
 
-    fn rows(&self) -> usize {
-        1
-    }
-
     fn precision(&self) -> Precision {
         Precision::Deviations(vec![self.sd])
     }
@@ -79,10 +75,6 @@ impl ObservationModel for OnLevel {
         Touches::points(&[self.point]).and(Some(self.level), CommonKind::Level)
     }
 
-    fn rows(&self) -> usize {
-        1
-    }
-
     fn precision(&self) -> Precision {
         Precision::Deviations(vec![self.sd])
     }
@@ -114,6 +106,7 @@ macro_rules! on_lines {
 
         impl ObservationModel for $name {
             const NAME: &'static str = $said;
+            const ROWS: usize = 2;
 
             fn from_numbers(of: &Named<'_>, _: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
                 let (&[point], &[Some(line)]) = (of.points, of.commons) else { return None };
@@ -122,10 +115,6 @@ macro_rules! on_lines {
 
             fn touches(&self) -> Touches {
                 Touches::points(&[self.point]).and(Some(self.line), CommonKind::$kind)
-            }
-
-            fn rows(&self) -> usize {
-                2
             }
 
             fn precision(&self) -> Precision {

@@ -51,6 +51,7 @@ impl Position {
 
 impl ObservationModel for Position {
     const NAME: &'static str = "position";
+    const ROWS: usize = 3;
 
     /// Values: coordinates, l if fixed, dt; shared parameters: lever arm, shift, drift.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -71,10 +72,6 @@ impl ObservationModel for Position {
             .and(self.lever_arm.common(), CommonKind::LeverArm)
             .and(self.shift, CommonKind::Shift)
             .and(self.drift, CommonKind::Drift)
-    }
-
-    fn rows(&self) -> usize {
-        3
     }
 
     fn precision(&self) -> Precision {
@@ -128,6 +125,7 @@ pub struct Attitude {
 
 impl ObservationModel for Attitude {
     const NAME: &'static str = "attitude";
+    const ROWS: usize = 3;
 
     /// Values: A_obs, then B if fixed, row by row; shared parameter: boresight.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -143,10 +141,6 @@ impl ObservationModel for Attitude {
 
     fn touches(&self) -> Touches {
         Touches::photos(&[self.photo]).and(self.boresight.common(), CommonKind::Boresight)
-    }
-
-    fn rows(&self) -> usize {
-        3
     }
 
     fn precision(&self) -> Precision {
@@ -198,6 +192,7 @@ pub struct Relative {
 
 impl ObservationModel for Relative {
     const NAME: &'static str = "relative";
+    const ROWS: usize = 6;
 
     /// Values: t_obs, then R_obs row by row.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -208,10 +203,6 @@ impl ObservationModel for Relative {
 
     fn touches(&self) -> Touches {
         Touches::photos(&self.photos)
-    }
-
-    fn rows(&self) -> usize {
-        6
     }
 
     fn precision(&self) -> Precision {
@@ -271,10 +262,6 @@ impl ObservationModel for Range {
     fn touches(&self) -> Touches {
         let photos = vec![self.photo];
         Touches { photos, ..Touches::points(&[self.point]) }.and(self.instrument, CommonKind::Instrument)
-    }
-
-    fn rows(&self) -> usize {
-        1
     }
 
     fn precision(&self) -> Precision {

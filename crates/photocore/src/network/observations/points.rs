@@ -22,6 +22,7 @@ pub struct Control {
 
 impl ObservationModel for Control {
     const NAME: &'static str = "control";
+    const ROWS: usize = 3;
 
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let &[point] = of.points else { return None };
@@ -30,10 +31,6 @@ impl ObservationModel for Control {
 
     fn touches(&self) -> Touches {
         Touches::points(&[self.point])
-    }
-
-    fn rows(&self) -> usize {
-        3
     }
 
     fn precision(&self) -> Precision {
@@ -77,10 +74,6 @@ impl ObservationModel for Distance {
 
     fn touches(&self) -> Touches {
         Touches::points(&self.points).and(self.instrument, CommonKind::Instrument)
-    }
-
-    fn rows(&self) -> usize {
-        1
     }
 
     fn precision(&self) -> Precision {

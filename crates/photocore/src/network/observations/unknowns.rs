@@ -92,10 +92,6 @@ impl ObservationModel for Base {
         Touches::default().and(Some(self.second), CommonKind::Sensor).and(self.first, CommonKind::Sensor)
     }
 
-    fn rows(&self) -> usize {
-        1
-    }
-
     fn precision(&self) -> Precision {
         Precision::Deviations(vec![self.sd])
     }
