@@ -37,8 +37,10 @@ def block_facts(block: Block, places: Floats) -> Facts:
     facts: Facts = {"widths": [], "readouts": []}
     of_images = cameras[block.image_photos]
     low, high = (np.full((max(len(block.cameras), 1), 2), end) for end in (math.inf, -math.inf))
-    np.minimum.at(low, of_images, block.image_xy)
-    np.maximum.at(high, of_images, block.image_xy)
+    for axis, values in enumerate(block.image_xy.T):
+        # Faster than both coordinates together, which numpy adds row by row.
+        np.minimum.at(low[:, axis], of_images, values)
+        np.maximum.at(high[:, axis], of_images, values)
     for camera, (width, height) in enumerate((high - low).tolist()):
         facts["widths"].append(width if width > 0 else math.nan)
         digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0
@@ -48,9 +50,11 @@ def block_facts(block: Block, places: Floats) -> Facts:
         return facts
     seconds = np.full(count, math.nan)
     row = {name: k for k, name in enumerate(block.photo_ids)}
-    for each in block.observations:
-        if each.KIND == "position" and each.photos and each.photos[0] in row:
-            seconds[row[each.photos[0]]] = each.time  # type: ignore[attr-defined]
+    for columns in block.observations.columns:
+        if columns.kind.KIND == "position":
+            for photos, time in zip(columns.table["photos"], columns.table["time"], strict=True):
+                if photos and photos[0] in row:
+                    seconds[row[photos[0]]] = time
     timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
     times = seconds if timed else np.arange(count, dtype=np.float64)
     velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)
