@@ -54,7 +54,7 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
         trial = result._trial()
         trial.stand()
         facts = {name: [] for name in ("times", "position_sets", "control_sets", "checks")}
-        rows, _ = trial.core.hypotheses(
+        tested = trial.core.hypotheses(
             **facts,
             velocities=np.array(GOLDEN["velocity"])[:photos],
             readouts=[[0.0, 1 / GOLDEN["camera"]["height"], -0.5]],
@@ -65,9 +65,8 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
             limit=6.0,
             effects=0,
         )
-        for place, row in enumerate(rows):
-            if row["rank"] and row["redundancy"] > 1e-6:
-                found[row["code"], place].append(row["probability"])
+        for place in np.flatnonzero((tested["rank"] > 0) & (tested["redundancy"] > 1e-6)).tolist():
+            found[tested["code"][place], place].append(tested["probability"][place])
     assert len({code for code, _ in found}) > 10
     assert (freedom < 50) is (photos < 10)
     least = min(kstest(values, "uniform").pvalue for values in found.values())

@@ -1426,7 +1426,7 @@ class NetworkTrial:
         detection: tuple[float, float],
         limit: float,
         effects: int,
-    ) -> tuple[list[dict[str, Any]], _Floats]:
+    ) -> dict[str, Any]:
         """Test errors that sets of observations have in common, and errors of groups except images.
 
         Parameters
@@ -1454,12 +1454,13 @@ class NetworkTrial:
 
         Returns
         -------
-        For each hypothesis a dictionary: `code`, `group` (type as in `suspects`, None for sets), `index`,
-        `component`, `parameters`, `observations`, `plausible` (sizes), `rank`, `statistic` T, `probability`,
-        `estimate`, its `cofactors`, `redundancy` r, `noncentrality`, `mdb`, `error`, `bias_to_noise`, and
-        `effect`: points beyond the limit, the same without points of the group, the largest change in
-        standard deviations, its point and coordinate, the largest change, and the changes of `checks`. Then
-        the (s, s) correlations of the scores of sets.
+        Columns of the h hypotheses, those of s sets first: `code`, `group` (type as in `suspects`), `index`,
+        `component` (-1 if a hypothesis has none), `observations`, `rank`, `statistic` T, `probability`,
+        `redundancy` r, `noncentrality`, `bias_to_noise`; `estimate`, `plausible` (sizes) and `mdb`: (h, k)
+        with NaN for missing values. `effects` by row: points beyond the limit, the same without points of
+        the group, the largest change in standard deviations, its point and coordinate, the largest change,
+        and the changes of `checks`. `sets`: dictionaries with `parameters`, `plausible`, `estimate`, its
+        `cofactors`, and `error`. `correlations`: (s, s), of the scores of sets.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:
@@ -1483,8 +1484,8 @@ class NetworkTrial:
         error of one standard deviation, in its unit and in its standard deviations (a-priori unit weight).
         """
 
-    def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return pairs of groups of one point whose tests are correlated by more than `limit`."""
+    def inseparable(self, points: list[int], limit: float) -> tuple[_Indices, _Indices, _Floats]:
+        """Return both groups of pairs on one point with correlated tests, and the correlation > `limit`."""
 
 @final
 class BlockState:

@@ -84,7 +84,7 @@ fn adjust_block(network: &Network, threads: &Threads) {
     network.adjustment(&options).from_state(&solution.state).on(threads).watched(&mut go).run().unwrap();
     let mut trial = solution.converged.expect("it converges").trial(network);
     trial.stand(threads, &mut go).unwrap();
-    trial.tests(threads).unwrap();
+    trial.tests(true, threads).unwrap();
     trial.effects(&[0, 5], threads).unwrap();
     trial.responses(&[0, 5], threads).unwrap();
     trial.most_moved(&[0, 5], threads).unwrap();

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -341,25 +340,20 @@ def hypotheses(
     """
     suspects, estimated = trial.suspects, None if known else standing
     images = (suspects.kinds == 0) & tests.active
-    adjusted = np.unique(suspects.points[images])
+    adjusted = np.flatnonzero(np.bincount(suspects.points[images]))
     drawn = sampled(adjusted, DRAWN)
     core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
     core.pop("check_sd", None)
     timed = core.pop("timed", False)
     checks = len(core["checks"])
     core["checks"] = [*core["checks"], *drawn.tolist()]
-    rows, _ = trial.core.hypotheses(
+    found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
-
-    def of(name: str) -> Any:
-        return np.array([-1 if row[name] is None else row[name] for row in rows])
-
-    width = max((len(row["estimate"]) for row in rows), default=1)
-    estimate, plausible, mdb = (_padded(rows, name, width) for name in ("estimate", "plausible", "mdb"))
-    kinds = [(row["code"], row["component"] is None) for row in rows]
+    statistic, estimate = found["statistic"], found["estimate"]
+    kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
     numbers = Counter(kinds)
-    count, statistic = np.array([numbers[kind] for kind in kinds]), of("statistic")
+    count = np.array([numbers[kind] for kind in kinds])
     k = np.maximum(np.count_nonzero(~np.isnan(estimate), axis=1), 1)
 
     def change(statistic: ArrayLike) -> Floats:
@@ -369,30 +363,26 @@ def hypotheses(
         omega, freedom = estimated
         return -freedom * np.log(np.maximum(1 - np.asarray(statistic) / omega, 1e-300))
 
-    odds = _log_odds(change(statistic), k, np.maximum(of("observations"), k + 1), count)
-    odds -= np.nansum(np.square(estimate / plausible), axis=1) / 2
+    odds = _log_odds(change(statistic), k, np.maximum(found["observations"], k + 1), count)
+    odds -= np.nansum(np.square(estimate / found["plausible"]), axis=1) / 2
     effects = {}
-    for row, own in enumerate(rows):
-        if (effect := own.pop("effect")) is not None:
-            of_checks, of_points = np.split(np.reshape(effect[-1], (-1, 3)), [checks])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratios = np.zeros(0) if check_sd is None else np.abs(of_checks) / check_sd
-            detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
-            effects[row] = Effect(detected, of_points, *effect[:-1])
+    for row, (*sizes, changes) in found["effects"].items():
+        of_checks, of_points = np.split(changes, [checks])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = np.zeros(0) if check_sd is None else np.abs(of_checks) / check_sd
+        detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
+        effects[row] = Effect(detected, of_points, *sizes)
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
-    kind, index = of("group"), of("index")
-    sets = int(np.count_nonzero(kind < 0))
+    sets = len(found["sets"])
+    same = ("index", "component", "probability", "estimate", "redundancy", "mdb", "bias_to_noise", "sets")
     return Hypotheses(
-        code=np.array([code for code, _ in kinds], dtype=np.str_),
-        index=index,
-        group=_groups(suspects, kind, index),
-        **{name: of(name) for name in ("component", "rank", "probability", "redundancy", "bias_to_noise")},
+        **{name: found[name] for name in same},
+        code=np.array(found["code"], dtype=np.str_),
+        group=_groups(suspects, found["group"], found["index"]),
+        rank=found["rank"].astype(np.int64),
         statistic=statistic,
         log_odds=odds,
-        estimate=estimate,
-        mdb=mdb,
-        sets=rows[:sets],
         effects=effects,
         drawn=drawn,
         limit=limit,
@@ -403,14 +393,6 @@ def hypotheses(
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         single_odds=float(np.nanmax(odds[sets:], initial=of_images)),
     )
-
-
-def _padded(rows: Sequence[Mapping[str, Any]], name: str, width: int) -> Floats:
-    """Return lists of numbers as rows of an array, with NaN behind them."""
-    values = [row[name] or () for row in rows]
-    found = np.full((len(rows), width), np.nan)
-    found[np.arange(width) < np.array([*map(len, values)], dtype=int)[:, np.newaxis]] = [*chain(*values)]
-    return found
 
 
 def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:

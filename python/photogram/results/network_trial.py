@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,7 +30,7 @@ IMAGE, CONTROL, POSITION, ATTITUDE, OBSERVATION = range(5)
 
 MANY, MOST_OF_PHOTO = 4, 0.25  # Smallest number, and share, of removed images of a photo that is doubtful
 
-_TESTS = ("active", "rank", "statistic", "least", "residual", "error", "error_sd")
+_TESTS = ("active", "rank", "statistic", "least", "residual", "redundancy", "error", "error_sd")
 
 T = TypeVar("T")
 
@@ -74,8 +75,8 @@ class Tests:
 
     def testable(self, row_starts: Indices) -> Bools:
         """Return (G,) groups with a direction of notable errors in own residuals."""
-        largest = np.maximum.reduceat(np.nan_to_num(self.redundancy), row_starts[:-1])
-        return np.asarray(self.active & (self.rank > 0) & (largest > TESTABLE))
+        checked = np.logical_or.reduceat(self.redundancy > TESTABLE, row_starts[:-1])
+        return np.asarray(self.active & (self.rank > 0) & checked)
 
 
 class LostSupportError(Exception):
@@ -103,11 +104,6 @@ class NetworkTrial:
         self.deviations: Floats = core.suspects.deviations
         self.supported = supported  # (P,) whether the pose of a photo is determined without images
         self.control = control  # Parts that may be removed alone: `whole`, `plan and height`, `components`
-        starts = suspects.row_starts
-        sizes = np.diff(starts)
-        self._block_starts = np.concatenate([[0], np.cumsum(sizes**2)])
-        row = np.arange(starts[-1]) - np.repeat(starts[:-1], sizes)
-        self._diagonal = np.repeat(self._block_starts[:-1], sizes) + row * (np.repeat(sizes, sizes) + 1)
         self._tests: dict[str, np.ndarray] = {}
         self.out: Out | None = None  # Observations that a robust loss removes
 
@@ -156,9 +152,11 @@ class NetworkTrial:
 
     def tests(self) -> Tests:
         found = self._tests = self.core.tests()
-        inside = ~np.isnan(found["residual"])
-        redundancy = np.where(inside, found["cofactors"][self._diagonal], math.nan)
-        return Tests(**{name: found[name] for name in _TESTS}, redundancy=redundancy)
+        return Tests(**{name: found[name] for name in _TESTS})
+
+    @cached_property
+    def _block_starts(self) -> Indices:
+        return np.concatenate([[0], np.cumsum(np.diff(self.suspects.row_starts) ** 2)])
 
     def own_block(self, group: int) -> Floats:
         """Return R of a group."""
@@ -187,11 +185,15 @@ class NamedSuspects(ABC):
         components: tuple[Sequence[str], Sequence[str], Sequence[str]],
         lengths: Sequence[str],
     ) -> None:
-        kinds, subjects = (values.astype(np.int64) for values in core.subjects)
-        image, station = kinds == IMAGE, (kinds == POSITION) | (kinds == ATTITUDE)
-        points, photos = (np.where(own, subjects, -1) for own in (kinds == CONTROL, station))
+        kinds, subjects = (values.astype(np.int64, copy=False) for values in core.subjects)
+        points, photos = np.full(len(kinds), -1), np.full(len(kinds), -1)
+        # Groups are in the order of these types.
+        starts = np.searchsorted(kinds, (IMAGE, CONTROL, POSITION, OBSERVATION)).tolist()
+        image, control, station = map(slice, starts, starts[1:])
         points[image] = given.image_points[subjects[image]]
         photos[image] = given.image_photos[subjects[image]]
+        points[control] = subjects[control]
+        photos[station] = subjects[station]
         self.row_starts: Indices = core.row_starts  # (G + 1,) first row of each group
         self.kinds, self.kind_names = kinds, KINDS  # (G,) types by their numbers: `image`, `control`, ...
         self.subjects = subjects  # (G,) number of the image, point, observation, ... of a group
@@ -393,9 +395,11 @@ def block_facts(block: Block, places: Floats) -> Facts:
         return facts
     seconds = np.full(count, math.nan)
     row = {name: k for k, name in enumerate(block.photo_ids)}
-    for each in block.observations:
-        if each.KIND == "position" and each.photos and each.photos[0] in row:
-            seconds[row[each.photos[0]]] = each.time  # type: ignore[attr-defined]
+    for columns in block.observations.columns:
+        if columns.kind.KIND == "position":
+            for photos, time in zip(columns.table["photos"], columns.table["time"], strict=True):
+                if photos and photos[0] in row:
+                    seconds[row[photos[0]]] = time
     timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
     times = seconds if timed else np.arange(count, dtype=np.float64)
     velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)

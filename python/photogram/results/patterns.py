@@ -80,7 +80,7 @@ def patterns(
     given, (axis, _) = result.given, result._terms.image_axes
     # Tests by photo use measured coordinates: samples and lines for scanners.
     image_photos, xy, measured = given.image_photos, focal_images(given), given.image_xy
-    scale = factor * given.image_sd[used].mean(axis=0) * axis.factor
+    scale = factor * given.image_sd[used].T.copy().mean(axis=1) * axis.factor
     found: list[Systematic | None] = [
         _of_camera(each, image_photos[used], xy[used], residuals, redundancy, scale, axis.small)
         for each in cameras
@@ -165,7 +165,8 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
     redundancy, w = result.redundancy[used], result.standardized[used]
     single = result.point_rays[result.image_points[used]] <= 2
     seen = redundancy > VISIBLE
-    seen[single] &= redundancy[single] >= redundancy[single].max(axis=1, keepdims=True)
+    # Numpy is slow along short axes.
+    seen &= ~single[:, np.newaxis] | (redundancy >= np.maximum(*redundancy.T)[:, np.newaxis])
     found = fits.normality(w[seen])
     if found is None:
         return None

@@ -177,11 +177,11 @@ class Reliability:
         In the unit of the object space; only `heights` if plan coordinates are angles. NaN without a point.
         """
         effects = self.trial.core.effects(groups)[:, :3]
-        starts, errors = self.suspects.row_starts, self.detectable / self.sd
         found, first = [], 0
         for group in groups:
-            rows = np.arange(starts[group], starts[group + 1])
-            own = effects[first : first + len(rows)] * errors[rows, np.newaxis]
+            rows = self.suspects.rows(group)
+            errors = minimal_detectable_error(1.0, _shown(self.redundancy[rows]), self._delta)
+            own = effects[first : first + len(rows)] * errors[:, np.newaxis]
             first += len(rows)
             moved = np.abs(own[:, 2]) if heights else np.sqrt((own**2).sum(axis=1))
             moved = moved[np.isfinite(moved)]
@@ -244,10 +244,11 @@ class Reliability:
     def inseparable(self, limit: float = 0.9) -> list[Inseparable]:
         """Return pairs of inseparable observations on one point: images, and its control."""
         points = np.unique(self.suspects.points[self.suspects.points >= 0]).tolist()
-        return [self.named(*pair) for pair in self.pairs_on(points, limit)]
+        pairs = (each.tolist() for each in self.pairs_on(points, limit))
+        return [self.named(*pair) for pair in zip(*pairs, strict=True)]
 
-    def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return inseparable pairs on points by group numbers, with correlation: thousands."""
+    def pairs_on(self, points: list[int], limit: float) -> tuple[Indices, Indices, Floats]:
+        """Return both groups of inseparable pairs on points, and their correlation: thousands."""
         return self.trial.core.inseparable(points, limit)
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:

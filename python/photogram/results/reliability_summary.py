@@ -7,7 +7,7 @@ and selected inverse at the adjusted values.
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +37,6 @@ class ReliabilitySummary:
     level: float  # of the tests
     power: float
     known: bool
-    kinds: Quantities  # number, redundancy and checks of groups by type of observation
     weakest: Quantities  # of each type the groups with the largest undetected effect
     two_rays: int  # points on two photos: the wrong image cannot be identified
     # Inseparable pairs of observations on other points, the most correlated first
@@ -55,6 +54,31 @@ class ReliabilitySummary:
     def testable(self) -> Bools:
         """(G,) groups with a direction of sufficient redundancy."""
         return self.tests.testable(self.suspects.row_starts)
+
+    @cached_property
+    def kinds(self) -> Quantities:
+        """Number, redundancy and checks of groups by type of observation."""
+        suspects, active, redundancy = self.suspects, self.tests.active, self.tests.redundancy
+        sizes = np.diff(suspects.row_starts)
+        of_rows, known = np.repeat(suspects.kinds, sizes), ~np.isnan(redundancy)
+        untestable = active & ~(self.tests.least > TESTABLE)
+        invisible = active & (self.tests.rank < sizes) & ~untestable
+        count = partial(np.bincount, minlength=len(suspects.kind_names))
+        there = np.flatnonzero(count(suspects.kinds[active]))
+        components, sums = (count(of_rows[known], own)[there] for own in (None, redundancy[known]))
+        groups, unchecked, one_sided = (
+            count(suspects.kinds[own])[there] for own in (active, untestable, invisible)
+        )
+        names = [suspects.kind_names[k] for k in there.tolist()]
+        return [
+            Quantity(names, kind="name", member="kind", head="Kind"),
+            Quantity(groups, member="groups", head="Groups", decimals=0),
+            Quantity(components, member="components", head="Components", decimals=0),
+            Quantity(sums, member="redundancy", head="Redundancy", decimals=3),
+            Quantity(sums / np.maximum(components, 1), head="Mean", decimals=3),
+            Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
+            Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
+        ]
 
     def kinds_table(self) -> Table:
         note = about("reliability-kinds")
@@ -108,19 +132,17 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
     suspects, tests = found.suspects, found.tests
     two, points = _points(suspects, tests)
     checked = tests.least > TESTABLE
-    first, second, rho = np.reshape(found.pairs_on(points, LIMIT), (-1, 3)).T
-    first, second = first.astype(np.int64), second.astype(np.int64)
+    pairs = found.pairs_on(points, LIMIT)
+    first, second, rho = (each[checked[pairs[0]] & checked[pairs[1]]] for each in pairs)
     # Rounding does not define an order: equal values remain in the order of their numbers.
-    order = np.lexsort((second, first, -rho.round(9)))
-    order = order[checked[first[order]] & checked[second[order]]]
-    largest = [each[order[:PAIRS]].tolist() for each in (first, second, rho)]
+    order = np.lexsort((second, first, -np.round(rho, 9)))[:PAIRS]
+    named = zip(*(each[order].tolist() for each in (first, second, rho)), strict=True)
     return ReliabilitySummary(
         **{name: getattr(found, name) for name in ("level", "power", "known", "standing", "downweighted")},
-        kinds=_kinds(found),
         weakest=_weakest(found, heights=heights),
         two_rays=two,
-        pairs=tuple(map(found.named, *largest)),
-        pairs_found=len(order),
+        pairs=tuple(found.named(*pair) for pair in named),
+        pairs_found=len(rho),
         points_looked_into=len(points),
         suspects=suspects,
         tests=tests,
@@ -128,34 +150,14 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
     )
 
 
-def _kinds(found: Reliability) -> list[Quantity]:
-    suspects, active, redundancy = found.suspects, found.tests.active, found.redundancy
-    of_rows, known = np.repeat(suspects.kinds, np.diff(suspects.row_starts)), ~np.isnan(redundancy)
-    untestable, count = active & found.untestable, partial(np.bincount, minlength=len(suspects.kind_names))
-    invisible = active & found.invisible & ~untestable
-    there = np.flatnonzero(count(suspects.kinds[active]))
-    components, sums = (count(of_rows[known], own)[there] for own in (None, redundancy[known]))
-    groups, unchecked, one_sided = (
-        count(suspects.kinds[own])[there] for own in (active, untestable, invisible)
-    )
-    return [
-        Quantity([suspects.kind_names[k] for k in there.tolist()], kind="name", member="kind", head="Kind"),
-        Quantity(groups, member="groups", head="Groups", decimals=0),
-        Quantity(components, member="components", head="Components", decimals=0),
-        Quantity(sums, member="redundancy", head="Redundancy", decimals=3),
-        Quantity(sums / np.maximum(components, 1), head="Mean", decimals=3),
-        Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
-        Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
-    ]
-
-
 def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
     suspects, tests = found.suspects, found.tests
-    external, detectable = found.group_external, found.group_detectable
-    checked = tests.active & (tests.least > TESTABLE)
+    external = found.group_external
+    checked = np.flatnonzero(tests.active & (tests.least > TESTABLE) & np.isfinite(external))
+    kinds = suspects.kinds[checked]
     groups: list[int] = []
-    for kind in range(len(suspects.kind_names)):
-        own = np.flatnonzero(checked & (suspects.kinds == kind) & np.isfinite(external))
+    for kind in np.flatnonzero(np.bincount(kinds)).tolist():
+        own = checked[kinds == kind]
         if len(own) > LISTED:
             # Only candidates for the first rows are sorted.
             least = np.partition(external[own], -LISTED)[-LISTED]
@@ -166,7 +168,7 @@ def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
         column("kind", [suspects.kind(group) for group in groups], kind="name"),
         column("name", [str(suspects.name(group)) for group in groups], "Group", kind="name"),
         column("redundancy", tests.least[groups], "Least redundancy", decimals=3),
-        column("detectable_sd", detectable[groups], "Detectable error, sd", decimals=2),
+        column("detectable_sd", found.group_detectable[groups], "Detectable error, sd", decimals=2),
         column("external_sd", external[groups], "Moves up to, sd", decimals=2),
         column("own_point", own_points, "Own point", decimals=4),
     ]

@@ -9,11 +9,11 @@ So tests with the variance sum r_i are conservative.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import bounds
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
@@ -126,13 +126,12 @@ def frame_pattern(
 
 def _cells(xy: Floats, count: int) -> Indices:
     """Return (m,) cells of observations, `count` per direction over their extent."""
-    low, high = bounds(xy)
-    width = np.where(high > low, high - low, 1.0)
-    across, up = (
-        np.minimum((count * (values - least) / whole).astype(np.int64), count - 1)
-        for values, least, whole in zip(xy.T, low, width, strict=True)
-    )
-    return np.asarray(across * count + up)
+    cells = np.zeros(len(xy), dtype=np.int64)
+    for values in xy.T:  # Numpy is slow along short axes.
+        low, high = values.min(), values.max()
+        width = high - low if high > low else 1.0
+        cells = cells * count + np.minimum((count * (values - low) / width).astype(np.int64), count - 1)
+    return cells
 
 
 def _summed(groups: Indices, values: Floats) -> Floats:
@@ -151,26 +150,37 @@ def group_patterns(
     scaled, it is the score test c' C^-1 c, c = sum b ~v, C = sum r b b', in both axes. It is chi-square with
     six degrees of freedom.
     """
-    numbers = np.bincount(groups, minlength=count)
-    means = np.stack([np.bincount(groups, weights=each, minlength=count) for each in xy.T], axis=1)
-    centred = xy - (means / np.maximum(numbers, 1)[:, np.newaxis])[groups]
-    spread = np.sqrt((centred**2).mean()) if len(xy) else 1.0
-    design = np.asfortranarray(np.column_stack([np.ones(len(xy)), centred / (spread or 1.0)]))
+    sums = _summing(groups, count)
+    numbers = np.maximum(np.bincount(groups, minlength=count), 1)
+    x, y = (each - (sums(each) / numbers)[groups] for each in xy.T)
+    spread = math.sqrt((x * x + y * y).mean() / 2) if len(xy) else 1.0
+    x, y = x / (spread or 1.0), y / (spread or 1.0)
     statistics, enough = np.zeros(count), np.ones(count, dtype=bool)
-    for axis in (0, 1):
-        score: Floats = np.stack(
-            [np.bincount(groups, weights=each * residuals[:, axis], minlength=count) for each in design.T],
-            axis=1,
-        )
+    for v, r in zip(residuals.T.copy(), redundancy.T.copy(), strict=True):
+        score: Floats = np.stack([sums(each) for each in (v, x * v, y * v)], axis=1)
         matrices = np.empty((count, 3, 3))
-        for i, j in _UPPER:
-            weights = design[:, i] * design[:, j] * redundancy[:, axis]
-            matrices[:, i, j] = matrices[:, j, i] = np.bincount(groups, weights=weights, minlength=count)
+        of_x, of_y = x * r, y * r
+        for (i, j), weights in zip(_UPPER, (r, of_x, of_y, x * of_x, y * of_x, y * of_y), strict=True):
+            matrices[:, i, j] = matrices[:, j, i] = sums(weights)
         enough &= matrices[:, 0, 0] >= FULL
         matrices[~enough] = np.eye(3)
         statistics += _quadratic(matrices, score)
     statistics[~enough] = math.nan
     return statistics, np.array([_photocore.chi_square(each, 6.0) for each in statistics.tolist()])
+
+
+def _summing(groups: Indices, count: int) -> Callable[[Floats], Floats]:
+    """Return a function that sums values by group; consecutive values of sorted groups are added faster."""
+    if not len(groups) or (groups[1:] < groups[:-1]).any():
+        return lambda values: np.asarray(np.bincount(groups, values, count), dtype=np.float64)
+    starts = np.flatnonzero(np.diff(groups, prepend=-1))
+
+    def sums(values: Floats) -> Floats:
+        found = np.zeros(count)
+        found[groups[starts]] = np.add.reduceat(values, starts)
+        return found
+
+    return sums
 
 
 def _quadratic(matrices: Floats, vectors: Floats) -> Floats:

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::equations::ObservationEquations;
+use super::equations::{ObservationEquations, Row};
 use super::group_test::Few;
 use super::linearized::Linearized;
 use super::problem::AnyProblem;
@@ -25,8 +25,14 @@ pub struct Equation<'a> {
     pub of: EquationOf,
     /// Standard deviation of the observation; 1 if its components are weighted together.
     pub sd: f64,
+    row: &'a Row<'a>,
+}
+
+impl Equation<'_> {
     /// Unknowns, fixed ones among them, with their coefficients.
-    pub coefficients: &'a [(usize, f64)],
+    pub fn coefficients(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.row.taken()
+    }
 }
 
 /// The observation of an equation.
@@ -100,8 +106,7 @@ struct LocalRows {
     ends: Vec<(usize, usize)>,
     others: Vec<(usize, f64)>,
     partials: Vec<(usize, f64)>,
-    /// Room for the coefficients and the partials of one equation.
-    coefficients: Vec<(usize, f64)>,
+    /// Room for the partials of one equation.
     scratch: Vec<(usize, f64)>,
     shared: Shared,
 }
@@ -124,21 +129,21 @@ impl LocalRows {
         self.partials.clear();
     }
 
-    /// Takes over the equation whose coefficients are in the buffer; `first` is the first unknown of the block.
-    fn push(&mut self, to: &Extended<'_>, (of, sd, constant): (EquationOf, f64, f64), first: usize) {
-        let Self { width, constants, own, ends, others, partials, coefficients, scratch, shared } = self;
+    /// Adds an equation; `first` is the first unknown of the block.
+    fn push(&mut self, to: &Extended<'_>, (of, sd, row): (EquationOf, f64, &Row<'_>), first: usize) {
+        let Self { width, constants, own, ends, others, partials, scratch, shared } = self;
         scratch.clear();
-        to.parameters.partials(&Equation { of, sd, coefficients }, shared, scratch);
+        to.parameters.partials(&Equation { of, sd, row }, shared, scratch);
         partials.extend(scratch.iter().filter(|partial| partial.1 != 0.0));
         let start = own.len();
         own.resize(start + *width, 0.0);
-        for &(unknown, value) in coefficients.iter().filter(|own| !to.fixed[own.0]) {
+        for (unknown, value) in row.taken().filter(|own| !to.fixed[own.0]) {
             match unknown.checked_sub(first) {
                 Some(k) if k < *width => own[start + k] = value,
                 _ => others.push((unknown, value)),
             }
         }
-        constants.push(constant);
+        constants.push(row.constant);
         ends.push((others.len(), partials.len()));
     }
 
@@ -163,22 +168,34 @@ impl Extended<'_> {
         let (first, width, size) = (range.start, range.len(), layout.rows());
         rows.clear(width);
         self.equations.each_row(buffers, local, |row| {
-            rows.coefficients.clear();
-            rows.coefficients.extend(row.taken());
             let of = EquationOf::Group { group: row.number / size, local, row: row.number % size };
-            rows.push(self, (of, self.equations.deviation(row.number), row.constant), first);
+            rows.push(self, (of, self.equations.deviation(row.number), row), first);
         });
+        self.each_prior(range, |unknown, row| {
+            rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], row), first);
+        });
+    }
+
+    /// Calls `take` with each weighted unknown of a range, as an equation.
+    fn each_prior(&self, range: Range<usize>, mut take: impl FnMut(usize, &Row<'_>)) {
         self.terms.rows_within(range, |unknown, row, constant| {
-            rows.coefficients.clear();
-            rows.coefficients.extend(row);
-            rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], constant), first);
+            let (columns, coefficients): (Vec<usize>, Vec<f64>) = row.unzip();
+            take(unknown, &Row::single(constant, &columns, &coefficients));
         });
     }
 
     /// The inverse of the normal matrix of a local block; zero if it has none.
     fn inverse(&self, local: usize, rows: &LocalRows) -> Few {
+        match rows.width {
+            // Points: with a constant size, loops are unrolled.
+            3 => self.inverse_of::<3>(local, rows),
+            _ => self.inverse_of::<0>(local, rows),
+        }
+    }
+
+    fn inverse_of<const D: usize>(&self, local: usize, rows: &LocalRows) -> Few {
         let range = self.equations.problem().layout().local_range(local);
-        let count = range.len();
+        let count = if D > 0 { D } else { range.len() };
         let mut normal = Few::from_elem(0.0, count * count);
         for (_, own, ..) in rows.rows() {
             for (a, row) in own.iter().zip(normal.chunks_exact_mut(count)) {
@@ -195,6 +212,7 @@ impl Extended<'_> {
 }
 
 /// Inverts a positive definite matrix by exchanging each unknown with its equation; sets others to zero.
+#[inline(always)]
 fn invert(matrix: &mut [f64], count: usize) {
     for k in 0..count {
         let pivot = matrix[k * count + k];
@@ -393,19 +411,21 @@ impl Linearized {
         parts.push(retained(&extended, count));
 
         let (mut sums, first) = (Sums::new(count), layout.all_locals().end);
-        let mut rights = DMatrix::zeros(layout.unknowns() - first, count);
+        // A parameter per row: the elements of an unknown follow each other.
+        let mut rights = DMatrix::zeros(count, layout.unknowns() - first);
         for part in parts {
             sums.score += part.score;
             sums.squares += part.squares;
             sums.taken += part.taken;
             sums.observations.iter_mut().zip(part.observations).for_each(|(sum, own)| *sum += own);
             for (unknown, own) in part.unknowns.iter().zip(part.rights.chunks_exact(count.max(1))) {
-                own.iter().enumerate().for_each(|(k, value)| rights[(unknown - first, k)] += value);
+                rights.column_mut(unknown - first).iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
             }
         }
-        let solved = threads.install(|| self.factor.solve_reduced(layout, rights.as_slice()));
-        let effects = DMatrix::from_vec(rights.nrows(), count, solved);
-        let taken = sums.taken + rights.tr_mul(&effects);
+        let columns = rights.transpose();
+        let solved = threads.install(|| self.factor.solve_reduced(layout, columns.as_slice()));
+        let effects = DMatrix::from_vec(columns.nrows(), count, solved);
+        let taken = sums.taken + rights * &effects;
         let redundancy = &sums.squares - (&taken + taken.transpose()) / 2.0;
         let Sums { score, squares, observations, .. } = sums;
         Additional { score, squares, redundancy, effects, observations }
@@ -462,33 +482,30 @@ fn retained(extended: &Extended<'_>, count: usize) -> Sums {
     let problem = extended.equations.problem();
     let (layout, mut sums) = (problem.layout(), Sums::new(count));
     let (groups, first) = (layout.groups() * layout.rows(), layout.all_locals().end);
-    let (mut coefficients, mut partials, mut work) = (vec![], vec![], Work::new(layout, count));
-    let mut shared = Shared::default();
-    let mut add = |(of, sd, constant): (EquationOf, f64, f64), coefficients: &mut Vec<(usize, f64)>| {
+    let (mut partials, mut work) = (vec![], Work::new(layout, count));
+    let (mut shared, mut others) = (Shared::default(), vec![]);
+    let mut add = |of: EquationOf, sd: f64, row: &Row<'_>| {
         partials.clear();
-        extended.parameters.partials(&Equation { of, sd, coefficients }, &mut shared, &mut partials);
+        extended.parameters.partials(&Equation { of, sd, row }, &mut shared, &mut partials);
         if partials.iter().all(|own| own.1 == 0.0) {
             return;
         }
-        sums.add(constant, &partials);
+        sums.add(row.constant, &partials);
         work.select(&partials);
         work.left.clear();
         work.left.resize(work.columns.len(), 0.0);
         let left = &mut work.left;
         Work::each_active(&work.active, &partials, |column, partial| left[column] += partial);
-        coefficients.retain(|own| !extended.fixed[own.0]);
-        sums.reduce(coefficients, &mut work);
+        others.clear();
+        others.extend(row.taken().filter(|own| !extended.fixed[own.0]));
+        sums.reduce(&others, &mut work);
     };
     extended.equations.each_row_of_ties(|tie, row| {
-        coefficients.clear();
-        coefficients.extend(row.taken());
         let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
-        add((of, extended.equations.deviation(row.number), row.constant), &mut coefficients);
+        add(of, extended.equations.deviation(row.number), row);
     });
-    extended.terms.rows_within(first..layout.unknowns(), |unknown, row, constant| {
-        coefficients.clear();
-        coefficients.extend(row);
-        add((EquationOf::Unknown(unknown), problem.sd[unknown], constant), &mut coefficients);
+    extended.each_prior(first..layout.unknowns(), |unknown, row| {
+        add(EquationOf::Unknown(unknown), problem.sd[unknown], row);
     });
     sums
 }

@@ -22,6 +22,7 @@ pub(super) struct ObservationEquations<'a> {
 }
 
 /// Single equation of unit weight.
+#[derive(Debug)]
 pub(super) struct Row<'a> {
     /// Its index, in the order of groups and rows, then of ties and rows.
     pub number: usize,
@@ -31,7 +32,12 @@ pub(super) struct Row<'a> {
     coefficients: [&'a [f64]; 3],
 }
 
-impl Row<'_> {
+impl<'a> Row<'a> {
+    /// Creates an equation without a number.
+    pub fn single(constant: f64, columns: &'a [usize], coefficients: &'a [f64]) -> Self {
+        Self { number: usize::MAX, constant, columns, coefficients: [coefficients, &[], &[]] }
+    }
+
     /// Returns the unknowns of the equation, with their coefficients.
     #[inline(always)]
     pub fn taken(&self) -> impl Iterator<Item = (usize, f64)> {

@@ -99,7 +99,7 @@ impl GroupTest {
 /// Returns eigenvalues, larger first, and eigenvectors of a symmetric matrix.
 fn eigen(matrix: &Matrix2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
     let (a, b, c) = (matrix[(0, 0)], matrix[(0, 1)], matrix[(1, 1)]);
-    let half = ((a - c) / 2.0).hypot(b);
+    let half = (((a - c) / 2.0).powi(2) + b * b).sqrt();
     let larger = f64::midpoint(a, c) + half;
     let smaller = if larger > 0.0 { (a * c - b * b) / larger } else { larger - 2.0 * half };
     // The row of matrix - larger without cancellation.
@@ -124,30 +124,37 @@ pub fn may_correlate(odds: f64, other: f64, limit: f64) -> bool {
     limit <= 0.0 || odds * other >= limit * limit * (1.0 - BARELY)
 }
 
-/// Returns the largest canonical correlation of two groups of residuals: the largest singular value of R_g^-1/2 R_gh R_h^-1/2.
-///
-/// An error in one group changes the test value of the other by this fraction. Groups with a value above 0.9 are not separable.
-///
-/// * `first`, `second`: their cofactor matrices, row by row;
-/// * `between`: cofactors of the first with the second, row by row.
-pub fn canonical_correlation(first: &[f64], second: &[f64], between: &[f64]) -> f64 {
-    correlation_above(&whitening(first), &whitening(second), between, 0.0)
-}
-
 /// Returns R_g^-1/2 of a group with the cofactor matrix R_g, given row by row.
 pub fn whitening(cofactors: &[f64]) -> DMatrix<f64> {
     let count = cofactors.len().isqrt();
+    let root = |value: f64| if value > VISIBLE { value.sqrt().recip() } else { 0.0 };
+    if count == 2 {
+        let (values, vectors) = eigen(&Matrix2::from_row_slice(cofactors));
+        let half = vectors * Matrix2::from_diagonal(&values.map(root));
+        return DMatrix::from_column_slice(2, 2, half.as_slice());
+    }
     let eigen = DMatrix::from_row_slice(count, count, cofactors).symmetric_eigen();
-    let root = eigen.eigenvalues.map(|value| if value > VISIBLE { value.sqrt().recip() } else { 0.0 });
-    eigen.eigenvectors * DMatrix::from_diagonal(&root)
+    eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(root))
 }
 
-/// Returns the canonical correlation of two groups, from R_g^-1/2 and R_h^-1/2; 0 if it cannot exceed a limit, because the sum of squares of
-/// all singular values does not.
+/// Returns the largest canonical correlation of two groups of residuals: the largest singular value of R_g^-1/2 R_gh R_h^-1/2. It is 0 if it
+/// cannot exceed a limit, because the sum of squares of all singular values does not.
+///
+/// An error in one group changes the test value of the other by this fraction. Groups with a value above 0.9 are not separable.
+///
+/// * `first`, `second`: R_g^-1/2 and R_h^-1/2, see [`whitening`];
+/// * `between`: cofactors of the first with the second, row by row.
 pub fn correlation_above(first: &DMatrix<f64>, second: &DMatrix<f64>, between: &[f64], limit: f64) -> f64 {
     let between = DMatrix::from_row_slice(first.nrows(), second.nrows(), between);
     let matrix = first.tr_mul(&between) * second;
-    if matrix.norm_squared() <= limit * limit { 0.0 } else { matrix.singular_values().max().min(1.0) }
+    if matrix.norm_squared() <= limit * limit {
+        return 0.0;
+    }
+    let largest = match matrix.shape() {
+        (2, 2) => eigen(&Matrix2::from_fn(|i, j| matrix.column(i).dot(&matrix.column(j)))).0[0].sqrt(),
+        _ => matrix.singular_values().max(),
+    };
+    largest.min(1.0)
 }
 
 #[cfg(test)]
@@ -192,8 +199,15 @@ mod tests {
 
     #[test]
     fn errors_that_cannot_be_told_apart_are_correlated_by_one() {
-        let rho = canonical_correlation(&[0.3], &[0.2], &[0.06_f64.sqrt()]);
-        assert!((rho - 1.0).abs() < 1e-12);
-        assert!((canonical_correlation(&[0.5], &[0.5], &[-0.1]) - 0.2).abs() < 1e-12);
+        let rho = |first: &[f64], second: &[f64], between: &[f64]| {
+            correlation_above(&whitening(first), &whitening(second), between, 0.0)
+        };
+        assert!((rho(&[0.3], &[0.2], &[0.06_f64.sqrt()]) - 1.0).abs() < 1e-12);
+        assert!((rho(&[0.5], &[0.5], &[-0.1]) - 0.2).abs() < 1e-12);
+        // Two rows in closed form: the same with a third row that is independent of all others.
+        let (r, between) = ([0.5, 0.1, 0.1, 0.4], [0.2, -0.1, 0.05, 0.1]);
+        let wide = |own: &[f64], last: f64| [own[0], own[1], 0.0, own[2], own[3], 0.0, 0.0, 0.0, last];
+        let (r3, between3) = (wide(&r, 1.0), wide(&between, 0.0));
+        assert!((rho(&r, &r, &between) - rho(&r3, &r3, &between3)).abs() < 1e-12);
     }
 }

@@ -124,9 +124,11 @@ impl Leverages {
         threads: &Threads,
     ) -> Result<Vec<LocalCofactors>, AdjustError> {
         let (formed, asked, prior) = self.equations(problem, observation_sd, threads);
+        let same = std::ptr::eq(observation_sd, &problem.observation_sd[..]);
+        let asked = if same { &formed } else { &asked };
         let of = |&local: &usize| {
             let own_terms = terms(local);
-            problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &own_terms)
+            problem.system.local_cofactors(&self.selected, &formed, &prior, asked, local, &own_terms)
         };
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
         Ok(found.into_iter().collect::<Result<_, _>>()?)

@@ -94,10 +94,7 @@ pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
 };
-pub use group_test::{
-    Few, GroupTest, VISIBLE, canonical_correlation, correlation_above, leverage_odds, may_correlate,
-    whitening,
-};
+pub use group_test::{Few, GroupTest, VISIBLE, correlation_above, leverage_odds, may_correlate, whitening};
 pub use leverages::{Leverages, TieCofactors};
 pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;

@@ -119,11 +119,11 @@ pub(super) struct Tested {
 }
 
 impl Trial {
-    /// Tests every active observation group.
+    /// Tests every active observation group, on request with [`Tests::shared`].
     ///
     /// # Errors
     /// Tests before any adjustment.
-    pub fn tests(&self, threads: &Threads) -> Result<Tests, NetworkError> {
+    pub fn tests(&self, shared: bool, threads: &Threads) -> Result<Tests, NetworkError> {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
@@ -132,7 +132,7 @@ impl Trial {
         let fill = |_, (suspects, mut part): (&[Suspect], Part<'_>)| {
             for suspect in suspects {
                 let size = suspect.rows.len();
-                part.put(size, self.test(suspect, found, groups, &terms));
+                part.put(size, self.test(suspect, (found, groups), &terms, shared));
             }
         };
         let parts = self.suspects.all.chunks(TOGETHER).zip(parts).collect();
@@ -140,16 +140,28 @@ impl Trial {
         Ok(all)
     }
 
+    /// Returns the redundancy numbers of all rows: the diagonals of their cofactors; NaN for excluded rows.
+    pub fn redundancy(&self, tests: &Tests) -> Vec<f64> {
+        let of = |(rows, &first): (&[usize], &usize)| {
+            let (start, size) = (rows[0], rows[1] - rows[0]);
+            (0..size).map(move |k| match tests.residual[start + k] {
+                residual if residual.is_nan() => f64::NAN,
+                _ => tests.cofactors[first + k * (size + 1)],
+            })
+        };
+        self.suspects.row_starts().windows(2).zip(&self.block_starts).flat_map(of).collect()
+    }
+
     /// Tests a group; None if all its rows are excluded.
     pub(super) fn test(
         &self,
         suspect: &Suspect,
-        found: &Leverages,
-        groups: &GroupCofactors,
+        (found, groups): (&Leverages, &GroupCofactors),
         terms: &Terms<'_>,
+        shared: bool,
     ) -> Option<Tested> {
         if let Home::Group { group, .. } = suspect.home {
-            return self.image_test(group, found, groups);
+            return self.image_test(group, (found, groups), shared);
         }
         let size = suspect.rows.len();
         let taking: Vec<usize> = (0..size).filter(|&k| self.is_in(suspect.rows[k].0)).collect();
@@ -162,7 +174,8 @@ impl Trial {
             (0..count * count).map(|k| f64::from(u8::from(k / count == k % count)) - leverages[k]).collect()
         };
         let cofactors = left(&leverages);
-        let test = GroupTest::new(&residual, &cofactors, Some(&left(&by_point)));
+        let known = shared.then(|| left(&by_point));
+        let test = GroupTest::new(&residual, &cofactors, known.as_deref());
         let rows: Vec<(Row, usize)> = taking.iter().map(|&k| suspect.rows[k]).collect();
         let units = self.units(suspect, &rows);
         let (error, error_sd) = in_units(&units, &test.error, &test.cofactors);
@@ -196,7 +209,12 @@ impl Trial {
     }
 
     /// Tests an image of a local point; nearly all groups are of this type.
-    fn image_test(&self, group: usize, found: &Leverages, groups: &GroupCofactors) -> Option<Tested> {
+    fn image_test(
+        &self,
+        group: usize,
+        (found, groups): (&Leverages, &GroupCofactors),
+        shared: bool,
+    ) -> Option<Tested> {
         let rows = 2 * group..2 * group + 2;
         if self.assembled.problem.observation_sd[rows.clone()].iter().any(|sd| sd.is_infinite()) {
             return None;
@@ -206,7 +224,8 @@ impl Trial {
         let block = 4 * group..4 * group + 4;
         let left = |leverages: &[f64]| [1.0 - leverages[0], -leverages[1], -leverages[2], 1.0 - leverages[3]];
         let cofactors = left(&groups.leverages[block.clone()]);
-        let test = GroupTest::new(&residual, &cofactors, Some(&left(&groups.by_local[block])));
+        let known = shared.then(|| left(&groups.by_local[block]));
+        let test = GroupTest::new(&residual, &cofactors, known.as_ref().map(|own| &own[..]));
         let of = |k: usize| (test.error[k] * sd[k], test.cofactors[3 * k].sqrt() * sd[k]);
         let [first, second] = [of(0), of(1)];
         Some(Tested {

@@ -8,9 +8,12 @@ use super::error::NetworkError;
 use super::group_tests::{in_units, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::Threads;
 use crate::adjustment::{Leverages, Terms, TieCofactors, weighted};
 use crate::normals::{LocalCofactors, dot};
+use crate::{Threads, parallel};
+
+/// Minimum number of points per thread.
+pub(super) const AT_LEAST: usize = 16;
 
 /// Excluded rows of an observation compared with their prediction.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,22 +172,23 @@ impl Trial {
         let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
         let terms = self.terms(sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
-        let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_locals_together(problem, observation_sd, &places, (further, limit), threads);
-        let cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?;
-        let mut found_at = places.iter().zip(cofactors);
-        let of = |&point: &usize| {
-            let known = self.local(point).and_then(|_| found_at.next());
-            known.map_or_else(OnPoint::default, |(&place, own)| {
-                let (rows, residual) = self.rows_at(place, observation_sd, found, &terms);
+        let places: Vec<Option<usize>> = points.iter().map(|&point| self.local(point)).collect();
+        let locals: Vec<usize> = places.iter().flatten().copied().collect();
+        let cofactors = found.of_locals_together(problem, observation_sd, &locals, (further, limit), threads);
+        let mut cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?.into_iter();
+        let all: Vec<Option<(usize, LocalCofactors)>> =
+            places.into_iter().map(|place| Some((place?, cofactors.next()?))).collect();
+        let of = |k: usize| {
+            all[k].as_ref().map_or_else(OnPoint::default, |(place, own)| {
+                let (rows, residual) = self.rows_at(*place, observation_sd, found, &terms);
                 let (count, leverages) = (rows.len(), sub(&own.equations, own.rows(), &rows));
                 let identity = |k: usize| f64::from(u8::from(k / count == k % count));
                 let cofactors =
                     leverages.iter().enumerate().map(|(k, leverage)| identity(k) - leverage).collect();
-                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
+                OnPoint { suspects: self.on_place(*place).to_vec(), residual, cofactors }
             })
         };
-        Ok(points.iter().map(of).collect())
+        Ok(threads.install(|| parallel::map(all.len(), AT_LEAST, of)))
     }
 
     /// Returns R of excluded points, as if they were active: each one alone, given photos determined by the others. It is empty also for
@@ -207,7 +211,7 @@ impl Trial {
                 let (rows, observed) = self.rows_at(place, &self.observation_sd, found, &terms);
                 let cofactors = sub(&own, own.len().isqrt(), &rows);
                 let residual = cofactors.chunks_exact(rows.len()).map(|row| dot(row, &observed)).collect();
-                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
+                OnPoint { suspects: self.on_place(place).to_vec(), residual, cofactors }
             })
         };
         Ok(points.iter().map(of).collect())
@@ -220,7 +224,7 @@ impl Trial {
 
     /// Returns the equations of observed coordinates of a local point.
     fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<f64> {
-        let mut own = self.on_place[place].iter().map(|&index| &self.suspects.all[index]);
+        let mut own = self.on_place(place).iter().map(|&index| &self.suspects.all[index]);
         let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
         let all: Vec<usize> = (0..suspect.rows.len()).collect();
         self.term_rows(suspect, &all, terms).transpose().as_slice().to_vec()
@@ -237,7 +241,7 @@ impl Trial {
         let problem = &self.assembled.problem;
         let groups = problem.layout().groups_of(place);
         let (mut rows, mut off) = (vec![], vec![]);
-        for &index in &self.on_place[place] {
+        for &index in self.on_place(place) {
             let suspect = &self.suspects.all[index];
             let first = match suspect.home {
                 Home::Group { group, .. } => 2 * (group - groups.start),

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::covariance::{Covariances, Of};
 use super::error::NetworkError;
 use super::model::{Bundle, Owner};
-use super::predictions::OnPoint;
+use super::predictions::{AT_LEAST, OnPoint};
 use super::suspects::{Home, Suspects};
 use super::trial::Trial;
 use crate::adjustment::{
@@ -208,9 +208,6 @@ fn turned(step: &mut [f64], turn: &Matrix3) {
     let angles = turn * Vector3::from_column_slice(step);
     step.copy_from_slice(angles.as_slice());
 }
-
-/// Minimum number of points per thread.
-const AT_LEAST: usize = 16;
 
 impl Trial {
     /// Returns the effects of errors of one standard deviation in each row of some groups on their own point and photo. Each row has three

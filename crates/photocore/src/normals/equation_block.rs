@@ -74,15 +74,22 @@ impl System {
         if self.layout.stands_apart(local) {
             return self.cofactors_apart(selected, asked, local, groups, terms.len());
         }
-        let formed = self.own_equations(equations, local, groups.clone(), &[]);
+        let observed = groups.len() * self.layout.rows();
+        // The same equations are formed once.
+        let formed = (!std::ptr::addr_eq(equations, asked))
+            .then(|| self.own_equations(equations, local, groups.clone(), &[]));
         let Own { local: a, others: b, blocks } = self.own_equations(asked, local, groups, terms);
         let (rows, dim) = (a.nrows(), a.ncols());
-        let mut normal = formed.local.transpose() * &formed.local;
+        let (formed_local, formed_others) = match &formed {
+            Some(own) => (own.local.as_ref(), own.others.as_ref()),
+            None => (a.subrows(0, observed), b.subrows(0, observed)),
+        };
+        let mut normal = formed_local.transpose() * formed_local;
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
         let Ok(factor) = normal.llt(Side::Lower) else {
             return Ok(LocalCofactors::unknown(dim, rows, &blocks));
         };
-        let coupling = factor.solve(formed.local.transpose() * &formed.others);
+        let coupling = factor.solve(formed_local.transpose() * formed_others);
         let by_local = factor.solve(a.transpose());
         let c = &b - &a * &coupling;
         let others = self.inverse_over(selected, &blocks, b.ncols())? * c.transpose();
@@ -155,10 +162,13 @@ impl System {
     ) -> Result<Mat<f64>, LayoutError> {
         let mut q = Mat::<f64>::zeros(order, order);
         for (&row, &first) in blocks {
-            for (&column, &left) in blocks {
+            for (&column, &left) in blocks.range(row..) {
                 let values = selected.block(row, column)?;
                 let width = self.layout.retained_dim(column);
-                values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
+                for (k, &value) in values.iter().enumerate() {
+                    let (i, j) = (first + k / width, left + k % width);
+                    (q[(i, j)], q[(j, i)]) = (value, value);
+                }
             }
         }
         Ok(q)
@@ -176,33 +186,36 @@ impl System {
         let (rows, l) = (layout.rows(), layout.local_dim());
         let touched = groups.clone().flat_map(|group| layout.blocks_of(group));
         let mut blocks: BTreeMap<usize, usize> = touched.map(|block| (block, 0)).collect();
-        let (mut width, mut columns) = (0, BTreeMap::new());
+        let mut width = 0;
         for (&block, first) in &mut blocks {
             *first = width;
-            columns.extend(layout.retained_range(block).zip(width..));
-            width += self.layout.retained_dim(block);
+            width += layout.retained_dim(block);
         }
         let count = groups.len() * rows + terms.len() / l;
         let mut own = Own { local: Mat::zeros(count, l), others: Mat::zeros(count, width), blocks };
         for (k, &value) in terms.iter().enumerate() {
             own.local[(groups.len() * rows + k / l, k % l)] = value;
         }
+        let (mut constant, mut parts, mut columns) = (vec![0.0; rows], [vec![], vec![], vec![]], vec![]);
         for (index, group) in groups.enumerate() {
-            let main = layout.retained_range(layout.retained_of(group));
-            let mut parts = [l, main.len(), layout.shared_width(group)].map(|width| vec![0.0; rows * width]);
-            let mut constant = vec![0.0; rows];
+            let main = layout.retained_dim(layout.retained_of(group));
+            let widths = [l, main, layout.shared_width(group)];
+            parts.iter_mut().zip(widths).for_each(|(part, width)| part.resize(rows * width, 0.0));
             let [local_part, retained, shared] = &mut parts;
             let mut written = GroupRows { constant: &mut constant, local: local_part, retained, shared };
             equations.write(local, group, &mut written);
+            columns.clear();
+            columns.extend(layout.blocks_of(group).flat_map(|block| {
+                let first = own.blocks[&block];
+                first..first + layout.retained_dim(block)
+            }));
             for row in 0..rows {
                 let at = index * rows + row;
-                (0..l).for_each(|k| own.local[(at, k)] = parts[0][row * l + k]);
-                let others = main.clone().zip(&parts[1][row * main.len()..]);
-                let width = layout.shared_width(group);
-                let shared = layout.shared_columns(group).zip(&parts[2][row * width..]);
-                others
-                    .chain(shared)
-                    .for_each(|(unknown, &value)| own.others[(at, columns[&unknown])] = value);
+                let [local_part, retained, shared] =
+                    [0, 1, 2].map(|k| &parts[k][row * widths[k]..][..widths[k]]);
+                local_part.iter().enumerate().for_each(|(k, &value)| own.local[(at, k)] = value);
+                let others = retained.iter().chain(shared).zip(&columns);
+                others.for_each(|(&value, &column)| own.others[(at, column)] = value);
             }
         }
         own

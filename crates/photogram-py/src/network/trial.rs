@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use super::covariances::Refused;
 use super::state::BlockState;
 use super::suspects::{NetworkSuspects, subject};
-use crate::arrays::{Array, Matrix, rows, table};
+use crate::arrays::{Array, Matrix, Vector, rows, table};
 use crate::solution::status_name;
 use crate::work::{Workers, watched};
 
@@ -32,37 +32,65 @@ fn outcome_row(outcome: Outcome) -> OutcomeRow {
     (status_name(status), iterations, sum_of_squares, degrees_of_freedom, collapsed)
 }
 
-/// Converts a hypothesis to a dictionary; see the stub.
-fn hypothesis_row(py: Python<'_>, own: Hypothesis) -> PyResult<Bound<'_, PyDict>> {
-    let row = PyDict::new(py);
-    let (kind, index, component) = match own.about {
-        About::Set(set) => (None, set.map(|set| set as i64), None),
+/// Converts hypotheses to columns; see the stub.
+fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, PyDict>> {
+    let Hypotheses { mut all, sets, correlations } = found;
+    let columns = PyDict::new(py);
+    columns.set_item("code", all.iter().map(|own| own.code).collect::<Vec<_>>())?;
+    let numbers = |own: &Hypothesis| match own.about {
+        About::Set(set) => [-1, set.map_or(-1, |set| set as i64), -1],
         About::Group(group, component) => {
             let (kind, index) = subject(group);
-            (Some(kind), Some(index), component)
+            [i64::from(kind), index, component.map_or(-1, |component| component as i64)]
         }
     };
-    let judged = own.judged;
-    row.set_item("code", own.code)?;
-    row.set_item("group", kind)?;
-    row.set_item("index", index)?;
-    row.set_item("component", component)?;
-    row.set_item("parameters", own.parameters)?;
-    row.set_item("observations", own.observations)?;
-    row.set_item("plausible", own.plausible)?;
-    row.set_item("rank", judged.rank)?;
-    row.set_item("statistic", judged.statistic)?;
-    row.set_item("probability", judged.probability)?;
-    row.set_item("estimate", judged.estimate)?;
-    row.set_item("cofactors", judged.cofactors)?;
-    row.set_item("redundancy", judged.redundancy)?;
-    row.set_item("noncentrality", judged.noncentrality)?;
-    row.set_item("mdb", judged.mdb)?;
-    row.set_item("error", judged.error)?;
-    row.set_item("bias_to_noise", judged.bias_to_noise)?;
-    let effect = own.effect.map(|own| (own.points, own.others, own.ratio, own.at, own.change, own.checks));
-    row.set_item("effect", effect)?;
-    Ok(row)
+    for (k, name) in ["group", "index", "component"].into_iter().enumerate() {
+        columns.set_item(name, PyArray1::from_iter(py, all.iter().map(|own| numbers(own)[k])))?;
+    }
+    let scalars: [(&str, fn(&Hypothesis) -> f64); 7] = [
+        ("observations", |own| own.observations as f64),
+        ("rank", |own| own.judged.rank as f64),
+        ("statistic", |own| own.judged.statistic),
+        ("probability", |own| own.judged.probability),
+        ("redundancy", |own| own.judged.redundancy),
+        ("noncentrality", |own| own.judged.noncentrality),
+        ("bias_to_noise", |own| own.judged.bias_to_noise),
+    ];
+    for (name, of) in scalars {
+        columns.set_item(name, PyArray1::from_iter(py, all.iter().map(of)))?;
+    }
+    let width = all.iter().map(|own| own.judged.estimate.len()).max().unwrap_or(1);
+    let vectors: [(&str, fn(&Hypothesis) -> &[f64]); 3] = [
+        ("estimate", |own| &own.judged.estimate),
+        ("plausible", |own| &own.plausible),
+        ("mdb", |own| own.judged.mdb.as_deref().unwrap_or_default()),
+    ];
+    for (name, of) in vectors {
+        let padded =
+            all.iter().flat_map(|own| (0..width).map(move |k| of(own).get(k).copied().unwrap_or(f64::NAN)));
+        columns.set_item(name, PyArray1::from_iter(py, padded).reshape([all.len(), width])?)?;
+    }
+    let effects = PyDict::new(py);
+    for (row, own) in all.iter_mut().enumerate() {
+        if let Some(own) = own.effect.take() {
+            let effect = (own.points, own.others, own.ratio, own.at, own.change, table(py, own.checks)?);
+            effects.set_item(row, effect)?;
+        }
+    }
+    columns.set_item("effects", effects)?;
+    all.truncate(sets);
+    let of_set = |own: Hypothesis| -> PyResult<Bound<'_, PyDict>> {
+        let row = PyDict::new(py);
+        row.set_item("parameters", own.parameters)?;
+        row.set_item("plausible", own.plausible)?;
+        row.set_item("estimate", own.judged.estimate)?;
+        row.set_item("cofactors", own.judged.cofactors)?;
+        row.set_item("error", own.judged.error)?;
+        Ok(row)
+    };
+    columns.set_item("sets", all.into_iter().map(of_set).collect::<PyResult<Vec<_>>>()?)?;
+    columns.set_item("correlations", PyArray1::from_vec(py, correlations).reshape([sets, sets])?)?;
+    Ok(columns)
 }
 
 impl NetworkTrial {
@@ -73,6 +101,9 @@ impl NetworkTrial {
 
 /// Unknown with the largest change: type, index, component, change, and change in standard deviations.
 type MovedRow = (&'static str, usize, usize, f64, f64);
+
+/// First and second group of pairs, and their correlation.
+type Pairs<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Vector<'py>);
 
 /// Prepares a network for trials without some of its observations, from its final or its initial state.
 ///
@@ -143,9 +174,10 @@ impl NetworkTrial {
     }
 
     fn tests<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.tests(pool))?;
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.tests(false, pool))?;
         let tests = found.map_err(|error| (self.refused)(&error))?;
         let all = PyDict::new(py);
+        all.set_item("redundancy", PyArray1::from_vec(py, self.trial.redundancy(&tests)))?;
         all.set_item("active", PyArray1::from_vec(py, tests.active))?;
         let rank = tests.rank.into_iter().map(|rank| rank as i64).collect();
         all.set_item("rank", PyArray1::from_vec(py, rank))?;
@@ -179,7 +211,7 @@ impl NetworkTrial {
         detection: (f64, f64),
         limit: f64,
         effects: usize,
-    ) -> PyResult<(Vec<Bound<'py, PyDict>>, Matrix<'py>)> {
+    ) -> PyResult<Bound<'py, PyDict>> {
         let velocities = rows("velocities", &velocities)?;
         let facts = Facts {
             velocities,
@@ -196,9 +228,7 @@ impl NetworkTrial {
             effects,
         };
         let found = watched(py, self.workers(), None, |pool, _| self.trial.hypotheses(&facts, pool))?;
-        let Hypotheses { all, sets, correlations } = found.map_err(|error| (self.refused)(&error))?;
-        let rows = all.into_iter().map(|own| hypothesis_row(py, own)).collect::<PyResult<_>>()?;
-        Ok((rows, PyArray1::from_vec(py, correlations).reshape([sets, sets])?))
+        hypothesis_columns(py, found.map_err(|error| (self.refused)(&error))?)
     }
 
     fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Matrix<'py>> {
@@ -228,14 +258,14 @@ impl NetworkTrial {
         Ok(found.map_err(|error| (self.refused)(&error))?.into_iter().map(row).collect())
     }
 
-    fn inseparable(
-        &self,
-        py: Python<'_>,
-        points: Vec<usize>,
-        limit: f64,
-    ) -> PyResult<Vec<(usize, usize, f64)>> {
+    fn inseparable<'py>(&self, py: Python<'py>, points: Vec<usize>, limit: f64) -> PyResult<Pairs<'py>> {
         let found =
             watched(py, self.workers(), None, |pool, _| self.trial.inseparable(&points, limit, pool))?;
-        found.map_err(|error| (self.refused)(&error))
+        let pairs = found.map_err(|error| (self.refused)(&error))?;
+        let groups = |of: fn(&(usize, usize, f64)) -> usize| {
+            PyArray1::from_iter(py, pairs.iter().map(|pair| of(pair) as i64))
+        };
+        let rho = PyArray1::from_iter(py, pairs.iter().map(|pair| pair.2));
+        Ok((groups(|pair| pair.0), groups(|pair| pair.1), rho))
     }
 }

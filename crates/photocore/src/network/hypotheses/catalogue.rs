@@ -46,6 +46,8 @@ pub(super) struct Catalogue<'a> {
     displaced: HashMap<(Seen, usize), Vec<(usize, f64)>>,
     /// The same of fixed unknowns, whose error all observations see.
     fixed: HashMap<usize, Vec<(usize, f64)>>,
+    /// Errors of single observations that are no images of local points: columns and values.
+    single: HashMap<EquationOf, Vec<(usize, f64)>>,
     /// Parameters of the camera of each photo, and their columns.
     pub(super) cameras: Vec<Vec<(usize, usize)>>,
     /// Column of the readout time of the camera of each photo.
@@ -68,6 +70,7 @@ impl<'a> Catalogue<'a> {
             count: 0,
             displaced: HashMap::new(),
             fixed: HashMap::new(),
+            single: HashMap::new(),
             cameras: vec![vec![]; photos],
             shutters: vec![None; photos],
             camera_of_photo: &trial.camera_of_photo,
@@ -86,6 +89,15 @@ impl<'a> Catalogue<'a> {
         let (parameters, plausible) = (parameters.to_vec(), plausible.to_vec());
         self.causes.push(Cause { code, set, parameters, plausible, columns: columns.clone() });
         columns
+    }
+
+    /// Adds an error of some observations as a parameter; its column.
+    pub fn add_single(&mut self, error: &[(EquationOf, f64)]) -> usize {
+        for &(of, value) in error {
+            self.single.entry(of).or_default().push((self.count, value));
+        }
+        self.count += 1;
+        self.count - 1
     }
 
     /// Displaces an unknown, as some observations see it, with a parameter.
@@ -180,7 +192,11 @@ impl AdditionalParameters for Catalogue<'_> {
             return None;
         }
         let end = 3 * self.bundle.locals;
-        let unknowns = self.displaced.keys().map(|own| own.1).filter(|&unknown| unknown < end);
+        let single = self.single.keys().filter_map(|of| match *of {
+            EquationOf::Unknown(unknown) => Some(unknown),
+            _ => None,
+        });
+        let unknowns = self.displaced.keys().map(|own| own.1).chain(single).filter(|&unknown| unknown < end);
         let mut locals: Vec<usize> = unknowns.map(|unknown| unknown / 3).collect();
         locals.sort_unstable();
         locals.dedup();
@@ -205,13 +221,14 @@ impl AdditionalParameters for Catalogue<'_> {
             let own = own.into_iter().flatten();
             own.for_each(|&(column, value)| put(partials, column, coefficient * value));
         };
-        for &(unknown, coefficient) in equation.coefficients {
-            if let Some(seen) = seen {
-                add(self.displaced.get(&(seen, unknown)), coefficient);
-            }
-            if !self.fixed.is_empty() {
+        if seen.is_some() || !self.fixed.is_empty() {
+            for (unknown, coefficient) in equation.coefficients() {
+                add(seen.and_then(|seen| self.displaced.get(&(seen, unknown))), coefficient);
                 add(self.fixed.get(&unknown), coefficient);
             }
+        }
+        if !matches!(equation.of, EquationOf::Group { .. }) {
+            add(self.single.get(&equation.of), 1.0);
         }
         if let Some(image) = image {
             self.camera_partials(image, equation, shared, partials);

@@ -1,19 +1,19 @@
 //! The evaluation of all hypotheses of an adjusted network.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::super::NetworkError;
 use super::super::trial::Trial;
 use super::catalogue::Catalogue;
 use super::effect::Sample;
 use super::facts::Facts;
-use super::groups::single_errors;
+use super::groups::{single_errors, worst};
 use super::hypothesis::{About, Hypotheses, Hypothesis};
 use super::judged::{Criteria, Judged};
 use super::{attitudes, cameras, control, form, positions, shutter};
-use crate::Threads;
-use crate::adjustment::{Leverages, canonical_correlation};
+use crate::adjustment::{Leverages, correlation_above, whitening};
 use crate::geometry::{ObjectSpace, PoseNumbers};
+use crate::{Threads, parallel};
 
 /// The errors of sets that are possible for a network.
 fn catalogue<'a>(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Catalogue<'a> {
@@ -47,8 +47,12 @@ impl Trial {
         let linearized = found.linearized(problem, threads).map_err(failed)?;
         let criteria = Criteria::new(facts);
         let sample = Sample::new(self, found, &linearized, &facts.checks);
+        let mut singles = single_errors(self, found, &criteria, threads);
+        let worst = worst(&singles, facts);
 
-        let catalogue = catalogue(self, found, facts);
+        let mut catalogue = catalogue(self, found, facts);
+        let columns_of_worst: Vec<usize> =
+            worst.iter().map(|&k| catalogue.add_single(&singles[k].error)).collect();
         let sums = linearized.additional(problem, &catalogue, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
@@ -81,24 +85,36 @@ impl Trial {
             });
             columns.push(own);
         }
-        let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
-        for (k, own) in all.iter_mut().enumerate().filter(|(_, own)| own.judged.error.is_some()) {
-            own.effect = Some(sample.effect(&changes, k, &[], facts.limit));
-        }
         let sets = all.len();
-        let block = |i: &[usize], j: &[usize]| -> Vec<f64> {
-            i.iter()
-                .flat_map(|&i| j.iter().map(move |&j| (i, j)))
-                .map(|place| sums.redundancy[place])
-                .collect()
+        errors.extend(columns_of_worst.iter().map(|&column| {
+            let unit = |k: usize, _| f64::from(u8::from(k == column));
+            DVector::from_fn(sums.score.len(), unit)
+        }));
+        let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
+        let effect = |error: usize| {
+            let single = error.checked_sub(sets).map(|k| &singles[worst[k]]);
+            let own = single.map_or(vec![], |single| self.points_of(single.suspect));
+            sample.effect(&changes, error, &own, facts.limit)
         };
-        let correlation = |(i, j): (usize, usize)| {
-            let (i, j): (&[usize], &[usize]) = (&columns[i], &columns[j]);
-            canonical_correlation(&block(i, i), &block(j, j), &block(i, j))
+        let effects = threads.install(|| parallel::map(errors.len(), 1, effect));
+        for (error, effect) in effects.into_iter().enumerate() {
+            let own = match error.checked_sub(sets) {
+                None => &mut all[error],
+                Some(k) => &mut singles[worst[k]].hypothesis,
+            };
+            own.effect = own.judged.error.is_some().then_some(effect);
+        }
+        let block = |i: usize, j: usize| -> Vec<f64> {
+            let places = columns[i].iter().flat_map(|&i| columns[j].iter().map(move |&j| (i, j)));
+            places.map(|place| sums.redundancy[place]).collect()
         };
-        let pairs = (0..sets).flat_map(|i| (0..sets).map(move |j| (i, j)));
-        let correlations = pairs.map(correlation).collect();
-        all.extend(single_errors(self, found, &linearized, &sample, (facts, &criteria), threads));
+        let roots: Vec<DMatrix<f64>> = (0..sets).map(|k| whitening(&block(k, k))).collect();
+        let correlation = |k: usize| {
+            let (i, j) = (k / sets, k % sets);
+            correlation_above(&roots[i], &roots[j], &block(i, j), 0.0)
+        };
+        let correlations = (0..sets * sets).map(correlation).collect();
+        all.extend(singles.into_iter().map(|single| single.hypothesis));
         Ok(Hypotheses { all, sets, correlations })
     }
 }

@@ -1,85 +1,61 @@
 //! Errors of single groups of observations except images, and of their components: a control point or one of its coordinates, a distance, the
 //! position of a photo.
 
-use std::collections::HashMap;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::super::group_tests::Tested;
 use super::super::suspects::{Home, Row, Subject, Suspect};
 use super::super::trial::Trial;
-use super::effect::Sample;
 use super::facts::Facts;
 use super::hypothesis::{About, Hypothesis};
 use super::judged::{Criteria, Judged};
-use crate::Threads;
-use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Linearized, Shared};
+use crate::adjustment::{EquationOf, Leverages};
+use crate::{Threads, parallel};
 
 /// Size of an error that is reported if no error of any size is detected, in standard deviations of its observation.
 const LARGE: f64 = 1000.0;
+/// Least number of groups of a thread.
+const AT_LEAST: usize = 16;
 
-/// An error of unit weight: equations with their shares of it.
-type Error = Vec<(EquationOf, f64)>;
+/// A hypothesis on a group, or on one of its components.
+pub(super) struct Single<'a> {
+    pub hypothesis: Hypothesis,
+    pub suspect: &'a Suspect,
+    /// The error whose effect is reported: equations of unit weight with their shares.
+    pub error: Vec<(EquationOf, f64)>,
+}
 
-/// The errors of groups; `linearized` is at the adjusted values.
-pub(super) fn single_errors(
-    trial: &Trial,
+/// The errors of groups.
+pub(super) fn single_errors<'a>(
+    trial: &'a Trial,
     found: &Leverages,
-    linearized: &Linearized,
-    sample: &Sample<'_>,
-    (facts, criteria): (&Facts, &Criteria),
+    criteria: &Criteria,
     threads: &Threads,
-) -> Vec<Hypothesis> {
+) -> Vec<Single<'a>> {
     let Some(groups) = found.cofactors.groups.as_ref() else { return vec![] };
     let terms = trial.terms(&trial.assembled.problem.sd, &found.values);
-    let (mut all, mut errors) = (vec![], vec![]);
-    let suspects = trial.suspects.all.iter();
-    for suspect in suspects.filter(|suspect| !matches!(suspect.subject, Subject::Image(_))) {
-        let Some(tested) = trial.test(suspect, found, groups, &terms) else { continue };
-        let size = suspect.rows.len();
-        let active: Vec<usize> = (0..size).filter(|&k| !tested.residual[k].is_nan()).collect();
-        let redundancy = DMatrix::from_row_slice(size, size, &tested.cofactors);
-        let residual = DVector::from_column_slice(&tested.residual);
-        let mut sets = vec![(None, active.clone())];
-        if active.len() > 1 {
-            sets.extend(active.iter().map(|&k| (Some(suspect.rows[k].1), vec![k])));
-        }
-        for (component, rows) in sets {
-            let score = residual.select_rows(&rows);
-            let block = redundancy.select_rows(&rows).select_columns(&rows);
-            // In unit weight C selects rows.
-            let count = rows.len();
-            let judged =
-                Judged::new(&score, &DMatrix::identity(count, count), &block, &vec![LARGE; count], criteria);
-            let unit = judged.error.clone().unwrap_or_default();
-            let shares = rows.iter().zip(&unit).map(|(&k, &value)| (trial.equation(suspect, k), value));
-            errors.push((trial.points_of(suspect), shares.collect::<Error>()));
-            let units = trial.units(suspect, &rows.iter().map(|&k| suspect.rows[k]).collect::<Vec<_>>());
-            all.push(Hypothesis {
-                code: code(suspect.subject),
-                about: About::Group(suspect.subject, component),
-                parameters: vec![],
-                observations: rows.len(),
-                plausible: vec![],
-                judged: judged.in_units(&units),
-                effect: None,
-            });
-        }
-    }
-    let mut solved: Vec<usize> =
-        (0..all.len()).filter(|&k| is_whole(&all[k]) && all[k].judged.bias_to_noise > facts.limit).collect();
-    solved.sort_by(|&i, &j| all[j].judged.bias_to_noise.total_cmp(&all[i].judged.bias_to_noise));
+    let is_single = |suspect: &&Suspect| !matches!(suspect.subject, Subject::Image(_));
+    let suspects: Vec<&Suspect> = trial.suspects.all.iter().filter(is_single).collect();
+    let part = |some: Range<usize>| -> Vec<Single<'a>> {
+        let tested = suspects[some].iter().filter_map(|&suspect| {
+            let tested = trial.test(suspect, (found, groups), &terms, false)?;
+            Some(trial.errors_of(suspect, &tested, criteria))
+        });
+        tested.flatten().collect()
+    };
+    threads.install(|| parallel::by_parts(suspects.len(), AT_LEAST, &part))
+}
+
+/// The hypotheses whose effects are computed.
+pub(super) fn worst(singles: &[Single<'_>], facts: &Facts) -> Vec<usize> {
+    let ratio = |k: usize| singles[k].hypothesis.judged.bias_to_noise;
+    let solved = (0..singles.len()).filter(|&k| is_whole(&singles[k].hypothesis) && ratio(k) > facts.limit);
+    let mut solved: Vec<usize> = solved.collect();
+    solved.sort_by(|&i, &j| ratio(j).total_cmp(&ratio(i)));
     solved.truncate(facts.effects);
-    let columns = UnitErrors::new(solved.iter().map(|&k| &errors[k].1), trial.assembled.problem.model.locals);
-    let problem = &trial.assembled.problem;
-    let sums = linearized.additional(problem, &columns, threads);
-    let count = solved.len();
-    let units: Vec<DVector<f64>> =
-        (0..count).map(|k| DVector::from_fn(count, |i, _| f64::from(u8::from(i == k)))).collect();
-    let changes = sample.changes(&columns, &sums.effects, &units, threads);
-    for (column, &k) in solved.iter().enumerate() {
-        all[k].effect = Some(sample.effect(&changes, column, &errors[k].0, facts.limit));
-    }
-    all
+    solved
 }
 
 /// Whether a hypothesis is on all components of its group: an error of one of them moves no more than the worst of these.
@@ -99,49 +75,41 @@ fn code(subject: Subject) -> &'static str {
     }
 }
 
-/// Errors of some equations, a column each.
-struct UnitErrors {
-    count: usize,
-    locals: Vec<usize>,
-    columns: HashMap<EquationOf, Vec<(usize, f64)>>,
-}
-
-impl UnitErrors {
-    fn new<'e>(errors: impl Iterator<Item = &'e Error>, locals: usize) -> Self {
-        let (mut count, mut columns): (usize, HashMap<EquationOf, Vec<(usize, f64)>>) = (0, HashMap::new());
-        for error in errors {
-            for &(of, value) in error {
-                columns.entry(of).or_default().push((count, value));
-            }
-            count += 1;
-        }
-        let of = |of: &EquationOf| match *of {
-            EquationOf::Unknown(unknown) if unknown < 3 * locals => Some(unknown / 3),
-            EquationOf::Group { local, .. } => Some(local),
-            _ => None,
-        };
-        let mut locals: Vec<usize> = columns.keys().filter_map(of).collect();
-        locals.sort_unstable();
-        locals.dedup();
-        Self { count, locals, columns }
-    }
-}
-
-impl AdditionalParameters for UnitErrors {
-    fn count(&self) -> usize {
-        self.count
-    }
-
-    fn locals(&self) -> Option<Vec<usize>> {
-        Some(self.locals.clone())
-    }
-
-    fn partials(&self, equation: &Equation<'_>, _: &mut Shared, partials: &mut Vec<(usize, f64)>) {
-        partials.extend(self.columns.get(&equation.of).into_iter().flatten());
-    }
-}
-
 impl Trial {
+    /// The errors of a group: of all its components, then of each.
+    fn errors_of<'a>(&self, suspect: &'a Suspect, tested: &Tested, criteria: &Criteria) -> Vec<Single<'a>> {
+        let size = suspect.rows.len();
+        let active: Vec<usize> = (0..size).filter(|&k| !tested.residual[k].is_nan()).collect();
+        let redundancy = DMatrix::from_row_slice(size, size, &tested.cofactors);
+        let residual = DVector::from_column_slice(&tested.residual);
+        let mut sets = vec![(None, active.clone())];
+        if active.len() > 1 {
+            sets.extend(active.iter().map(|&k| (Some(suspect.rows[k].1), vec![k])));
+        }
+        let of = |(component, rows): (Option<usize>, Vec<usize>)| {
+            let score = residual.select_rows(&rows);
+            let block = redundancy.select_rows(&rows).select_columns(&rows);
+            // In unit weight C selects rows.
+            let count = rows.len();
+            let judged =
+                Judged::new(&score, &DMatrix::identity(count, count), &block, &vec![LARGE; count], criteria);
+            let shares = rows.iter().zip(judged.error.iter().flatten());
+            let error = shares.map(|(&k, &value)| (self.equation(suspect, k), value)).collect();
+            let units = self.units(suspect, &rows.iter().map(|&k| suspect.rows[k]).collect::<Vec<_>>());
+            let hypothesis = Hypothesis {
+                code: code(suspect.subject),
+                about: About::Group(suspect.subject, component),
+                parameters: vec![],
+                observations: count,
+                plausible: vec![],
+                judged: judged.in_units(&units),
+                effect: None,
+            };
+            Single { hypothesis, suspect, error }
+        };
+        sets.into_iter().map(of).collect()
+    }
+
     /// The equation of a row of a suspect that is no image of a local point.
     fn equation(&self, suspect: &Suspect, row: usize) -> EquationOf {
         let layout = self.assembled.problem.layout();
@@ -159,7 +127,7 @@ impl Trial {
     }
 
     /// The points of the network that the observations of a suspect belong to.
-    fn points_of(&self, suspect: &Suspect) -> Vec<usize> {
+    pub(super) fn points_of(&self, suspect: &Suspect) -> Vec<usize> {
         match (suspect.subject, suspect.home) {
             (Subject::Control(point), _) => vec![point],
             (Subject::Observation(_), Home::Tie(tie)) => {

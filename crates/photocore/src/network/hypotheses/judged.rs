@@ -148,7 +148,8 @@ fn worst_hidden(span: &DMatrix<f64>, taken: &DMatrix<f64>, plausible: &[f64]) ->
     for axis in 0..count {
         let direction = span * (&inverse * weighted.row(axis).transpose());
         let own = effect(&direction);
-        if own.is_finite() && own >= worst.0 * (1.0 - ROUNDING) {
+        // A parameter that is detected has only rounding errors in the span.
+        if direction[axis] > ROUNDING && own >= worst.0 * (1.0 - ROUNDING) {
             worst = (own.max(worst.0), direction);
         }
     }

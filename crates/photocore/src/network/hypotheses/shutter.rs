@@ -39,8 +39,8 @@ impl Catalogue<'_> {
         let Some([a, b, c]) = self.facts.readouts[camera] else { return };
         let time = a * observed.xy[0] + b * observed.xy[1] + c;
         let (first, velocity) = (self.bundle.of_block(photo).start, self.facts.velocities[photo]);
-        let own = equation.coefficients.iter().filter(|own| (first..first + 3).contains(&own.0));
-        let change: f64 = own.map(|&(unknown, value)| value * velocity[unknown - first]).sum();
+        let own = equation.coefficients().filter(|own| (first..first + 3).contains(&own.0));
+        let change: f64 = own.map(|(unknown, value)| value * velocity[unknown - first]).sum();
         put(partials, column, change * time);
     }
 }

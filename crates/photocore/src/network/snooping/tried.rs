@@ -58,7 +58,7 @@ impl Tried for Running<'_> {
     }
 
     fn tests(&mut self) -> Result<Tests, NetworkError> {
-        self.trial.tests(self.threads)
+        self.trial.tests(true, self.threads)
     }
 
     fn predictions(&mut self, groups: &[usize]) -> Result<Vec<Option<Prediction>>, NetworkError> {
