@@ -177,7 +177,7 @@ def calibrations(result: Result) -> list[Calibration]:
                 correlations=_correlations(each),
                 poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
                 terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
-                removable=removable and removable.name,
+                removable=None if removable is None else removable.name,
             )
         )
     return found

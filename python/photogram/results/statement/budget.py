@@ -139,8 +139,8 @@ def budgets(
         sources = tuple(Source(*source, source[-1] * share) for source in rows.sources(squares))
         largest, k = tuple(_largest(rows, squares, t, share)), coverage_factor(coverage, freedom.used)
         numbers = value, math.sqrt(variance), variance / result.covariance_scale
-        parts = sources, largest, freedom, k, coverage
-        found.append(Budget(each.name, each.subject, each.unit, *numbers, *parts))
+        names = each.name, each.subject, each.unit
+        found.append(Budget(*names, *numbers, sources, largest, freedom, k, coverage))
     return found
 
 
@@ -264,11 +264,11 @@ class Rows(network_trial.BlockSuspects):
         several = len(self.block.camera_names) > 1
         for group in np.flatnonzero(self.kinds > network_trial.OBSERVATION).tolist():
             for row in self.rows(group).tolist():
-                kind, *of, component = self.named(row)
+                kind, *unknown, component = self.named(row)
                 axis = Phrase(f"axis.{component}")
                 alone = kind == "camera" and not several
-                own = axis if alone else phrase("named.component", name=" ".join(of), axis=axis)
-                yield "parameter", own, 1, float(squares[row])
+                name = axis if alone else phrase("named.component", name=" ".join(unknown), axis=axis)
+                yield "parameter", name, 1, float(squares[row])
 
     def named(self, row: int) -> tuple[str, ...]:
         """Return the type of a row, its items, and its component."""
