@@ -462,7 +462,12 @@ _EXPLAINING = frozenset(
 """Rules that explain residuals that are too large."""
 
 RULES = (
-    Rule("not-converged", _not_converged, EXIT_NOT_CONVERGED, ("no-results", "iterate", "first-values", "take-out")),
+    Rule(
+        "not-converged",
+        _not_converged,
+        EXIT_NOT_CONVERGED,
+        ("no-results", "iterate", "first-values", "take-out"),
+    ),
     Rule(
         "undetermined",
         _listing("undetermined", "names", "undetermined"),
