@@ -108,6 +108,13 @@ def test_what_is_barely_rejected_is_a_warning():
     assert result.verdict.exit_code(strict=True) == 4
 
 
+def test_single_tests_and_the_joint_test_share_the_level():
+    (single,) = (
+        each for each in adjust(block()).verdict.tests if getattr(each.kind, "code", "") == "test.checks"
+    )
+    assert (single.tests, single.level) == (8, pytest.approx(0.05 / 2 / 8))
+
+
 def test_their_own_standard_deviations_count():
     one = spoiled(block())
     assert adjust(with_sd(one, 0.01)).verdict.exit == 4

@@ -198,7 +198,10 @@ def duplicates(block: Block, factor: float = 1.0) -> list[Phrase]:
 
     `factor` is the factor of the given standard deviations that the residuals indicate.
     """
-    limit = EQUAL * min(factor, 1.0) * float(np.median(block.image_sd)) if len(block.image_xy) else 0.0
+    if not len(block.image_xy):
+        return []
+    # A factor that is not a number does not count.
+    limit = EQUAL * (factor if factor < 1.0 else 1.0) * float(np.median(block.image_sd))
     messages = []
     for name, owners, others, ids, fewest in (
         ("photos", block.image_photos, block.image_points, block.photo_ids, FEWEST),
@@ -216,15 +219,11 @@ def _equal_pairs(
 ) -> list[tuple[int, int]]:
     """Return pairs of owners whose observations are mostly equal within a limit."""
     # Sums of different coordinates on one photo, or of one point, are rarely near each other.
-    sums = xy[:, 0] + xy[:, 1] / np.pi
-    low = float(sums.min(initial=0.0))
-    keys = others * (2.0 * (float(sums.max(initial=0.0)) - low) + 1.0) + (sums - low)
-    if np.count_nonzero(np.diff(np.sort(keys)) <= 2 * limit) < fewest:
-        return []
+    keys = xy[:, 0] + xy[:, 1] / np.pi
+    keys += others * (2.0 * float(np.ptp(keys)) + 1.0)
     order = np.argsort(keys)
-    first, second = order[:-1], order[1:]
     near = np.flatnonzero(np.diff(keys[order]) <= 2 * limit)
-    first, second = first[near], second[near]
+    first, second = order[near], order[near + 1]
     equal = (np.abs(xy[first] - xy[second]) <= limit).all(axis=1) & (others[first] == others[second])
     pairs = np.sort(np.column_stack([owners[first[equal]], owners[second[equal]]]), axis=1)
     if not len(pairs):

@@ -17,7 +17,7 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Findings, Systematic, Tested, Text
+from photogram.statistics.findings import Agreement, Findings, Systematic, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
@@ -199,12 +199,17 @@ class Evidence:
         alike = NOTABLE_FACTOR <= robust <= self.factor <= NOTABLE_FACTOR * robust
         return self.factor if alike else max(robust, 1.0)
 
+    def _of_each_check(self, checks: Agreement, level: float) -> float:
+        """Return the level of the test of each check point; the joint test has the other half."""
+        part = 1.0 if checks.together is None else 0.5
+        return bonferroni(part * level, self._count(checks.points))
+
     def disagreement(self, level: float) -> list[Phrase]:
         """Return check points that disagree at a level, singly or together."""
         checks = self.found.checks
         if checks is None:
             return []
-        beyond = checks.points.beyond(bonferroni(level, self._count(checks.points)))
+        beyond = checks.points.beyond(self._of_each_check(checks, level))
         if beyond:
             return [checks.difference(place) for _, place in sorted(beyond)]
         test = checks.together
@@ -299,12 +304,12 @@ class Evidence:
         whole = [] if self.test is None else [_whole(self.test)]
         largest = [_largest(each, self.level, self.number) for each in self.found.observations]
         if (checks := self.found.checks) is not None:
-            number = self._count(checks.points)
             if checks.together is not None:
                 whole.append(
                     replace(_whole(checks.together), kind=Phrase("test.checks_together"), statistic="T/m")
                 )
-            largest.append(_largest(checks.points, bonferroni(self.found.level, number), number))
+            own = self._of_each_check(checks, self.found.level)
+            largest.append(_largest(checks.points, own, self._count(checks.points)))
         patterns = [_of_pattern(each) for each in self.found.systematic]
         return [*whole, *(each for each in largest if each is not None), *patterns]
 
