@@ -12,7 +12,7 @@ import pytest
 import photogram
 from message_codes import refused
 from photogram import InputError, formats
-from photogram.cli.options import default_out
+from photogram.cli.job import default_out
 from photogram.formats import crs
 from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
