@@ -161,15 +161,11 @@ class Reliability:
         """(G,) whether own residuals cannot detect errors in any direction."""
         return np.asarray(self.tests.active & ~(self.tests.least > TESTABLE))
 
-    @cached_property
-    def _effects(self) -> Floats:
-        """(M, 9) effects of an error of one standard deviation on its own point and photo."""
-        return self.trial.core.effects(list(range(len(self.suspects))))
-
     @property
     def own_point_effect(self) -> Floats:
         """(M, 3) effect of a detectable error on the own point; NaN without one."""
-        return np.asarray(self._effects[:, :3] * (self.detectable / self.sd)[:, np.newaxis])
+        effects = self.trial.core.effects(list(range(len(self.suspects))))[:, :3]
+        return np.asarray(effects * (self.detectable / self.sd)[:, np.newaxis])
 
     def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
         """Return effects of detectable errors of the worst group rows on their points.

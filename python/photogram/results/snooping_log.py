@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from photogram import _photocore
 from photogram.arguments.types import Bools
@@ -13,9 +13,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.network_trial import KINDS, LostSupportError, Out, Standing, Tests
 from photogram.results.snooping_options import SnoopOptions
 from photogram.words import Phrase, phrase
-
-if TYPE_CHECKING:
-    from photogram.results.network_trial import NamedSuspects, NetworkTrial
 
 LN10 = math.log(10)
 MAX_ROWS = 1500  # Largest number of rows for the complete R; an exact round has this number of solutions

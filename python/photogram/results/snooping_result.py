@@ -385,6 +385,8 @@ def log_table(log: Sequence[Removal]) -> Table:
         [members(one, "name", T="statistic") | members(one, "dimension", "odds") for one in each.rivals]
         for each in log
     ]
+    states = ["out" if each.returned is None else f"back in round {each.returned}" for each in log]
+    states = [f"kept: {each.kept}" if each.kept else state for each, state in zip(log, states, strict=True)]
     columns = [
         of_each(log, "round", head="Round", decimals=0),
         of_each(log, "kind", kind="name"),
@@ -403,7 +405,7 @@ def log_table(log: Sequence[Removal]) -> Table:
         of_each(log, "returned"),
         Quantity([str(each.kept) or None for each in log], member="kept"),
         Quantity([rivals_of(each.rivals[:3], 2) for each in log], kind="name", head="Or instead"),
-        Quantity([*map(_state, log)], kind="name", head="Now"),
+        Quantity(states, kind="name", head="Now"),
     ]
     return Table("log", "In order", columns)
 
@@ -421,12 +423,6 @@ def _tests_table(log: Sequence[Removal]) -> Table:
         of_each(log, "prediction_log10_p", head="log10 p", decimals=1),
     ]
     return Table("removed-tests", "Tests", columns)
-
-
-def _state(each: Removal) -> str:
-    if each.kept:
-        return f"kept: {each.kept}"
-    return "out" if each.returned is None else f"back in round {each.returned}"
 
 
 _STANDING = ("status", "weighted_sum_of_squares", "degrees_of_freedom")

@@ -146,6 +146,10 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     missing = np.einsum("iab,ib->ia", (turn != 0).astype(float), np.isnan(differences).astype(float)) > 0
     differences = np.where(missing, np.nan, np.einsum("iab,ib->ia", turn, np.nan_to_num(differences)))
     sd = _survey(block, rows, differences, names, asked.sd)
+    survey = np.diag(np.nan_to_num(sd).ravel() ** 2)
+    if not asked.survey_common_in_control:  # The common error cancels otherwise
+        for k, common in enumerate((np.isfinite(sd) * np.array(asked.survey_common_sd)).T):
+            survey[k::3, k::3] += np.outer(common, common)
     joint = covariances.covariance(("point", names)) if names else np.zeros((0, 0))
     if block.geographic or block.frame.kind == "geocentric":
         joint = turned_jointly(turn, joint)
@@ -161,7 +165,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         places=plan_positions(block, result.point_positions[rows]),
         differences=differences,
         product=joint,
-        survey=_survey_covariance(sd, asked),
+        survey=survey,
         survey_sd=sd,
         common_sd=np.array(asked.survey_common_sd),
         scale=result.covariance_scale,
@@ -239,16 +243,6 @@ def _survey(
         without = [name for name, lacks in zip(names, lacking.tolist(), strict=True) if lacks]
         raise InputError(phrase("request.survey", points=without))
     return np.where(known, own, np.nan)
-
-
-def _survey_covariance(sd: Floats, asked: Asked) -> Floats:
-    """Return S: point variances, and the common error unless it cancels."""
-    known = np.nan_to_num(sd).ravel()
-    survey = np.diag(known**2)
-    if not asked.survey_common_in_control:
-        for k, common in enumerate((np.isfinite(sd) * np.array(asked.survey_common_sd)).T):
-            survey[k::3, k::3] += np.outer(common, common)
-    return survey
 
 
 def _control_positions(block: Block) -> dict[str, Floats]:

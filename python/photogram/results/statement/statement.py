@@ -47,13 +47,6 @@ class RemovedObservation:
         return str(self.subject)
 
 
-def removed_observations(result: Result, earlier: Sequence[Phrase | str]) -> tuple[RemovedObservation, ...]:
-    """Return all removed observations, with those removed `earlier`."""
-    snooped = () if result.snooped is None else [each["subject"] for each in result.snooped.removed]
-    of_reason = {"snooping": snooped, "first values": result.set_aside, "earlier": earlier}
-    return tuple(RemovedObservation(name, reason) for reason, names in of_reason.items() for name in names)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Statement(Brief):
     """An accuracy statement for a client: figures, standards, methods, assumptions.
@@ -299,6 +292,8 @@ def statement(
         result, quantities, covariances, coverage=options.coverage, components=options.components
     )
     lengths = by_standard.tested_lengths(result, options) if options.lengths else None
+    snooped = () if result.snooped is None else [each["subject"] for each in result.snooped.removed]
+    of_reason = {"snooping": snooped, "first values": result.set_aside, "earlier": removed}
     # Given positions with both plan coordinates.
     checks = found.given_places[np.isfinite(found.given[:, :2]).all(axis=1)]
     control = comparison.control_places(result.block)
@@ -325,7 +320,7 @@ def statement(
             else [],
         ),
         layout=layout(checks, np.concatenate([checks, control]), control) if len(checks) else None,
-        removed=removed_observations(result, removed),
+        removed=tuple(RemovedObservation(name, why) for why, names in of_reason.items() for name in names),
         survey=comparison.surveyed(result, found, system),
         inputs=tuple(inputs),
         command=command,
