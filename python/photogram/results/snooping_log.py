@@ -10,7 +10,15 @@ from typing import Any
 from photogram import _photocore
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.network_trial import KINDS, LostSupportError, Out, Standing, Tests
+from photogram.results.network_trial import (
+    KINDS,
+    LostSupportError,
+    NamedSuspects,
+    NetworkTrial,
+    Out,
+    Standing,
+    Tests,
+)
 from photogram.results.snooping_options import SnoopOptions
 from photogram.words import Phrase, phrase
 
