@@ -178,8 +178,8 @@ pub struct Minimum {
     pub coordinate: Option<(usize, usize)>,
 }
 
-/// Screens that may exclude points and photos during the adjustment, see [`Reason`]. Each is on by default; if it is off, the points and
-/// photos remain.
+/// Screens that may exclude points and photos during the adjustment, see [`super::Reason`]. Each is on by default; if it is off, the points
+/// and photos remain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Screens {
     /// Points and photos that their images do not determine, if these are few.

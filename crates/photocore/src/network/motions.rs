@@ -1,7 +1,7 @@
 //! Effect of similarity transformations of the network on shared parameters and trajectories.
 //!
-//! A transformation displaces the position C(t) of a trajectory and rotates its attitude A(t). The coefficients follow by least squares over
-//! the times of images and records, as far as their basis functions allow. The remainder distinguishes the transformation from datum
+//! A transformation displaces the position C(t) of a trajectory and rotates its attitude A(t). The coefficients follow by least squares
+//! over the times of images and records, as far as their basis functions allow. The remainder distinguishes the transformation from datum
 //! defects ([`crate::adjustment::Motions`]).
 
 use std::collections::BTreeMap;

@@ -23,8 +23,8 @@ impl Unseen {
     }
 }
 
-/// Returns the squared distances of the active points from the nearest station, and the impossible images. Counts the rays behind the camera
-/// in the adjusted points.
+/// Returns the squared distances of the active points from the nearest station, and the impossible images. Counts the rays behind the
+/// camera in the adjusted points.
 pub(super) fn find_unseen(
     Assembled { problem, points, .. }: &Assembled,
     unknowns: &[f64],
