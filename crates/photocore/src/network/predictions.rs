@@ -185,7 +185,7 @@ impl Trial {
                 let identity = |k: usize| f64::from(u8::from(k / count == k % count));
                 let cofactors =
                     leverages.iter().enumerate().map(|(k, leverage)| identity(k) - leverage).collect();
-                OnPoint { suspects: self.on_place(*place).to_vec(), residual, cofactors }
+                OnPoint { suspects: self.on_place[*place].clone(), residual, cofactors }
             })
         };
         Ok(threads.install(|| parallel::map(all.len(), AT_LEAST, of)))
@@ -211,7 +211,7 @@ impl Trial {
                 let (rows, observed) = self.rows_at(place, &self.observation_sd, found, &terms);
                 let cofactors = sub(&own, own.len().isqrt(), &rows);
                 let residual = cofactors.chunks_exact(rows.len()).map(|row| dot(row, &observed)).collect();
-                OnPoint { suspects: self.on_place(place).to_vec(), residual, cofactors }
+                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
             })
         };
         Ok(points.iter().map(of).collect())
@@ -224,7 +224,7 @@ impl Trial {
 
     /// Returns the equations of observed coordinates of a local point.
     fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<f64> {
-        let mut own = self.on_place(place).iter().map(|&index| &self.suspects.all[index]);
+        let mut own = self.on_place[place].iter().map(|&index| &self.suspects.all[index]);
         let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
         let all: Vec<usize> = (0..suspect.rows.len()).collect();
         self.term_rows(suspect, &all, terms).transpose().as_slice().to_vec()
@@ -241,7 +241,7 @@ impl Trial {
         let problem = &self.assembled.problem;
         let groups = problem.layout().groups_of(place);
         let (mut rows, mut off) = (vec![], vec![]);
-        for &index in self.on_place(place) {
+        for &index in &self.on_place[place] {
             let suspect = &self.suspects.all[index];
             let first = match suspect.home {
                 Home::Group { group, .. } => 2 * (group - groups.start),

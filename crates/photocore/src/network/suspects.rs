@@ -116,26 +116,6 @@ impl Suspects {
         &self.row_starts
     }
 
-    /// Returns the groups of all local points, point by point, and the first one of each point.
-    pub(super) fn on_places(&self, locals: usize) -> (Vec<usize>, Vec<usize>) {
-        let place = |suspect: &Suspect| match suspect.home {
-            Home::Group { point, .. } => Some(point),
-            Home::Point(place) => Some(place).filter(|&place| place < locals),
-            Home::Tie(_) | Home::Block(_) => None,
-        };
-        let mut starts = vec![0; locals + 1];
-        self.all.iter().filter_map(place).for_each(|place| starts[place + 1] += 1);
-        (0..locals).for_each(|k| starts[k + 1] += starts[k]);
-        let (mut next, mut all) = (starts.clone(), vec![0; starts[locals]]);
-        for (index, suspect) in self.all.iter().enumerate() {
-            if let Some(place) = place(suspect) {
-                all[next[place]] = index;
-                next[place] += 1;
-            }
-        }
-        (all, starts)
-    }
-
     /// Returns the component of each row.
     pub fn components(&self) -> impl Iterator<Item = usize> {
         self.all.iter().flat_map(|suspect| suspect.rows.iter().map(|&(_, component)| component))

@@ -25,8 +25,8 @@ pub struct Trial {
     pub(super) sd: Vec<f64>,
     /// Index of each active point in the model.
     pub(super) place: Vec<Option<usize>>,
-    /// Test groups of all local points, point by point, and the first one of each point.
-    on_places: (Vec<usize>, Vec<usize>),
+    /// Test groups of each local point.
+    pub(super) on_place: Vec<Vec<usize>>,
     pub(super) camera_of_photo: Vec<usize>,
     /// Parameters fixed as a minimal datum at the end of the adjustment.
     pub(super) held: Vec<usize>,
@@ -131,7 +131,15 @@ impl Trial {
             block_starts.push(block_starts[block_starts.len() - 1] + suspect.rows.len().pow(2));
         }
         let place = assembled.places(network.points.len());
-        let on_places = suspects.on_places(assembled.problem.model.locals);
+        let locals = assembled.problem.model.locals;
+        let mut on_place: Vec<Vec<usize>> = vec![vec![]; locals];
+        for (index, suspect) in suspects.all.iter().enumerate() {
+            match suspect.home {
+                Home::Group { point, .. } => on_place[point].push(index),
+                Home::Point(place) if place < locals => on_place[place].push(index),
+                _ => {}
+            }
+        }
         let mut own = *options;
         if let Method::Full(_) = own.method {
             own.method = Method::default();
@@ -144,7 +152,7 @@ impl Trial {
             suspects: Arc::new(suspects),
             block_starts,
             place,
-            on_places,
+            on_place,
             camera_of_photo: network.photos.iter().map(|photo| photo.camera).collect(),
             held,
             stands: found.is_some(),
@@ -319,12 +327,6 @@ impl Trial {
 
     pub(super) fn found(&self) -> Result<&Leverages, NetworkError> {
         self.found.as_ref().ok_or(NetworkError::State)
-    }
-
-    /// Returns the test groups of a local point.
-    pub(super) fn on_place(&self, place: usize) -> &[usize] {
-        let (all, starts) = &self.on_places;
-        &all[starts[place]..starts[place + 1]]
     }
 
     /// Returns the prior terms of the parameters, with given standard deviations.

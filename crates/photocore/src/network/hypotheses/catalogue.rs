@@ -91,13 +91,12 @@ impl<'a> Catalogue<'a> {
         columns
     }
 
-    /// Adds an error of some observations as a parameter; its column.
-    pub fn add_single(&mut self, error: &[(EquationOf, f64)]) -> usize {
+    /// Adds an error of some observations as a parameter.
+    pub fn add_single(&mut self, error: &[(EquationOf, f64)]) {
         for &(of, value) in error {
             self.single.entry(of).or_default().push((self.count, value));
         }
         self.count += 1;
-        self.count - 1
     }
 
     /// Displaces an unknown, as some observations see it, with a parameter.

@@ -51,8 +51,7 @@ impl Trial {
         let worst = worst(&singles, facts);
 
         let mut catalogue = catalogue(self, found, facts);
-        let columns_of_worst: Vec<usize> =
-            worst.iter().map(|&k| catalogue.add_single(&singles[k].error)).collect();
+        worst.iter().for_each(|&k| catalogue.add_single(&singles[k].error));
         let sums = linearized.additional(problem, &catalogue, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
@@ -85,11 +84,10 @@ impl Trial {
             });
             columns.push(own);
         }
-        let sets = all.len();
-        errors.extend(columns_of_worst.iter().map(|&column| {
-            let unit = |k: usize, _| f64::from(u8::from(k == column));
-            DVector::from_fn(sums.score.len(), unit)
-        }));
+        let (sets, count) = (all.len(), sums.score.len());
+        // The last parameters are errors of unit size.
+        let unit = |column: usize| DVector::from_fn(count, |k, _| f64::from(u8::from(k == column)));
+        errors.extend((count - worst.len()..count).map(unit));
         let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
         let effect = |error: usize| {
             let single = error.checked_sub(sets).map(|k| &singles[worst[k]]);
