@@ -10,7 +10,9 @@ use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
 use super::in_block::InBlock;
 use super::mounts::{AT_PHOTO, Mounts};
-use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
+use super::observations::{
+    CommonSite, LOCAL, Linear, PhotoSite, PointSite, TiedModel, TiedObservation, Touches,
+};
 use super::parts::Parts;
 use super::passages::Passages;
 use super::selection::PointImages;
@@ -23,9 +25,9 @@ use crate::geometry::{
 use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
 use crate::parallel;
 
-/// Model of a network. Local blocks are the points without additional observations. Retained blocks are, in this order, photos (pose and
-/// own free camera), shared cameras, shared parameters, and all other points. Image observations of these points and additional
-/// observations are the ties, in this order.
+/// Model of a network. Local blocks are the points that no observation connects with other objects. Retained blocks are, in this order,
+/// photos (pose and own free camera), shared cameras, shared parameters, and all other points. Image observations of these points and
+/// additional observations are the ties, in this order; an observation of a local point alone is a tie of its local block.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
@@ -59,7 +61,10 @@ pub struct Bundle {
     pub images_on: Vec<usize>,
     /// Photos with steps by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
+    /// Additional observations, last those of single local points.
     pub observations: Vec<TiedObservation>,
+    /// Equations of these last observations in rectangular space, if they are computed.
+    pub linear: Vec<Linear>,
     /// Datum information of the network and the user.
     pub datum: GivenDatum,
     pub screens: Screens,
@@ -140,18 +145,19 @@ impl Bundle {
             let point = self.point_of(image);
             let others = self.blocks_of_image(image);
             let blocks = std::iter::once(self.block_of_point(point)).chain(others);
-            Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
+            Tie { rows: 2, local: None, retained: blocks.map(|block| block as u32).collect() }
         });
-        let observations = self.observations.iter().map(|tied| Tie {
-            rows: tied.root.nrows(),
-            retained: tied.blocks.iter().map(|&block| block as u32).collect(),
+        let observations = self.observations.iter().map(|tied| {
+            let (rows, local) = (tied.root.nrows(), tied.local().map(|point| point as u32));
+            let retained = tied.blocks.iter().filter(|_| local.is_none()).map(|&block| block as u32);
+            Tie { rows, local, retained: retained.collect() }
         });
         images.chain(observations).collect()
     }
 
-    /// Returns the retained block of a point that is not local.
+    /// Returns the retained block of a point; [`LOCAL`] for a local one.
     fn block_of_point(&self, point: usize) -> usize {
-        self.stations() + point - self.locals
+        point.checked_sub(self.locals).map_or(LOCAL, |tied| self.stations() + tied)
     }
 
     /// Returns the number of parameters of a retained block.
@@ -220,7 +226,7 @@ impl Bundle {
     pub(super) fn with_tied<T>(&self, stations: &Stations, take: impl FnOnce(&TiedModel<'_>) -> T) -> T {
         let point = |point: usize| PointSite {
             point: stations.points[point],
-            coordinates: stations.tied[point - self.locals],
+            coordinates: stations.coordinates[point],
             block: self.block_of_point(point),
         };
         let mounted = stations.bent.as_ref().and_then(|bent| bent.mounted.as_ref());
@@ -389,22 +395,16 @@ impl Bundle {
     /// Evaluates photos, points and shared parameters at given parameter values.
     pub fn evaluated(&self, unknowns: &[f64]) -> Stations {
         let photos = &unknowns[self.of_stations()];
-        let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
-        let tied = tied.as_chunks().0.to_vec();
+        let (local, tied) = self.all_coordinates(unknowns);
         let Placed { photos: stations, commons, mounted, films } = self.placed(photos);
         let refracted = self.refraction.map(|refraction| Refracted {
             refraction,
             at_photos: self.verticals_at_photos(&refraction, photos, &stations),
-            at_points: verticals(
-                &refraction,
-                self.space,
-                local.chunks(3).chain(tied.as_flattened().chunks(3)),
-            ),
+            at_points: verticals(&refraction, self.space, local.iter().chain(tied)),
         });
         let plain = refracted.is_none() && mounted.is_none() && self.passages.is_empty();
         let bent = (!plain).then_some(Bent { refracted, mounted, films });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
-        let local: &[[f64; 3]] = local.as_chunks().0;
         let mut points = if self.passages.have_figures() {
             let shift = |point| self.passages.shift(point, |common| commons[common].vector());
             let shifted = |point| place(&(Vector3::from(local[point]) + shift(point)).into());
@@ -413,15 +413,16 @@ impl Bundle {
             parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]))
         };
         points.extend(tied.iter().map(place));
-        Stations { photos: stations, points, tied, commons, bent }
+        let coordinates = if self.observations.is_empty() { vec![] } else { [local, tied].concat() };
+        Stations { photos: stations, points, coordinates, commons, bent }
     }
 }
 
-/// Returns the verticals at positions, the first three parameters of each.
+/// Returns the verticals at positions.
 fn verticals<'a>(
     refraction: &Refraction,
     space: ObjectSpace,
-    unknowns: impl Iterator<Item = &'a [f64]>,
+    positions: impl Iterator<Item = &'a [f64; 3]>,
 ) -> Vec<Vertical> {
-    unknowns.map(|values| refraction.vertical(space, std::array::from_fn(|k| values[k]))).collect()
+    positions.map(|&position| refraction.vertical(space, position)).collect()
 }

@@ -15,8 +15,8 @@ use crate::normals::GroupRows;
 pub struct Stations {
     pub photos: Vec<Station>,
     pub points: Vec<geometry::Point>,
-    /// Coordinates of the points that are not local.
-    pub tied: Vec<[f64; 3]>,
+    /// Coordinates of the points if there are additional observations, otherwise empty.
+    pub coordinates: Vec<[f64; 3]>,
     pub commons: Vec<CommonState>,
     pub bent: Option<Bent>,
 }

@@ -85,6 +85,7 @@ pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
 pub use dense::take_product_buffers;
 pub use equation_block::LocalCofactors;
+pub(crate) use equations::TieBuffer;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
 pub use error::SystemError;
 pub use factor::Factor;

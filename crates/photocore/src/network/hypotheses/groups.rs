@@ -13,6 +13,7 @@ use super::hypothesis::{About, Hypothesis};
 use super::judged::{Criteria, Judged};
 use crate::Threads;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Linearized, Shared};
+use crate::normals::Layout;
 
 /// Size of an error that is reported if no error of any size is detected, in standard deviations of its observation.
 const LARGE: f64 = 1000.0;
@@ -69,7 +70,7 @@ pub(super) fn single_errors(
         (0..all.len()).filter(|&k| is_whole(&all[k]) && all[k].judged.bias_to_noise > facts.limit).collect();
     solved.sort_by(|&i, &j| all[j].judged.bias_to_noise.total_cmp(&all[i].judged.bias_to_noise));
     solved.truncate(facts.effects);
-    let columns = UnitErrors::new(solved.iter().map(|&k| &errors[k].1), trial.assembled.problem.model.locals);
+    let columns = UnitErrors::new(solved.iter().map(|&k| &errors[k].1), trial.assembled.problem.layout());
     let problem = &trial.assembled.problem;
     let sums = linearized.additional(problem, &columns, threads);
     let count = solved.len();
@@ -107,7 +108,7 @@ struct UnitErrors {
 }
 
 impl UnitErrors {
-    fn new<'e>(errors: impl Iterator<Item = &'e Error>, locals: usize) -> Self {
+    fn new<'e>(errors: impl Iterator<Item = &'e Error>, layout: &Layout) -> Self {
         let (mut count, mut columns): (usize, HashMap<EquationOf, Vec<(usize, f64)>>) = (0, HashMap::new());
         for error in errors {
             for &(of, value) in error {
@@ -116,9 +117,9 @@ impl UnitErrors {
             count += 1;
         }
         let of = |of: &EquationOf| match *of {
-            EquationOf::Unknown(unknown) if unknown < 3 * locals => Some(unknown / 3),
+            EquationOf::Unknown(unknown) => Some(unknown / 3).filter(|&local| local < layout.locals()),
             EquationOf::Group { local, .. } => Some(local),
-            _ => None,
+            EquationOf::Tie { tie, .. } => layout.ties()[tie].local.map(|local| local as usize),
         };
         let mut locals: Vec<usize> = columns.keys().filter_map(of).collect();
         locals.sort_unstable();
