@@ -110,7 +110,7 @@ class Columns:
         for name, known in parts.items():
             column: Sequence[tuple[Any, ...]] = table[name]
             try:
-                flat = [known[one] for row in column for one in row]
+                flat = [known[one] for row in column for one in row] if column[0] else []
             except KeyError as error:
                 number = next(number for number, row in enumerate(column) if error.args[0] in row)
                 what = f"observation {self.objects[number].name}"

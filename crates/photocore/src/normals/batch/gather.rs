@@ -13,9 +13,9 @@ impl Batch {
         self.place(system, units);
         self.own.clear();
         if system.layout.has_local_ties() && !self.apart {
-            let own = self.locals.iter();
-            let own = own.map(|&local| TieSums::of(equations, &system.layout, local as usize, &mut self.tie));
-            self.own.extend(own);
+            let mut buffer = TieBuffer::default();
+            let of = |&local: &u32| TieSums::of(equations, &system.layout, local as usize, &mut buffer);
+            self.own.extend(self.locals.iter().map(of));
         }
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
         let (depth, incidence) = (self.locals.len(), &system.incidence);

@@ -11,7 +11,6 @@ use std::ops::Range;
 
 use smallvec::SmallVec;
 
-use super::equations::TieBuffer;
 use super::front::Strip;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
@@ -178,7 +177,6 @@ pub(super) struct Batch {
     spans: Vec<(usize, Range<usize>)>,
     /// Normal equations of the ties of each local block; empty if no tie is local.
     own: Vec<TieSums>,
-    tie: TieBuffer,
     constants: Vec<f64>,
     local_rows: Vec<f64>,
     retained_rows: Vec<f64>,
