@@ -432,3 +432,47 @@ def test_a_block_checks_the_changed_fields(example):
         with raises(InputError, code):
             block.replace(**change)
     assert block.replace(**fewer, image_sd=block.image_sd[1:]).observation_groups[0][0] == groups[0][0]
+
+
+def test_observations_of_single_points_are_eliminated_with_them_without_another_result():
+    simulation = simulate(strips=2, photos_per_strip=3, seed=4)
+    block, rng = simulation.block, np.random.default_rng(4)
+    positions = adjust(block).point_positions
+    free = np.flatnonzero(np.isinf(block.point_sd).all(axis=1) & np.isfinite(positions).all(axis=1))[:60]
+    roots = 0.2 * (np.eye(3) + np.tril(rng.uniform(-0.5, 0.5, (60, 3, 3)), -1))
+    names = [block.point_ids[point] for point in free]
+    control = Control.from_arrays(
+        point=names,
+        position=positions[free] + np.einsum("nij,nj->ni", roots, rng.normal(size=(60, 3))),
+        covariance=roots @ roots.transpose(0, 2, 1),
+    )
+    # Distances of almost no weight connect the points: then they are not eliminated first.
+    weak = Distance.from_arrays(first=names[:-1], second=names[1:], length=100.0, sd=1e9)
+    alone = adjust(block.replace(observations=[control]))
+    connected = adjust(block.replace(observations=[control, weak]))
+    assert alone.degrees_of_freedom + len(weak) == connected.degrees_of_freedom
+    for name, scale in {
+        "photo_positions": connected.photo_sd[:, :3],
+        "point_positions": connected.point_sd,
+        "photo_cofactors": None,
+        "point_cofactors": None,
+        "residuals": block.image_sd,
+        "redundancy": 1.0,
+        "standardized": 1.0,
+    }.items():
+        found, expected = getattr(alone, name), getattr(connected, name)
+        off = np.abs(found - expected) / (np.nanmax(np.abs(expected)) if scale is None else scale)
+        assert np.nanmax(off) < 1e-6, name
+    for name in ("sd", "residuals", "redundancy", "standardized", "squares", "weights"):
+        found, expected = (getattr(each.kinds["control"], name) for each in (alone, connected))
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-8, err_msg=name)
+    assert alone.kinds["control"].names == names
+    first, second = (each.reliability() for each in (alone, connected))
+    groups = len(first.tests.statistic)
+    assert groups + len(weak) == len(second.tests.statistic)
+    for name in ("statistic", "least"):
+        found, expected = (getattr(each.tests, name)[:groups] for each in (first, second))
+        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6, err_msg=name)
+    once, twice = (adjust(alone.block, threads=count) for count in (1, 2))
+    assert np.array_equal(once.point_cofactors, twice.point_cofactors)
+    assert np.array_equal(once.kinds["control"].redundancy, twice.kinds["control"].redundancy)

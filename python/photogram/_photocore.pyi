@@ -1828,13 +1828,12 @@ class BlockSolution(_NetworkSolution):
         """Sums of the redundancy numbers of the same types; None without covariances."""
 
     @property
-    def adjusted_observations(
-        self,
-    ) -> list[tuple[list[float], list[float], list[float], float, float] | None]:
-        """Results of each observation, in the order of the groups.
+    def adjusted_observations(self) -> tuple[_Indices, _Floats, _Floats]:
+        """Results of the n observations, in the order of the groups.
 
-        Residuals, redundancy numbers and standardized residuals of its components, in the units of its type;
-        its weighted square; the factor of its weight by a loss. None for observations of excluded points.
+        (n,) numbers of components, zero for observations of excluded points; (3, r) residuals, redundancy
+        numbers and standardized residuals of all components in sequence, in the units of their types; (2, n)
+        weighted squares, and factors of the weights by a loss, NaN for observations of excluded points.
         """
 
     @property

@@ -139,7 +139,7 @@ const ALL: [Ordering; 6] = [
 ];
 
 /// Random systems: local blocks of 1 to 3 unknowns, retained blocks of 1 to 7, optionally a shared one. Observations of a local block may
-/// repeat a retained block and have two further ones; constraints join up to three blocks and the shared one.
+/// repeat a retained block and have two further ones; constraints join up to three blocks and the shared one, or belong to a local block.
 fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
     let blocks = (prop::collection::vec(1..8usize, 1..12), 0..4usize);
     let shape = (1..4usize, 1..3usize, blocks, 0..5usize);
@@ -154,24 +154,36 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
             let groups = prop::collection::vec(prop::collection::vec((main, further), 0..5), 1..25);
             let tied = prop::collection::btree_set(0..retained.len() as u32, 0..4);
             let ties = prop::collection::vec((1..4usize, tied, any::<bool>()), 0..6);
+            let of_locals = prop::collection::vec((1..4usize, any::<prop::sample::Index>()), 0..6);
             (
                 Just((l, rows, retained, shared)),
                 groups,
-                ties,
+                (ties, of_locals),
                 any::<u64>(),
                 prop::sample::select(ALL.to_vec()),
             )
         })
-        .prop_map(|((l, rows, mut retained, shared), locals, ties, seed, ordering)| {
+        .prop_map(|((l, rows, mut retained, shared), locals, (ties, of_locals), seed, ordering)| {
             let last = retained.len() as u32;
             retained.extend((shared > 0).then_some(shared));
             // Constraints and observations use an order different from the order of the blocks.
             let blocks = |own: BTreeSet<u32>, too: bool| -> Vec<u32> {
                 own.into_iter().rev().chain((shared > 0 && too).then_some(last)).collect()
             };
-            let tie =
-                |(rows, own, too): (usize, BTreeSet<u32>, bool)| Tie { rows, retained: blocks(own, too) };
-            let ties = ties.into_iter().map(tie).filter(|tie| !tie.retained.is_empty()).collect();
+            let tie = |(rows, own, too): (usize, BTreeSet<u32>, bool)| Tie {
+                rows,
+                local: None,
+                retained: blocks(own, too),
+            };
+            let of_local = |(rows, local): &(usize, prop::sample::Index)| Tie {
+                rows: *rows,
+                local: Some(local.index(locals.len()) as u32),
+                retained: vec![],
+            };
+            let of_locals: Vec<Tie> = of_locals.iter().map(of_local).collect();
+            let (first, last_ties) = of_locals.split_at(of_locals.len() / 2);
+            let ties = ties.into_iter().map(tie).filter(|tie| !tie.retained.is_empty());
+            let ties = first.iter().cloned().chain(ties).chain(last_ties.iter().cloned()).collect();
             let mut ptr = vec![0];
             for groups in &locals {
                 ptr.push(ptr[ptr.len() - 1] + groups.len());
@@ -594,7 +606,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
 }
 
 fn same_bits(plain: Layout) {
-    let tie = |k: u32| Tie { rows: 2, retained: vec![k, k + 40, 7] };
+    let tie = |k: u32| Tie { rows: 2, local: None, retained: vec![k, k + 40, 7] };
     same_bits_of(&Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3));
 }
 
@@ -683,13 +695,17 @@ fn layouts_that_contradict_themselves_are_refused() {
         assert!(two.clone().with_shared(ptr, blocks).is_err());
     }
     let refused = |rows, retained: &[u32]| {
-        layout.clone().with_ties(vec![Tie { rows, retained: retained.to_vec() }]).is_err()
+        layout.clone().with_ties(vec![Tie { rows, local: None, retained: retained.to_vec() }]).is_err()
     };
     assert!(refused(1, &[1]));
     assert!(refused(1, &[0, 0]));
     assert!(refused(1, &[]));
     assert!(refused(0, &[0]));
     assert!(!refused(1, &[0]));
+    let of_local = |local, retained| {
+        layout.clone().with_ties(vec![Tie { rows: 1, local: Some(local), retained }]).is_err()
+    };
+    assert!(of_local(1, vec![]) && of_local(0, vec![0]) && !of_local(0, vec![]));
 }
 
 #[test]
@@ -765,7 +781,7 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
 #[test]
 fn ties_alone_are_a_system() {
     let layout = Layout::new(1, 1, &[1; 6], vec![0], vec![]).unwrap();
-    let tie = |k: u32| Tie { rows: 1, retained: vec![k, (k + 1) % 6] };
+    let tie = |k: u32| Tie { rows: 1, local: None, retained: vec![k, (k + 1) % 6] };
     let dense = Dense::new(layout.with_ties((0..6).map(tie).collect()).unwrap(), 9);
     for ordering in ALL {
         compare_with_dense(&dense, ordering);

@@ -889,6 +889,62 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert!(weights.iter().any(|&weight| weight < 1.0), "{weights:?}");
 }
 
+/// Returns a network with observations of single points, connected by distances of almost no weight if `connected`.
+fn of_single_points(connected: bool) -> Network {
+    let mut network = images_alone();
+    let control = |point: usize| -> Observation {
+        let coordinates = std::array::from_fn(|k| place(point)[k] + 0.002 * noise(70 + point + k));
+        Control { point, coordinates, precision: covariance(&[0.002, 0.003, 0.002]) }.into()
+    };
+    network.points[3] = Point { coordinates: place(3), sd: [0.002, f64::INFINITY, 0.003] };
+    network.points[4] = Point { coordinates: place(4), sd: [0.0; 3] };
+    let level = Common::vector(CommonKind::Level, [0.0, 0.0, place(6)[2]], &[0.0]);
+    network.commons.push(level);
+    network.observations = [0, 1, 2, 3, 4, 7, 1].map(control).to_vec();
+    network.observations.push(OnLevel { point: 6, level: 0, difference: 0.0, sd: 0.004 }.into());
+    if connected {
+        let weak = |k: usize| Distance { points: [k, k + 1], length: 1.0, sd: 1e9, instrument: None }.into();
+        network.observations.extend((0..7).map(weak));
+    }
+    network
+}
+
+#[test]
+fn observations_of_single_points_give_the_same_as_with_connections() {
+    for loss in [None, Some(Loss::Huber(1.0))] {
+        let options = options(Method::Damped(Stop::Fraction(1e-12)), loss);
+        let [alone, connected, again] = [(false, 1), (true, 2), (false, 2)].map(|(connected, threads)| {
+            adjust_with(&of_single_points(connected), &options, threads).unwrap()
+        });
+        assert_eq!(unknowns(&alone), unknowns(&again), "any number of threads");
+        assert_eq!(alone.observations, again.observations);
+        assert_eq!(alone.degrees_of_freedom + 7, connected.degrees_of_freedom);
+        for (a, b) in unknowns(&alone).into_iter().zip(unknowns(&connected)) {
+            close(a, b, 1.0, 1e-9, "unknown");
+        }
+        for (a, b) in alone.points.iter().zip(&connected.points) {
+            let (a, b) = (a.unwrap(), b.unwrap());
+            let scale = b.cofactors.trace().max(1e-30);
+            (0..9).for_each(|k| close(a.cofactors[k], b.cofactors[k], scale, 1e-8, "cofactor"));
+            (0..3).for_each(|k| close(a.redundancy[k], b.redundancy[k], 1.0, 1e-8, "redundancy"));
+        }
+        for (a, b) in alone.observations.iter().zip(&connected.observations) {
+            let (a, b) = (a.as_ref().unwrap(), b.as_ref().unwrap());
+            close(a.weight, b.weight, 1.0, 1e-7, "weight");
+            close(a.square, b.square, 1.0, 1e-6, "square");
+            for k in 0..a.residual.len() {
+                close(a.residual[k], b.residual[k], 0.002, 1e-6, "residual");
+                close(a.redundancy[k], b.redundancy[k], 1.0, 1e-8, "redundancy number");
+                assert!((a.standardized[k] - b.standardized[k]).abs() < 1e-6 || a.standardized[k].is_nan());
+            }
+        }
+        for (a, b) in alone.images.iter().zip(&connected.images) {
+            (0..2)
+                .for_each(|k| close(a.unwrap().redundancy[k], b.unwrap().redundancy[k], 1.0, 1e-8, "image"));
+        }
+    }
+}
+
 /// Returns a network with a fixed first photo, scaled by a distance of the given length between points 3 and 4.
 fn scaled(length: f64) -> Network {
     let mut network = images_alone();

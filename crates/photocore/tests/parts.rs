@@ -129,8 +129,8 @@ fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     let dims: Vec<usize> = retained.iter().map(|&block| layout.retained_dim(block)).collect();
     let main = groups.iter().map(|&group| place(layout.retained_of(group))).collect();
     let tie = |&tie: &usize| {
-        let Tie { rows, retained } = layout.ties()[tie].clone();
-        Tie { rows, retained: retained.iter().map(|&block| place(block as usize)).collect() }
+        let Tie { rows, retained, .. } = layout.ties()[tie].clone();
+        Tie { rows, local: None, retained: retained.iter().map(|&block| place(block as usize)).collect() }
     };
     let children = cut.children(p);
     let below = children.iter().map(|&child| cut.outer[child].iter().map(|&block| place(block)).collect());
@@ -401,8 +401,11 @@ fn systems() -> impl Strategy<Value = (Layout, u64)> {
         let mut shared_ptr = vec![0];
         further.iter().for_each(|own| shared_ptr.push(shared_ptr[shared_ptr.len() - 1] + own.len()));
         let further = further.into_iter().flatten().collect();
-        let tie =
-            |(rows, retained): (usize, BTreeSet<u32>)| Tie { rows, retained: retained.into_iter().collect() };
+        let tie = |(rows, retained): (usize, BTreeSet<u32>)| Tie {
+            rows,
+            local: None,
+            retained: retained.into_iter().collect(),
+        };
         let layout =
             Layout::new(2, l, &retained, ptr, main).unwrap().with_shared(shared_ptr, further).unwrap();
         (layout.with_ties(ties.into_iter().map(tie).collect()).unwrap(), seed)

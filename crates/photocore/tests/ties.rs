@@ -94,7 +94,7 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     }
     let pairs: Vec<[u32; 2]> =
         (0..12).flat_map(|k| [[k, (k + 1) % 12], [k, (k + 4) % 12], [(k + 5) % 12, k]]).collect();
-    let ties = pairs.iter().map(|pair| Tie { rows: 1, retained: pair.to_vec() }).collect();
+    let ties = pairs.iter().map(|pair| Tie { rows: 1, local: None, retained: pair.to_vec() }).collect();
     let layout = Layout::new(1, 2, &[2; 12], ptr.clone(), seen.clone()).unwrap().with_ties(ties).unwrap();
     let truth: Vec<f64> = local.iter().chain(&retained).flatten().copied().collect();
     let distance = |a: usize, b: usize| (truth[a] - truth[b]).hypot(truth[a + 1] - truth[b + 1]);

@@ -1,7 +1,7 @@
 //! Additional observations: input rows by type, and their results.
 
 use nalgebra::DMatrix;
-use numpy::PyUntypedArrayMethods;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use photocore::network::observations::Named;
 use photocore::network::{AdjustedObservation, Observation};
 use pyo3::prelude::*;
@@ -49,11 +49,24 @@ fn own<'a, T>(all: &'a [T], shape: &[usize], row: usize) -> &'a [T] {
     &all[row * shape[1]..][..shape[1]]
 }
 
-/// Residuals, redundancy numbers, standardized residuals, weighted square and weight.
-pub type AdjustedRow = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64);
+/// Number of components of each observation, zero for excluded ones; residuals, redundancy numbers and standardized residuals of all
+/// components (3, rows); weighted squares and weights (2, observations).
+pub type Adjusted = (Py<PyArray1<i64>>, Py<PyArray2<f64>>, Py<PyArray2<f64>>);
 
-/// Converts an adjusted observation to a row.
-pub fn adjusted_row(observation: AdjustedObservation) -> AdjustedRow {
-    let AdjustedObservation { residual, redundancy, standardized, square, weight } = observation;
-    (residual, redundancy, standardized, square, weight)
+/// Converts adjusted observations to arrays.
+pub fn adjusted(py: Python<'_>, all: &[Option<AdjustedObservation>]) -> PyResult<Adjusted> {
+    let count = |own: &Option<AdjustedObservation>| own.as_ref().map_or(0, |own| own.residual.len());
+    let counts: Vec<usize> = all.iter().map(count).collect();
+    let rows = counts.iter().sum();
+    let column = |of: fn(&AdjustedObservation) -> &[f64]| all.iter().flatten().flat_map(of).copied();
+    let values = column(|own| &own.residual);
+    let values = values.chain(column(|own| &own.redundancy)).chain(column(|own| &own.standardized));
+    let single =
+        |of: fn(&AdjustedObservation) -> f64| all.iter().map(move |own| own.as_ref().map_or(f64::NAN, of));
+    let sums = single(|own| own.square).chain(single(|own| own.weight));
+    Ok((
+        PyArray1::from_iter(py, counts.iter().map(|&own| own as i64)).unbind(),
+        PyArray1::from_vec(py, values.collect()).reshape([3, rows])?.unbind(),
+        PyArray1::from_vec(py, sums.collect()).reshape([2, all.len()])?.unbind(),
+    ))
 }

@@ -307,7 +307,8 @@ def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message
         Message(phrase("adjust.left-out", reason=reason, points=", ".join(points)))
         for reason, points in by_reason.items()
     ]
-    lost = [each.name for each in block.observations if dropped.keys() & set(each.points)]
+    of_points = enumerate(block.observations.column("points") if dropped else [])
+    lost = [block.observations[row].name for row, of in of_points if not dropped.keys().isdisjoint(of)]
     if lost:
         messages.append(Message(phrase("adjust.left-out.observations", observations=lost)))
     return messages + refraction_remarks(block, solution.photo_positions)

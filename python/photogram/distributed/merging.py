@@ -108,7 +108,6 @@ def _rest(
     """Return the attributes of a solution that are not arrays of photos, points and images."""
     redundancies = [each["redundancies"] for each in details]
     sums = None if None in redundancies else tuple(map(math.fsum, zip(*redundancies, strict=True)))
-    observed = dict(_all(details, "observed"))
     observations, weighted, unknowns = outcome.counts
     excess = None if sums is None else math.fsum(sums) - (observations + weighted - unknowns)
     return {
@@ -143,9 +142,18 @@ def _rest(
         "dropped": sorted((int(row), str(reason)) for row, reason in _all(details, "dropped")),
         "sums_of_squares": outcome.sums_of_squares,
         # In the order of the observation groups of the whole block
-        "adjusted_observations": [observed[row] for row in block.observations.core_order],
+        "adjusted_observations": _observed(block, details),
         "degrees_of_freedom": outcome.degrees_of_freedom,
     }
+
+
+def _observed(block: Block, details: list[dict[str, Any]]) -> tuple[Indices, Floats, Floats]:
+    """Return the adjusted observations in the order of the observation groups of the whole block."""
+    of_rows = {row: (np.array(values, dtype=float), own) for row, values, own in _all(details, "observed")}
+    found = [of_rows[row] for row in block.observations.core_order]
+    values = [np.zeros((3, 0)), *(own for own, _ in found)]
+    sums = np.array([own for _, own in found], dtype=float).reshape(-1, 2)
+    return np.array([own.shape[1] for own in values[1:]], dtype=np.int64), np.hstack(values), sums.T
 
 
 def _all(details: list[dict[str, Any]], name: str) -> Iterator[Any]:

@@ -82,7 +82,8 @@ class CoreEngine:
         _write(folder, _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], freedom))
         # Data without a table; rows refer to the whole block.
         places = [int(part.observations[row]) for row in part.block.observations.core_order]
-        observed = zip(places, solution.adjusted_observations, strict=True)
+        counts, values, sums = solution.adjusted_observations
+        of_rows = np.split(values, np.cumsum(counts)[:-1], axis=1) if places else []
         outcome = {
             "sums_of_squares": solution.sums_of_squares,
             "redundancies": solution.redundancies,
@@ -93,7 +94,7 @@ class CoreEngine:
             "dropped": [(int(part.points[row]), reason) for row, reason in solution.dropped],
             "cameras": solution.cameras,
             "unknowns": list(zip(part.unknowns.tolist(), solution.adjusted_unknowns, strict=True)),
-            "observed": list(observed),
+            "observed": list(zip(places, of_rows, sums.T, strict=True)),
             "relative_error": solution.relative_error,
             "operations": solution.operations,
             "seconds": solution.seconds,

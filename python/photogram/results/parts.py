@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -111,34 +112,36 @@ class ObservedKind:
 
 def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
     """Return the adjusted observations of a block by the names of their types."""
-    found = iter(solution.adjusted_observations)
-    parts: dict[str, list[tuple[Observation, Indices, tuple[Floats, ...]]]] = {}
-    for columns in block.observations.columns:
-        first, rows = columns.objects[0], columns.rows
+    counts, values, sums = solution.adjusted_observations
+    all_columns = block.observations.columns
+    starts = np.cumsum([0, *(len(columns.rows) for columns in all_columns)])
+    ends = np.concatenate([[0], np.cumsum(counts)])[starts]
+    parts: dict[str, list[tuple[Observation, Indices, list[str], tuple[Floats, ...]]]] = {}
+    for columns, (start, stop), (begin, end) in zip(
+        all_columns, pairwise(starts), pairwise(ends), strict=True
+    ):
+        first, rows = columns.first, columns.rows
         observed = np.ones((len(rows), len(first.components(geographic=block.geographic))), dtype=bool)
         if first.MISSING:
             observed = ~np.isnan(columns.table["observed"])
         tables = np.full((3, *observed.shape), np.nan)
-        single = np.full((2, len(rows)), np.nan)
-        adjusted = [next(found) for _ in rows]
-        taken = np.array([each is not None for each in adjusted])
-        if some := [each for each in adjusted if each is not None]:
-            values = zip(*some, strict=True)
-            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(values)) for _ in range(3)]
-            single[:, taken] = list(values)
+        tables[:, observed & (counts[start:stop, np.newaxis] > 0)] = values[:, begin:end]
         variances = np.diagonal(np.asarray(columns.table["precision"]), axis1=1, axis2=2)
         sd = np.sqrt(np.where(observed, variances, np.nan))
-        parts.setdefault(columns.label, []).append((first, rows, (sd, *tables, *single)))
+        parts.setdefault(columns.label, []).append(
+            (first, rows, columns.names, (sd, *tables, *sums[:, start:stop]))
+        )
     kinds = {}
     for kind, groups in parts.items():  # Groups of one type have different numbers of unknowns
         first = groups[0][0]
-        every = np.concatenate([own for _, own, _ in groups])
+        every = np.concatenate([own for _, own, *_ in groups])
+        names = [name for *_, own, _ in groups for name in own]
         order = np.argsort(every, kind="stable")
         arrays = zip(*(own for *_, own in groups), strict=True)
         kinds[kind] = ObservedKind(
             kind,
             every[order],
-            [" - ".join(block.observations[row].of) for row in every[order].tolist()],
+            [names[place] for place in order.tolist()],
             first.components(geographic=block.geographic),
             first.units(block.linear_unit),
             *(np.concatenate(each)[order] for each in arrays),

@@ -134,7 +134,9 @@ impl LocalRows {
         let Self { width, constants, own, ends, others, partials, scratch, shared } = self;
         scratch.clear();
         to.parameters.partials(&Equation { of, sd, row }, shared, scratch);
-        partials.extend(scratch.iter().filter(|partial| partial.1 != 0.0));
+        // All rows of a tie, whose components are whitened together, depend on the same parameters.
+        let is_tie = matches!(of, EquationOf::Tie { .. });
+        partials.extend(scratch.iter().filter(|partial| is_tie || partial.1 != 0.0));
         let start = own.len();
         own.resize(start + *width, 0.0);
         for (unknown, value) in row.taken().filter(|own| !to.fixed[own.0]) {
@@ -160,7 +162,7 @@ impl LocalRows {
 }
 
 impl Extended<'_> {
-    /// Writes the equations of a local block, its unknowns as observations among them.
+    /// Writes the equations of a local block: its groups, its ties and its unknowns as observations.
     fn write(&self, buffers: &mut Buffers, local: usize, rows: &mut LocalRows) {
         let problem = self.equations.problem();
         let layout = problem.layout();
@@ -171,6 +173,13 @@ impl Extended<'_> {
             let of = EquationOf::Group { group: row.number / size, local, row: row.number % size };
             rows.push(self, (of, self.equations.deviation(row.number), row), first);
         });
+        for tie in layout.ties_of(local).iter().map(|&tie| tie as usize) {
+            let before = layout.groups() * size + layout.tie_rows(tie).start;
+            self.equations.each_row_of_tie(buffers, tie, |row| {
+                let of = EquationOf::Tie { tie, row: row.number - before };
+                rows.push(self, (of, self.equations.deviation(row.number), row), first);
+            });
+        }
         self.each_prior(range, |unknown, row| {
             rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], row), first);
         });
@@ -477,7 +486,7 @@ const AT_LEAST: usize = 32;
 /// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
 const PARTS: usize = 64;
 
-/// The sums over ties and over unknowns that are not local.
+/// The sums over ties of retained blocks and over unknowns that are not local.
 fn retained(extended: &Extended<'_>, count: usize) -> Sums {
     let problem = extended.equations.problem();
     let (layout, mut sums) = (problem.layout(), Sums::new(count));
@@ -500,10 +509,13 @@ fn retained(extended: &Extended<'_>, count: usize) -> Sums {
         others.extend(row.taken().filter(|own| !extended.fixed[own.0]));
         sums.reduce(&others, &mut work);
     };
-    extended.equations.each_row_of_ties(|tie, row| {
-        let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
-        add(of, extended.equations.deviation(row.number), row);
-    });
+    let mut buffers = Buffers::default();
+    for tie in (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_none()) {
+        extended.equations.each_row_of_tie(&mut buffers, tie, |row| {
+            let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
+            add(of, extended.equations.deviation(row.number), row);
+        });
+    }
     extended.each_prior(first..layout.unknowns(), |unknown, row| {
         add(EquationOf::Unknown(unknown), problem.sd[unknown], row);
     });

@@ -2,6 +2,8 @@
 //!
 //! Changes of the observations of a group by a step.
 
+use smallvec::SmallVec;
+
 use super::loss::Reweighting;
 use super::problem::{AnyProblem, Evaluated};
 use super::walk::Buffers;
@@ -147,16 +149,25 @@ impl<'a> ObservationEquations<'a> {
 
     /// Calls `take` with the tie number and row of every tie.
     pub fn each_row_of_ties(&self, mut take: impl FnMut(usize, &Row<'_>)) {
+        let mut buffers = Buffers::default();
+        (0..self.problem.layout().ties().len())
+            .for_each(|tie| self.each_row_of_tie(&mut buffers, tie, |row| take(tie, row)));
+    }
+
+    /// Calls `take` with the rows of a tie.
+    #[inline(always)]
+    pub fn each_row_of_tie(&self, buffers: &mut Buffers, tie: usize, mut take: impl FnMut(&Row<'_>)) {
         let layout = self.problem.layout();
-        let groups = layout.groups() * layout.rows();
-        self.problem.for_ties(|tie, rows| {
-            self.write_tie(tie, rows);
-            let columns: Vec<usize> = layout.tie_columns(tie).collect();
-            let each = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len().max(1)));
-            for (number, (&constant, own)) in (groups + layout.tie_rows(tie).start..).zip(each) {
-                take(tie, &Row { number, constant, columns: &columns, coefficients: [own, &[], &[]] });
-            }
-        });
+        let first = layout.groups() * layout.rows() + layout.tie_rows(tie).start;
+        let Buffers { tie: buffer, columns, .. } = buffers;
+        columns.clear();
+        columns.extend(layout.tie_columns(tie));
+        let mut rows = buffer.rows(layout, tie);
+        self.write_tie(tie, &mut rows);
+        let each = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len().max(1)));
+        for (number, (&constant, own)) in (first..).zip(each) {
+            take(&Row { number, constant, columns, coefficients: [own, &[], &[]] });
+        }
     }
 
     /// Returns the decrease of the weighted sum of squares of equations and priors by a step: sum of Ax (2 l - Ax).
@@ -175,9 +186,9 @@ impl<'a> ObservationEquations<'a> {
             }
             sum
         });
-        let tied = self.problem.for_ties(|tie, rows| {
+        let tied = self.problem.for_ties(threads, |tie, rows| {
             self.write_tie(tie, rows);
-            let columns: Vec<f64> = layout.tie_columns(tie).map(|column| step[column]).collect();
+            let columns: SmallVec<[f64; 16]> = layout.tie_columns(tie).map(|column| step[column]).collect();
             let rows = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len()));
             let decrease = |(constant, coefficients): (&f64, &[f64])| {
                 let change = dot(coefficients, &columns);

@@ -41,8 +41,8 @@ pub struct Leverages {
 pub struct TieCofactors {
     /// Leverage matrix a Q a^T, row by row.
     pub equations: Vec<f64>,
-    /// Q a^T for each retained block of the tie, one vector over its unknowns per equation.
-    pub blocks: Vec<(usize, Vec<f64>)>,
+    /// Q a^T for each block of the tie, one vector over its unknowns per equation; None for the local block.
+    pub blocks: Vec<(Option<usize>, Vec<f64>)>,
 }
 
 impl Leverages {
@@ -271,15 +271,23 @@ impl Leverages {
         asked.write_tie(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
         let mut first = 0;
         let place = |&block: &u32| {
-            let own = (block as usize, first, layout.retained_dim(block as usize));
+            let own = (Some(block as usize), first, layout.retained_dim(block as usize));
             first += own.2;
             own
         };
-        let blocks: Vec<(usize, usize, usize)> = each.retained.iter().map(place).collect();
+        let mut blocks: Vec<(Option<usize>, usize, usize)> = each.retained.iter().map(place).collect();
+        blocks.extend(each.local.map(|_| (None, 0, width)));
+        let cofactors = |pair: (Option<usize>, Option<usize>)| match (pair, each.local) {
+            ((Some(row), Some(column)), _) => self.selected.block(row, column),
+            (_, local) => {
+                let first = local.map_or(0, |local| local as usize * width * width);
+                Ok(self.cofactors.local[first..][..width * width].to_vec())
+            }
+        };
         let mut along = vec![0.0; each.rows * width];
         for &(row_block, to, _) in &blocks {
             for &(column_block, from, count) in &blocks {
-                let values = self.selected.block(row_block, column_block)?;
+                let values = cofactors((row_block, column_block))?;
                 for (k, row) in values.chunks_exact(count.max(1)).enumerate() {
                     for equation in 0..each.rows {
                         let own = &coefficients[equation * width + from..][..count];
@@ -293,7 +301,7 @@ impl Leverages {
         let product = |i: usize, j: usize| -> f64 {
             row(&along, i).iter().zip(row(&coefficients, j)).map(|(x, y)| x * y).sum()
         };
-        let of_block = |&(block, first, count): &(usize, usize, usize)| {
+        let of_block = |&(block, first, count): &(Option<usize>, usize, usize)| {
             (block, (0..each.rows).flat_map(|i| along[i * width + first..][..count].to_vec()).collect())
         };
         Ok(TieCofactors {

@@ -258,9 +258,7 @@ impl AnyProblem<'_> {
             .iter()
             .for_each(|part| sums.add(part));
         sums.multiply(stride as f64);
-        self.for_ties(|tie, rows| {
-            candidates.add_tie(&mut sums, &equations, tie, rows);
-        });
+        self.each_tie(|tie, rows| candidates.add_tie(&mut sums, &equations, tie, rows));
         for term in
             self.terms(values).within(0..values.len()).filter(|term| term.unknowns().all(|i| stays(&i)))
         {
@@ -334,7 +332,7 @@ impl AnyProblem<'_> {
                 equations.each_row(&mut buffers, local, |row| candidates.add_row(groups, row.taken()));
             }
         }
-        self.for_ties(|tie, rows| {
+        self.each_tie(|tie, rows| {
             candidates.add_tie(&mut sums[classes.of_ties[tie]], &equations, tie, rows);
         });
         let mut observed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();

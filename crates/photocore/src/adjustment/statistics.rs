@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use smallvec::SmallVec;
+
 use super::loss::Loss;
 use super::problem::{AnyProblem, Evaluated, Problem};
 use super::terms::weighted_among;
@@ -151,9 +153,9 @@ impl AnyProblem<'_> {
             }
             residuals
         });
-        let by_tie = self.for_ties(|tie, rows| {
+        let by_tie = self.for_ties(threads, |tie, rows| {
             at.observe_tie(tie, rows);
-            rows.constant.to_vec()
+            SmallVec::<[f64; 3]>::from_slice(rows.constant)
         });
         let mut residuals = by_stretch.concat();
         by_tie.iter().for_each(|of_tie| residuals.extend_from_slice(of_tie));

@@ -3,16 +3,17 @@
 use std::ops::Range;
 
 use super::problem::AnyProblem;
-use crate::normals::{GroupRows, Layout, TieRows};
+use crate::normals::{GroupRows, Layout, TieBuffer, TieRows};
 use crate::{Threads, parallel};
 
-/// Buffers for the rows of one group.
+/// Buffers for the rows of one group, and of one tie.
 #[derive(Default)]
 pub(super) struct Buffers {
     constant: Vec<f64>,
     local: Vec<f64>,
     retained: Vec<f64>,
     shared: Vec<f64>,
+    pub tie: TieBuffer,
     /// Buffer for the unknowns of these rows.
     pub columns: Vec<usize>,
 }
@@ -66,17 +67,21 @@ impl AnyProblem<'_> {
         (AT_LEAST * GROUPS * locals / groups.max(1)).clamp(1, AT_LEAST)
     }
 
-    /// Maps every tie, in order, on one thread.
-    pub(super) fn for_ties<T>(&self, mut each: impl FnMut(usize, &mut TieRows<'_>) -> T) -> Vec<T> {
+    /// Calls `take` with a buffer for the rows of each tie, in order.
+    pub(super) fn each_tie(&self, mut take: impl FnMut(usize, &mut TieRows<'_>)) {
+        let mut buffer = TieBuffer::default();
+        (0..self.layout().ties().len()).for_each(|tie| take(tie, &mut buffer.rows(self.layout(), tie)));
+    }
+
+    /// Maps every tie, in order.
+    pub(super) fn for_ties<T: Send>(
+        &self,
+        threads: &Threads,
+        each: impl Fn(usize, &mut TieRows<'_>) -> T + Sync,
+    ) -> Vec<T> {
         let layout = self.layout();
-        let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
-        let visit = |tie: usize| {
-            let rows = layout.ties()[tie].rows;
-            constant.resize(rows, 0.0);
-            coefficients.resize(rows * layout.tie_columns(tie).count(), 0.0);
-            each(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients })
-        };
-        (0..layout.ties().len()).map(visit).collect()
+        let each = |buffers: &mut Buffers, tie: usize| each(tie, &mut buffers.tie.rows(layout, tie));
+        by_parts(threads, layout.ties().len(), AT_LEAST, each)
     }
 }
 

@@ -1,6 +1,5 @@
 //! Conversion of a network to observation equations.
 
-use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use super::blocks::Blocks;
@@ -68,6 +67,7 @@ impl Network {
             turning: vec![false; self.photos.len()],
             images_on,
             observations: vec![],
+            linear: vec![],
             screens: Screens::default(),
             parts: OnceLock::new(),
         };
@@ -156,19 +156,22 @@ impl Network {
         })
     }
 
-    /// Returns the active additional observations.
+    /// Returns the active additional observations, last those of single local points in the order of the points.
     fn tied_observations(
         &self,
         selected: &Selected,
         model: &Bundle,
     ) -> Result<Vec<TiedObservation>, NetworkError> {
-        let Selected { points, locals, observations, .. } = selected;
-        let place: HashMap<usize, usize> =
-            points[*locals..].iter().enumerate().map(|(i, &point)| (point, locals + i)).collect();
+        let Selected { points, observations, .. } = selected;
+        if observations.is_empty() {
+            return Ok(vec![]);
+        }
+        let mut place = vec![0; self.points.len()];
+        points.iter().enumerate().for_each(|(own, &point)| place[point] = own);
         let tied = |&index: &usize| {
             let observation: &Observation = &self.observations[index];
             let touches = observation.touches();
-            let points = touches.points.iter().map(|point| place[point]).collect();
+            let points = touches.points.iter().map(|&point| place[point]).collect();
             let touches = Touches { points, ..touches };
             let blocks = model.blocks_of(&touches);
             let root = match blocks.len() {
@@ -184,6 +187,11 @@ impl Network {
                 observation: observation.clone(),
             })
         };
-        observations.iter().map(tied).collect()
+        let tied = |place: usize| tied(&observations[place]);
+        let tied: Result<Vec<TiedObservation>, NetworkError> =
+            parallel::map(observations.len(), TOGETHER, tied).into_iter().collect();
+        let mut tied = tied?;
+        tied.sort_by_key(TiedObservation::local);
+        Ok(tied)
     }
 }

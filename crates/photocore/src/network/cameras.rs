@@ -25,7 +25,8 @@ impl Bundle {
             of_commons[common].push(photos[photo]);
         }
         for touches in self.observations.iter().map(|tied| &tied.touches) {
-            let points = touches.points.iter().map(|&point| tied[point - self.locals]);
+            let points =
+                touches.points.iter().filter_map(|&point| tied.get(point.checked_sub(self.locals)?).copied());
             let places: Vec<[f64; 3]> =
                 points.chain(touches.photos.iter().map(|&photo| photos[photo])).collect();
             touches.commons.iter().for_each(|&(common, _)| of_commons[common].extend(&places));

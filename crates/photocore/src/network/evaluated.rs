@@ -34,6 +34,10 @@ impl Bundle {
             return self.observe_tied_image(stations, self.point_images.start[self.locals] + tie, rows);
         };
         let own = &self.observations[observation];
+        let first_linear = self.observations.len() - self.linear.len();
+        if let Some(linear) = observation.checked_sub(first_linear) {
+            return self.linear[linear].write(&stations.coordinates, rows);
+        }
         self.with_tied(stations, |model| own.write(model, rows.constant, rows.coefficients));
     }
 }

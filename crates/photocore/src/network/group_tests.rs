@@ -160,8 +160,8 @@ impl Trial {
         terms: &Terms<'_>,
         shared: bool,
     ) -> Option<Tested> {
-        if let Home::Group { group, .. } = suspect.home {
-            return self.image_test(group, (found, groups), shared);
+        if let Home::Group { group, point } = suspect.home {
+            return self.image_test((group, point), (found, groups), shared);
         }
         let size = suspect.rows.len();
         let taking: Vec<usize> = (0..size).filter(|&k| self.is_in(suspect.rows[k].0)).collect();
@@ -211,7 +211,7 @@ impl Trial {
     /// Tests an image of a local point; nearly all groups are of this type.
     fn image_test(
         &self,
-        group: usize,
+        (group, place): (usize, usize),
         (found, groups): (&Leverages, &GroupCofactors),
         shared: bool,
     ) -> Option<Tested> {
@@ -224,7 +224,8 @@ impl Trial {
         let block = 4 * group..4 * group + 4;
         let left = |leverages: &[f64]| [1.0 - leverages[0], -leverages[1], -leverages[2], 1.0 - leverages[3]];
         let cofactors = left(&groups.leverages[block.clone()]);
-        let known = shared.then(|| left(&groups.by_local[block]));
+        let by_point = if self.is_tested_whole(place) { &groups.by_local[block] } else { &[0.0; 4] };
+        let known = shared.then(|| left(by_point));
         let test = GroupTest::new(&residual, &cofactors, known.as_ref().map(|own| &own[..]));
         let of = |k: usize| (test.error[k] * sd[k], test.cofactors[3 * k].sqrt() * sd[k]);
         let [first, second] = [of(0), of(1)];
@@ -237,7 +238,8 @@ impl Trial {
         })
     }
 
-    /// Returns whitened residuals of some rows, their leverages A Q A^T, and the leverages with only the own point free.
+    /// Returns whitened residuals of some rows, their leverages A Q A^T, and the leverages with only the own point free; zero for points
+    /// with additional observations, which are tested apart from them.
     fn leverages(
         &self,
         suspect: &Suspect,
@@ -262,7 +264,7 @@ impl Trial {
                 let rows = self.term_rows(suspect, taking, terms);
                 let q = self.cofactors_at(found, suspect.home);
                 let alone = match suspect.home {
-                    Home::Point(place) if place < problem.model.locals => {
+                    Home::Point(place) if self.is_tested_whole(place) => {
                         let own = DMatrix::from_row_slice(3, 3, &groups.alone[9 * place..9 * place + 9]);
                         &rows * own * rows.transpose()
                     }

@@ -90,17 +90,17 @@ impl Bundle {
             return coordinates;
         }
         let rays: Vec<Ray> = self.rays(placed, point).collect();
+        let free = |k: &usize| !held[*k];
         for _ in 0..3 {
             let at = Point::new(self.space, coordinates);
-            let column = |k: usize| Vector3::from(at.partials().column(k));
+            let columns = [0, 1, 2].map(|k| Vector3::from(at.partials().column(k)));
             let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
             for ray in &rays {
                 let offset = across(&(ray.origin - at.position()), ray);
-                for i in (0..3).filter(|&i| !held[i]) {
-                    right[i] += column(i).dot(&offset);
-                    for j in (0..3).filter(|&j| !held[j]) {
-                        normal[(i, j)] += column(i).dot(&across(&column(j), ray));
-                    }
+                for j in (0..3).filter(free) {
+                    right[j] += columns[j].dot(&offset);
+                    let turned = across(&columns[j], ray);
+                    (0..3).filter(free).for_each(|i| normal[(i, j)] += columns[i].dot(&turned));
                 }
             }
             (0..3).filter(|&i| held[i]).for_each(|i| normal[(i, i)] = 1.0);

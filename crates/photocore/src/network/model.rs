@@ -11,7 +11,9 @@ use super::commons::{CommonState, InBlock, PlacedCommon};
 use super::input::{Image, Minimum, Point, Screens};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::neighbourhood::PointImages;
-use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
+use super::observations::{
+    CommonSite, LOCAL, Linear, PhotoSite, PointSite, TiedModel, TiedObservation, Touches,
+};
 use super::parts::Components;
 use super::passages::Passages;
 use super::stations::{Refracted, Station, Stations};
@@ -22,9 +24,9 @@ use crate::geometry::{
 use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
 use crate::parallel;
 
-/// Model of a network. Local blocks are the points without additional observations. Retained blocks are, in this order, photos (pose and
-/// own free camera), shared cameras, shared parameters, and all other points. Image observations of these points and additional
-/// observations are the ties, in this order.
+/// Model of a network. Local blocks are the points that no observation connects with other objects. Retained blocks are, in this order,
+/// photos (pose and own free camera), shared cameras, shared parameters, and all other points. Image observations of these points and
+/// additional observations are the ties, in this order; an observation of a local point alone is a tie of its local block.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
@@ -58,7 +60,10 @@ pub struct Bundle {
     pub images_on: Vec<usize>,
     /// Photos with steps by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
+    /// Additional observations, last those of single local points.
     pub observations: Vec<TiedObservation>,
+    /// Equations of these last observations in rectangular space, if they are computed.
+    pub linear: Vec<Linear>,
     /// Datum information of the network and the user.
     pub datum: GivenDatum,
     pub screens: Screens,
@@ -153,18 +158,19 @@ impl Bundle {
             let point = self.point_of(image);
             let others = self.blocks_of_image(image);
             let blocks = std::iter::once(self.block_of_point(point)).chain(others);
-            Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
+            Tie { rows: 2, local: None, retained: blocks.map(|block| block as u32).collect() }
         });
-        let observations = self.observations.iter().map(|tied| Tie {
-            rows: tied.root.nrows(),
-            retained: tied.blocks.iter().map(|&block| block as u32).collect(),
+        let observations = self.observations.iter().map(|tied| {
+            let (rows, local) = (tied.root.nrows(), tied.local().map(|point| point as u32));
+            let retained = tied.blocks.iter().filter(|_| local.is_none()).map(|&block| block as u32);
+            Tie { rows, local, retained: retained.collect() }
         });
         images.chain(observations).collect()
     }
 
-    /// Returns the retained block of a point that is not local.
+    /// Returns the retained block of a point; [`LOCAL`] for a local one.
     fn block_of_point(&self, point: usize) -> usize {
-        self.stations() + point - self.locals
+        point.checked_sub(self.locals).map_or(LOCAL, |tied| self.stations() + tied)
     }
 
     /// Returns the number of parameters of a retained block.
@@ -233,7 +239,7 @@ impl Bundle {
     pub(super) fn with_tied<T>(&self, stations: &Stations, take: impl FnOnce(&TiedModel<'_>) -> T) -> T {
         let point = |point: usize| PointSite {
             point: stations.points[point],
-            coordinates: stations.tied[point - self.locals],
+            coordinates: stations.coordinates[point],
             block: self.block_of_point(point),
         };
         let mounted = stations.mounted.as_ref();
@@ -283,7 +289,16 @@ impl Bundle {
         let mounted = self.mount_all(&mut photos, &commons);
         let films = self.passages.films(&commons);
         let plain = self.refraction.is_none() && mounted.is_none() && self.passages.is_empty();
-        Stations { photos, commons, mounted, films, refracted: None, points: vec![], tied: vec![], plain }
+        Stations {
+            photos,
+            commons,
+            mounted,
+            films,
+            refracted: None,
+            points: vec![],
+            coordinates: vec![],
+            plain,
+        }
     }
 
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
@@ -402,20 +417,14 @@ impl Bundle {
     /// Evaluates photos, points and shared parameters at given parameter values.
     pub fn evaluated(&self, unknowns: &[f64]) -> Stations {
         let photos = &unknowns[self.of_stations()];
-        let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
-        let tied = tied.as_chunks().0.to_vec();
+        let (local, tied) = self.all_coordinates(unknowns);
         let mut stations = self.without_points(photos);
         stations.refracted = self.refraction.map(|refraction| Refracted {
             refraction,
             at_photos: self.verticals_at_photos(&refraction, photos, &stations.photos),
-            at_points: verticals(
-                &refraction,
-                self.space,
-                local.chunks(3).chain(tied.as_flattened().chunks(3)),
-            ),
+            at_points: verticals(&refraction, self.space, local.iter().chain(tied)),
         });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
-        let local: &[[f64; 3]] = local.as_chunks().0;
         stations.points = if self.passages.have_figures() {
             let commons = &stations.commons;
             let shift = |point| self.passages.shift(point, |common| commons[common].vector());
@@ -425,16 +434,16 @@ impl Bundle {
             parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]))
         };
         stations.points.extend(tied.iter().map(place));
-        stations.tied = tied;
+        stations.coordinates = if self.observations.is_empty() { vec![] } else { [local, tied].concat() };
         stations
     }
 }
 
-/// Returns the verticals at positions, the first three parameters of each.
+/// Returns the verticals at positions.
 fn verticals<'a>(
     refraction: &Refraction,
     space: ObjectSpace,
-    unknowns: impl Iterator<Item = &'a [f64]>,
+    positions: impl Iterator<Item = &'a [f64; 3]>,
 ) -> Vec<Vertical> {
-    unknowns.map(|values| refraction.vertical(space, std::array::from_fn(|k| values[k]))).collect()
+    positions.map(|&position| refraction.vertical(space, position)).collect()
 }

@@ -266,7 +266,7 @@ impl Node {
         self.check(&[state])?;
         let (problem, loss) = (&self.assembled.problem, self.options.adjustment.loss);
         let reached = Adjustment::between(problem, loss, &self.held, state, state.to_vec(), threads);
-        let observed = observations(&self.network, problem, &reached);
+        let observed = threads.install(|| observations(&self.network, problem, &reached));
         let sums = sums_of_squares(problem, &reached, state, &observed);
         Ok((sums, problem.any().objective(state, &reached.residuals, loss)))
     }

@@ -219,7 +219,13 @@ impl Trial {
 
     /// Returns the index of a point in the model, unless it has additional observations.
     fn local(&self, point: usize) -> Option<usize> {
-        self.place.get(point).copied().flatten().filter(|&place| place < self.assembled.problem.model.locals)
+        self.place.get(point).copied().flatten().filter(|&place| self.is_tested_whole(place))
+    }
+
+    /// Whether all observations of a point are its images and its coordinates, which are tested together.
+    pub(super) fn is_tested_whole(&self, place: usize) -> bool {
+        let problem = &self.assembled.problem;
+        place < problem.model.locals && problem.layout().ties_of(place).is_empty()
     }
 
     /// Returns the equations of observed coordinates of a local point.

@@ -1,18 +1,18 @@
 //! Least-squares problem of a network. Points are local blocks of three. Retained blocks are photos with their own cameras, shared cameras,
-//! shared parameters, and points with additional observations.
+//! shared parameters, and points that observations connect with other objects.
 
 use super::error::NetworkError;
 use super::input::{Image, Network, Options, Point, Start, State};
 use super::layout::layout;
 use super::model::Bundle;
 use super::neighbourhood::TOGETHER;
-use super::observations::{Fault, TiedObservation};
+use super::observations::{Fault, Linear};
 use super::selection::{Dropped, LeftOut, Selected};
 use super::stations::{Station, Stations};
 use super::surroundings::Surroundings;
 use crate::adjustment::{Method, Problem};
-use crate::geometry::{POSE, PoseNumbers};
-use crate::normals::{System, TieRows};
+use crate::geometry::{ObjectSpace, POSE, PoseNumbers};
+use crate::normals::{Layout, System, TieBuffer, TieRows};
 use crate::sorting::median;
 use crate::{Threads, parallel};
 
@@ -191,7 +191,7 @@ impl Network {
             Some(reached) => selected.points.iter().map(|&point| reached.points[point]).collect(),
             None => self.start(options.start, &selected, &model, &placed)?,
         };
-        // Order: local points, photos and shared cameras, points with additional observations.
+        // Order: local points, photos and shared cameras, points that observations connect with other objects.
         let locals = model.locals;
         let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
             let (local, tied) = points.split_at(locals);
@@ -216,6 +216,7 @@ impl Network {
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
         let (outer, below) = selected.surroundings.blocks(&model, &selected.points)?;
         let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
+        model.linearize_observations(&initial, &layout)?;
         let problem = Problem {
             observation_sd,
             system: System::new(layout, options.ordering)?,
@@ -224,7 +225,6 @@ impl Network {
             sd,
             model,
         };
-        self.check_observations(&problem)?;
         Ok(Assembled { problem, points: selected.points, dropped: selected.dropped, loose: selected.loose })
     }
 
@@ -244,27 +244,6 @@ impl Network {
         let tied: Vec<[f64; 3]> = tied.iter().map(|&at| self.space.cartesian(at).into()).collect();
         let commons = model.places_of_commons(&centres, &tied);
         [centres, cameras, commons, tied].concat()
-    }
-
-    /// Returns an error for observations without finite values at the initial values.
-    fn check_observations(&self, problem: &Problem<Bundle>) -> Result<(), NetworkError> {
-        let model = &problem.model;
-        if model.observations.is_empty() {
-            return Ok(());
-        }
-        let (stations, layout) = (model.evaluated(&problem.initial), problem.layout());
-        for (i, TiedObservation { index, observation, root, .. }) in model.observations.iter().enumerate() {
-            let tie = model.tied_images() + i;
-            let mut constant = vec![0.0; root.nrows()];
-            let mut coefficients = vec![0.0; root.nrows() * layout.tie_columns(tie).count()];
-            let mut rows = TieRows { constant: &mut constant, coefficients: &mut coefficients };
-            model.observe_tie(&stations, tie, &mut rows);
-            if !constant.iter().chain(&coefficients).all(|value| value.is_finite()) {
-                let (index, kind, fault) = (*index, observation.kind(), Fault::NotFinite);
-                return Err(NetworkError::Observation { index, kind, fault });
-            }
-        }
-        Ok(())
     }
 
     /// Returns the initial coordinates of the points.
@@ -291,6 +270,37 @@ impl Network {
             known.for_each(|(met, given)| *met = given);
         }
         Ok(met)
+    }
+}
+
+impl Bundle {
+    /// Computes the linear equations of single local points.
+    ///
+    /// # Errors
+    /// Observations without finite values at the initial values.
+    fn linearize_observations(&mut self, initial: &[f64], layout: &Layout) -> Result<(), NetworkError> {
+        if self.observations.is_empty() {
+            return Ok(());
+        }
+        let (stations, mut buffer, mut found) = (self.evaluated(initial), TieBuffer::default(), vec![]);
+        for (i, own) in self.observations.iter().enumerate() {
+            let tie = self.tied_images() + i;
+            let mut rows = buffer.rows(layout, tie);
+            self.observe_tie(&stations, tie, &mut rows);
+            let TieRows { constant, coefficients } = rows;
+            if !constant.iter().chain(&*coefficients).all(|value| value.is_finite()) {
+                let (index, kind, fault) = (own.index, own.observation.kind(), Fault::NotFinite);
+                return Err(NetworkError::Observation { index, kind, fault });
+            }
+            // Heights, planes and lines with fixed parameters, and control are linear in X, Y and Z.
+            if let Some(point) = own.local().filter(|_| self.space == ObjectSpace::Rectangular) {
+                let at = stations.coordinates[point];
+                let (constant, coefficients) = ((&*constant).into(), (&*coefficients).into());
+                found.push(Linear { point, at, constant, coefficients });
+            }
+        }
+        self.linear = found;
+        Ok(())
     }
 }
 

@@ -243,8 +243,9 @@ impl Trial {
                 Home::Tie(tie) => {
                     let Some(own) = around.ties.get(&tie) else { continue };
                     let stations = model.stations();
-                    let point = own.blocks.iter().find(|block| block.0 >= stations);
-                    let photo = own.blocks.iter().find(|block| block.0 < model.cameras.len());
+                    let point = own.blocks.iter().find(|block| block.0.is_none_or(|block| block >= stations));
+                    let is_photo = |block: usize| block < model.cameras.len();
+                    let photo = own.blocks.iter().find(|block| block.0.is_some_and(is_photo));
                     for row in 0..rows {
                         let mut effect = [f64::NAN; 9];
                         for (block, to, count) in [(point, 0, 3), (photo, 3, 6)] {

@@ -3,6 +3,7 @@
 use super::error::NetworkError;
 use super::input::{Network, State};
 use super::neighbourhood::{PointImages, TOGETHER};
+use super::observations::Touches;
 use super::surroundings::Surroundings;
 use crate::parallel;
 use crate::sorting::sort_by;
@@ -84,7 +85,7 @@ impl Network {
     /// A point on one photo remains if at most one of its coordinates is free: then there are at least four equations for three parameters
     /// (specification, open point 21). Points with parameters in other nodes of a larger network always remain.
     ///
-    /// Points with additional observations are the last ones. Images on excluded photos are ignored.
+    /// Points that observations connect with other objects are the last ones. Images on excluded photos are ignored.
     pub(super) fn select(&self, left_out: &LeftOut, surroundings: Surroundings) -> Selected {
         let loose = &left_out.photos;
         let named = surroundings.points();
@@ -104,8 +105,10 @@ impl Network {
         let mut tied = Vec::new();
         if !(observations.is_empty() && named.is_empty()) {
             let mut touched = vec![false; self.points.len()];
-            let touches = observations.iter().flat_map(|&i| self.observations[i].touches().points);
-            touches.chain(named).for_each(|point| touched[point] = true);
+            let touches = observations.iter().map(|&i| self.observations[i].touches());
+            let connected =
+                touches.filter(|touches| self.connects(touches)).flat_map(|touches| touches.points);
+            connected.chain(named).for_each(|point| touched[point] = true);
             (tied, points) = points.into_iter().partition(|&point| touched[point]);
         }
         let locals = points.len();
@@ -117,6 +120,14 @@ impl Network {
         }
         let loose = (0..loose.len()).filter(|&photo| loose[photo]).collect();
         Selected { points, locals, images, observations, dropped, loose, surroundings }
+    }
+
+    /// Whether an observation connects its points with other points, photos or shared parameters that are not fixed.
+    fn connects(&self, touches: &Touches) -> bool {
+        let mut commons = touches.commons.iter();
+        touches.points.len() > 1
+            || !touches.photos.is_empty()
+            || commons.any(|&(common, _)| !self.commons[common].is_held())
     }
 
     /// Returns the reason to exclude a point with the given images; None if it remains.
@@ -178,7 +189,7 @@ impl Network {
 /// Active objects, with neighbouring points in sequence, and exclusions.
 pub(super) struct Selected {
     pub points: Vec<usize>,
-    /// Number of points without additional observations, which are the first ones.
+    /// Number of points that no observation connects with other objects, which are the first ones.
     pub locals: usize,
     pub images: PointImages,
     pub observations: Vec<usize>,

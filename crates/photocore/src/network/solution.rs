@@ -11,6 +11,7 @@ use super::adjusted::{
 use super::error::NetworkError;
 use super::input::{Network, Options, State, UnitVariance};
 use super::model::{Bundle, Owner};
+use super::neighbourhood::TOGETHER;
 use super::observations::{AdjustedObservation, KindSums};
 use super::problem::Assembled;
 use super::selection::Dropped;
@@ -19,6 +20,7 @@ use super::visibility::{Unseen, find_unseen};
 use super::weak_points::WeakPoint;
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
+use crate::parallel;
 
 /// Smallest redundancy that is not attributed to rounding.
 pub const LEAST_REDUNDANCY: f64 = 1e-9;
@@ -261,15 +263,17 @@ pub(super) fn observations(
 ) -> Vec<Option<AdjustedObservation>> {
     let (model, layout) = (&problem.model, problem.layout());
     let first = layout.groups() * layout.rows();
-    let mut all = vec![None; network.observations.len()];
-    for (i, tied) in model.observations.iter().enumerate() {
-        let tie = model.tied_images() + i;
+    let of = |i: usize| {
+        let (tied, tie) = (&model.observations[i], model.tied_images() + i);
         let rows = layout.tie_rows(tie);
         let shares = adjustment.cofactors.as_ref().map(|found| &found.ties[layout.tie_block(tie)]);
         let weight = adjustment.weights.as_ref().map_or(1.0, |all| all[layout.groups() + tie]);
         let whitened = &adjustment.residuals[first + rows.start..first + rows.end];
-        all[tied.index] = Some(AdjustedObservation::new(tied, whitened, shares, weight));
-    }
+        AdjustedObservation::new(tied, whitened, shares, weight)
+    };
+    let found = parallel::map(model.observations.len(), TOGETHER, of);
+    let mut all = vec![None; network.observations.len()];
+    model.observations.iter().zip(found).for_each(|(tied, own)| all[tied.index] = Some(own));
     all
 }
 

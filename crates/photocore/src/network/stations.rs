@@ -23,8 +23,8 @@ pub struct Stations {
     pub refracted: Option<Refracted>,
     /// Points; empty if they are not evaluated.
     pub points: Vec<geometry::Point>,
-    /// Coordinates of the points that are not local.
-    pub tied: Vec<[f64; 3]>,
+    /// Coordinates of the points if there are additional observations, otherwise empty.
+    pub coordinates: Vec<[f64; 3]>,
     /// Whether the images have neither refraction nor mounts nor corrections.
     pub plain: bool,
 }

@@ -231,7 +231,9 @@ fn observations(assembled: &Assembled) -> Vec<Suspect> {
         let rows = layout.tie_rows(tie).enumerate().map(|(k, row)| (Row::Equation(first + row), k)).collect();
         Suspect { subject: Subject::Observation(tied.index), home: Home::Tie(tie), rows }
     };
-    model.observations.iter().enumerate().map(of).collect()
+    let mut order: Vec<usize> = (0..model.observations.len()).collect();
+    order.sort_by_key(|&i| model.observations[i].index);
+    order.into_iter().map(|i| of((i, &model.observations[i]))).collect()
 }
 
 /// Returns a group of the weighted ones among some parameters; None if there are none.

@@ -3,7 +3,7 @@
 //! Chord steps: solutions with an older factor for the right-hand sides at other values.
 
 use super::eliminated::{Elimination, Reduced};
-use super::equations::{Equations, Prior, TieRows};
+use super::equations::{Equations, Prior, TieBuffer};
 use super::factor::Factor;
 use super::layout::LayoutError;
 use super::system::{System, SystemError};
@@ -219,18 +219,16 @@ impl System {
         found
     }
 
-    /// Adds A^T l of ties to a right-hand side in elimination order.
+    /// Adds A^T l of ties of retained blocks to a right-hand side in elimination order.
     fn add_rights_of_ties(&self, equations: &dyn Equations, others: &mut [f64]) {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
-        let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
-        for (index, tie) in layout.ties().iter().enumerate() {
+        let mut buffer = TieBuffer::default();
+        for (index, tie) in layout.ties().iter().enumerate().filter(|(_, tie)| tie.local.is_none()) {
             let of_block = |&block: &u32| symbolic.range(symbolic.position(block as usize));
             let columns: Vec<usize> = tie.retained.iter().flat_map(of_block).collect();
-            constant.resize(tie.rows, 0.0);
-            coefficients.resize(tie.rows * columns.len(), 0.0);
-            equations
-                .write_tie(index, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
-            for (row, constant) in coefficients.chunks_exact(columns.len()).zip(&constant) {
+            let mut written = buffer.rows(layout, index);
+            equations.write_tie(index, &mut written);
+            for (row, constant) in written.coefficients.chunks_exact(columns.len()).zip(&*written.constant) {
                 columns.iter().zip(row).for_each(|(&column, a)| others[column] += a * constant);
             }
         }

@@ -6,7 +6,8 @@ use std::ops::Range;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use super::equations::{Equations, GroupRows, Prior};
+use super::batch::TieSums;
+use super::equations::{Equations, GroupRows, Prior, TieBuffer};
 use super::functions::Function;
 use super::layout::LayoutError;
 use super::panels::SelectedInverse;
@@ -85,6 +86,8 @@ impl System {
             None => (a.subrows(0, observed), b.subrows(0, observed)),
         };
         let mut normal = formed_local.transpose() * formed_local;
+        let of_ties = TieSums::of(equations, &self.layout, local, &mut TieBuffer::default()).normal;
+        (0..dim * dim).for_each(|k| normal[(k / dim, k % dim)] += of_ties[k / dim][k % dim]);
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
         let Ok(factor) = normal.llt(Side::Lower) else {
             return Ok(LocalCofactors::unknown(dim, rows, &blocks));

@@ -32,8 +32,25 @@ pub trait Equations: Sync {
 pub struct TieRows<'a> {
     /// Right-hand sides l (rows).
     pub constant: &'a mut [f64],
-    /// Coefficients, row by row; columns are the unknowns of the tie's retained blocks, in order.
+    /// Coefficients, row by row; columns are the unknowns of the tie's blocks, in order.
     pub coefficients: &'a mut [f64],
+}
+
+/// Equations of one tie, with reused memory.
+#[derive(Debug, Default)]
+pub(crate) struct TieBuffer {
+    constant: Vec<f64>,
+    coefficients: Vec<f64>,
+}
+
+impl TieBuffer {
+    /// Returns the rows of a tie, with undefined contents.
+    pub fn rows(&mut self, layout: &Layout, tie: usize) -> TieRows<'_> {
+        let rows = layout.ties()[tie].rows;
+        self.constant.resize(rows, 0.0);
+        self.coefficients.resize(rows * layout.tie_columns(tie).count(), 0.0);
+        TieRows { constant: &mut self.constant, coefficients: &mut self.coefficients }
+    }
 }
 
 /// Output rows of one group of equations. Matrices are stored row by row.

@@ -122,7 +122,7 @@ impl Walk<'_> {
             Ok([retained, pairs]) => [retained, pairs, information],
             Err(error) => return Some(Err(error.into())),
         };
-        let mut cofactors = Cofactors::collect(self.system, self.control, &found, of_blocks)?;
+        let mut cofactors = Cofactors::collect(self.system, self.equations, self.control, &found, of_blocks)?;
         if self.options.by_groups {
             cofactors.groups = Some(GroupCofactors::collect(self.system, self.control, &found)?);
         }

@@ -83,6 +83,7 @@ pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
 pub use dense::take_product_buffers;
 pub use equation_block::LocalCofactors;
+pub(crate) use equations::TieBuffer;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
 pub use factor::{Factor, FactorOptions};
 pub use functions::{Function, Functions};

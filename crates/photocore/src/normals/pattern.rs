@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn a_pattern_that_lacks_what_goes_to_a_front_is_refused() {
-        let tie = Tie { rows: 1, retained: vec![0, 2] };
+        let tie = Tie { rows: 1, local: None, retained: vec![0, 2] };
         let together = [
             Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 2, 3], vec![0, 1, 2]).unwrap(),
             apart().with_shared(vec![0, 0, 0, 1], vec![3]).unwrap(),

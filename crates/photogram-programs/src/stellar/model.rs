@@ -232,7 +232,7 @@ impl Calibration {
         let (mut ties, common) = (Vec::new(), self.pointings.len() as u32);
         if let Some(axis) = self.axis {
             let root = root(axis.weight, || "the axis".into())?;
-            let tie = Tie { rows: 2, retained: vec![axis.pointing as u32, common] };
+            let tie = Tie { rows: 2, local: None, retained: vec![axis.pointing as u32, common] };
             ties.push((Tied::Axis(root), tie));
         }
         for row in 0..self.weights.parameters.len() {
@@ -244,7 +244,7 @@ impl Calibration {
                 .collect();
             retained.sort_unstable();
             retained.dedup();
-            ties.push((Tied::Parameters(row), Tie { rows: 1, retained }));
+            ties.push((Tied::Parameters(row), Tie { rows: 1, local: None, retained }));
         }
         Ok(ties)
     }

@@ -13,7 +13,7 @@ use super::tables::Told;
 use super::{FailureRow, failure};
 use crate::arrays::{Blocks, Matrix, squares, table};
 use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
-use crate::observations::{AdjustedRow, adjusted_row};
+use crate::observations::{Adjusted, adjusted};
 use crate::solution::{IterationRow, iteration_row, operations, predictions, seconds, status_name};
 
 /// Returns the cofactors of the unknowns of each photo, (n, N, N); zero for fixed unknowns.
@@ -173,7 +173,7 @@ pub struct BlockSolution {
     dropped: Vec<(usize, &'static str)>,
     sums_of_squares: (f64, f64, f64, f64),
     redundancies: Option<(f64, f64, f64, f64)>,
-    adjusted_observations: Vec<Option<AdjustedRow>>,
+    adjusted_observations: Adjusted,
     photo_order: Py<PyArray1<i64>>,
 }
 
@@ -210,7 +210,7 @@ impl BlockSolution {
             redundancies: found
                 .redundancies
                 .map(|own| (own.camera, own.ground, own.plates, own.observations)),
-            adjusted_observations: found.observations.into_iter().map(|own| own.map(adjusted_row)).collect(),
+            adjusted_observations: adjusted(py, &found.observations)?,
         };
         Py::new(py, PyClassInitializer::from(base).add_subclass(own))
     }

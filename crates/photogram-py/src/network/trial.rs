@@ -32,6 +32,9 @@ fn outcome_row(outcome: Outcome) -> OutcomeRow {
     (status_name(status), iterations, sum_of_squares, degrees_of_freedom, collapsed)
 }
 
+/// Name and values of a column of hypotheses.
+type Column<'a, T> = (&'static str, fn(&'a Hypothesis) -> T);
+
 /// Converts hypotheses to columns; see the stub.
 fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, PyDict>> {
     let Hypotheses { mut all, sets, correlations } = found;
@@ -47,7 +50,7 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
     for (k, name) in ["group", "index", "component"].into_iter().enumerate() {
         columns.set_item(name, PyArray1::from_iter(py, all.iter().map(|own| numbers(own)[k])))?;
     }
-    let scalars: [(&str, fn(&Hypothesis) -> f64); 7] = [
+    let scalars: [Column<'_, f64>; 7] = [
         ("observations", |own| own.observations as f64),
         ("rank", |own| own.judged.rank as f64),
         ("statistic", |own| own.judged.statistic),
@@ -60,7 +63,7 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
         columns.set_item(name, PyArray1::from_iter(py, all.iter().map(of)))?;
     }
     let width = all.iter().map(|own| own.judged.estimate.len()).max().unwrap_or(1);
-    let vectors: [(&str, fn(&Hypothesis) -> &[f64]); 3] = [
+    let vectors: [Column<'_, &[f64]>; 3] = [
         ("estimate", |own| &own.judged.estimate),
         ("plausible", |own| &own.plausible),
         ("mdb", |own| own.judged.mdb.as_deref().unwrap_or_default()),

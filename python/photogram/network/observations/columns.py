@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
+from operator import add
 from typing import Any, TypeVar
 
 import numpy as np
@@ -62,12 +63,24 @@ class Columns:
     @cached_property
     def objects(self) -> list[Any]:
         """Observations as objects."""
-        objects = []
-        for values in zip(*self.table.values(), strict=True):
-            observation = object.__new__(self.kind)
-            vars(observation).update(zip(self.table, values, strict=True))
-            objects.append(observation)
-        return objects
+        return [self._object(values) for values in zip(*self.table.values(), strict=True)]
+
+    def _object(self, values: tuple[Any, ...]) -> Any:
+        observation = object.__new__(self.kind)
+        vars(observation).update(zip(self.table, values, strict=True))
+        return observation
+
+    @property
+    def first(self) -> Any:
+        """The first observation as an object."""
+        return self._object(next(zip(*self.table.values(), strict=False)))
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the observed items."""
+        if self.kind.POINTS:
+            return [" - ".join(items) for items in map(add, self.table["points"], self.table["photos"])]
+        return [" - ".join(each.of) for each in self.objects]
 
     def numbered(self) -> Iterator[tuple[int, Any]]:
         """Yield the row numbers and objects."""
@@ -97,7 +110,7 @@ class Columns:
         for name, known in parts.items():
             column: Sequence[tuple[Any, ...]] = table[name]
             try:
-                flat = [known[one] for row in column for one in row]
+                flat = [known[one] for row in column for one in row] if column[0] else []
             except KeyError as error:
                 number = next(number for number, row in enumerate(column) if error.args[0] in row)
                 what = f"observation {self.objects[number].name}"

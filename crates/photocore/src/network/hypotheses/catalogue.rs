@@ -9,6 +9,7 @@ use super::super::stations::Stations;
 use super::super::trial::Trial;
 use super::facts::Facts;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Shared};
+use crate::normals::Layout;
 
 /// An error that a set of observations has in common.
 pub(super) struct Cause {
@@ -37,6 +38,7 @@ pub(super) enum Seen {
 pub(super) struct Catalogue<'a> {
     pub causes: Vec<Cause>,
     pub bundle: &'a Bundle,
+    layout: &'a Layout,
     pub stations: Stations,
     pub facts: &'a Facts,
     /// Standard deviations of the unknowns.
@@ -64,6 +66,7 @@ impl<'a> Catalogue<'a> {
         Self {
             causes: vec![],
             bundle,
+            layout: problem.layout(),
             stations: bundle.evaluated(&found.values),
             facts,
             sd: &problem.sd,
@@ -190,13 +193,14 @@ impl AdditionalParameters for Catalogue<'_> {
         if cameras || !self.fixed.is_empty() || self.shutters.iter().any(Option::is_some) {
             return None;
         }
-        let end = 3 * self.bundle.locals;
         let single = self.single.keys().filter_map(|of| match *of {
-            EquationOf::Unknown(unknown) => Some(unknown),
-            _ => None,
+            EquationOf::Unknown(unknown) => Some(unknown / 3),
+            EquationOf::Tie { tie, .. } => self.layout.ties()[tie].local.map(|local| local as usize),
+            EquationOf::Group { .. } => None,
         });
-        let unknowns = self.displaced.keys().map(|own| own.1).chain(single).filter(|&unknown| unknown < end);
-        let mut locals: Vec<usize> = unknowns.map(|unknown| unknown / 3).collect();
+        let displaced = self.displaced.keys().map(|own| own.1 / 3);
+        let mut locals: Vec<usize> =
+            displaced.chain(single).filter(|&local| local < self.bundle.locals).collect();
         locals.sort_unstable();
         locals.dedup();
         Some(locals)

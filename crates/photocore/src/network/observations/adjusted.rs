@@ -1,6 +1,6 @@
 //! Adjusted additional observations.
 
-use nalgebra::{DMatrix, DVector};
+use smallvec::SmallVec;
 
 use super::{Observation, TiedObservation};
 
@@ -49,23 +49,29 @@ impl AdjustedObservation {
         weight: f64,
     ) -> Self {
         let (n, root) = (whitened.len(), &tied.root);
-        let z = DVector::from_column_slice(whitened);
-        let residual = root * &z;
-        let inverse =
-            root.solve_lower_triangular(&DMatrix::identity(n, n)).unwrap_or_else(|| root * f64::NAN);
+        // L^-1, row by row.
+        let mut inverse = SmallVec::<[f64; 9]>::from_elem(0.0, n * n);
+        (0..n).for_each(|k| inverse[k * (n + 1)] = 1.0);
+        tied.whiten(&mut inverse, n);
+        let product =
+            |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| (0..n).map(|k| a(k) * b(k)).sum::<f64>();
+        let residual = (0..n).map(|i| product(&|k| root[(i, k)], &|k| whitened[k])).collect();
         let (mut redundancy, mut standardized) = (vec![f64::NAN; n], vec![f64::NAN; n]);
         if let Some(shares) = shares {
-            let left = DMatrix::identity(n, n) - DMatrix::from_row_slice(n, n, shares);
-            redundancy = (root * &left * &inverse).diagonal().as_slice().to_vec();
-            let variances = (inverse.transpose() * left * &inverse).diagonal();
-            let weights = inverse.tr_mul(&inverse).diagonal();
-            let weighted = inverse.tr_mul(&z);
-            for k in (0..n).filter(|&k| variances[k] > LEAST_REDUNDANCY * weights[k]) {
-                standardized[k] = weighted[k] / variances[k].sqrt();
+            for i in 0..n {
+                let column = |k: usize| inverse[k * n + i];
+                // (I - B) L^-1, its column i.
+                let left: SmallVec<[f64; 3]> =
+                    (0..n).map(|k| column(k) - product(&|j| shares[k * n + j], &column)).collect();
+                redundancy[i] = product(&|k| root[(i, k)], &|k| left[k]);
+                let variance = product(&column, &|k| left[k]);
+                if variance > LEAST_REDUNDANCY * product(&column, &column) {
+                    standardized[i] = product(&column, &|k| whitened[k]) / variance.sqrt();
+                }
             }
         }
-        let residual = residual.as_slice().to_vec();
-        Self { residual, redundancy, standardized, square: weight * z.norm_squared(), weight }
+        let square = weight * product(&|k| whitened[k], &|k| whitened[k]);
+        Self { residual, redundancy, standardized, square, weight }
     }
 }
 

@@ -20,7 +20,7 @@ pub(super) use photos::misalignment;
 pub use precision::{Fault, Precision};
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
 pub use rows::{Rows, Sites};
-pub(super) use tied::{TiedModel, TiedObservation};
+pub(super) use tied::{LOCAL, Linear, TiedModel, TiedObservation};
 
 macro_rules! kinds {
     ($($module:ident::$($name:ident)? $({$($member:ident),*})?;)*) => {

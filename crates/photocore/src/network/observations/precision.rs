@@ -41,11 +41,27 @@ impl Precision {
                 let symmetric = |i: usize, j: usize| (s[(i, j)] - s[(j, i)]).abs() <= SYMMETRIC * scale(i, j);
                 let sound = (0..components)
                     .all(|i| deviates(s[(i, i)].sqrt()) && (0..components).all(|j| symmetric(i, j)));
-                let root = sound.then(|| s.clone().cholesky()).flatten();
-                root.map(|root| root.l()).ok_or(Fault::Covariance)
+                sound.then(|| lower_root(s)).flatten().ok_or(Fault::Covariance)
             }
         }
     }
+}
+
+/// Returns L of a symmetric matrix L L^T (Cholesky); None if it is not positive definite.
+fn lower_root(s: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let count = s.nrows();
+    let mut root = DMatrix::zeros(count, count);
+    for j in 0..count {
+        for i in j..count {
+            let left = (0..j).fold(s[(i, j)], |left, k| left - root[(i, k)] * root[(j, k)]);
+            root[(i, j)] = if i > j { left / root[(j, j)] } else { left.sqrt() };
+        }
+        let pivot = root[(j, j)];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return None;
+        }
+    }
+    Some(root)
 }
 
 /// Error of an invalid observation.

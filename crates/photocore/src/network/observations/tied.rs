@@ -1,11 +1,13 @@
 //! Active observation: a whitened tie.
 
 use nalgebra::{DMatrix, DVector};
+use smallvec::SmallVec;
 
 use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::{Observation, Rows, Sites, Touches};
 use crate::geometry::{ObjectSpace, Vector3};
 use crate::network::mounts::Moving;
+use crate::normals::TieRows;
 
 /// An observation of points, photos and shared parameters of a model.
 #[derive(Debug)]
@@ -18,6 +20,27 @@ pub struct TiedObservation {
     pub blocks: Vec<usize>,
     /// L of the covariance matrix S = L L^T.
     pub root: DMatrix<f64>,
+}
+
+/// Whitened linear equations of a point: observed minus computed at some coordinates, and partials row by row.
+#[derive(Debug)]
+pub struct Linear {
+    pub point: usize,
+    pub at: [f64; 3],
+    pub constant: SmallVec<[f64; 3]>,
+    pub coefficients: SmallVec<[f64; 9]>,
+}
+
+impl Linear {
+    /// Writes the equations at other coordinates of the points.
+    pub fn write(&self, coordinates: &[[f64; 3]], rows: &mut TieRows<'_>) {
+        let moved: [f64; 3] = std::array::from_fn(|k| coordinates[self.point][k] - self.at[k]);
+        rows.coefficients.copy_from_slice(&self.coefficients);
+        let partials = self.coefficients.as_chunks::<3>().0;
+        for ((to, constant), row) in rows.constant.iter_mut().zip(&self.constant).zip(partials) {
+            *to = constant - (row[0] * moved[0] + row[1] * moved[1] + row[2] * moved[2]);
+        }
+    }
 }
 
 /// A model at given parameter values.
@@ -33,7 +56,15 @@ pub struct TiedModel<'a> {
     pub width: &'a dyn Fn(usize) -> usize,
 }
 
+/// Block of a local point in [`TiedObservation::blocks`].
+pub const LOCAL: usize = usize::MAX;
+
 impl TiedObservation {
+    /// Returns the local point of an observation of this point alone.
+    pub fn local(&self) -> Option<usize> {
+        self.touches.points.first().copied().filter(|_| self.blocks == [LOCAL])
+    }
+
     /// Writes L^-1 (observed - computed) and L^-1 times the partials, in columns block by block.
     pub fn write(&self, model: &TiedModel<'_>, constant: &mut [f64], coefficients: &mut [f64]) {
         let sites = self.sites(model);
@@ -88,7 +119,7 @@ impl TiedObservation {
     }
 
     /// Multiplies a matrix of `width` columns by L^-1: forward substitution, row by row.
-    fn whiten(&self, matrix: &mut [f64], width: usize) {
+    pub(super) fn whiten(&self, matrix: &mut [f64], width: usize) {
         for i in 0..self.root.nrows() {
             let (before, row) = matrix.split_at_mut(i * width);
             let row = &mut row[..width];

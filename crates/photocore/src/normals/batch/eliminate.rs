@@ -51,6 +51,13 @@ impl Batch {
         for (lane, t) in locals.clone().enumerate() {
             let (mut normal, mut right) = prior.of_local::<L>(layout, self.locals[t] as usize);
             self.add_equations(t, rows, &mut normal, &mut right);
+            if let Some(own) = self.own.get(t) {
+                for a in 0..L {
+                    right[a] += own.right[a];
+                    (0..=a).for_each(|b| normal[a][b] += own.normal[a][b]);
+                }
+                self.sum_of_squares += own.sum_of_squares;
+            }
             for a in 0..L {
                 normal[a][a] *= 1.0 + damping;
                 for b in 0..a + 1 {

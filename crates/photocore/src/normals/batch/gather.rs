@@ -2,14 +2,21 @@
 
 use smallvec::{SmallVec, smallvec};
 
-use super::{Batch, Place};
-use crate::normals::equations::{Equations, GroupRows};
+use super::{Batch, Place, TieSums};
+use crate::normals::equations::{Equations, GroupRows, TieBuffer};
+use crate::normals::layout::Layout;
 use crate::normals::system::System;
 
 impl Batch {
     /// Evaluates the equations of units of one pattern.
     pub fn gather(&mut self, equations: &dyn Equations, system: &System, units: &[u32]) {
         self.place(system, units);
+        self.own.clear();
+        if system.layout.has_local_ties() && !self.apart {
+            let mut buffer = TieBuffer::default();
+            let of = |&local: &u32| TieSums::of(equations, &system.layout, local as usize, &mut buffer);
+            self.own.extend(self.locals.iter().map(of));
+        }
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
         let (depth, incidence) = (self.locals.len(), &system.incidence);
         let mut groups: SmallVec<[u32; 32]> = smallvec![0; depth];
@@ -35,5 +42,24 @@ impl Batch {
                 }
             }
         }
+    }
+}
+
+impl TieSums {
+    /// Forms the normal equations of the ties of a local block.
+    pub fn of(equations: &dyn Equations, layout: &Layout, local: usize, buffer: &mut TieBuffer) -> Self {
+        let mut own = Self::default();
+        for &tie in layout.ties_of(local) {
+            let mut rows = buffer.rows(layout, tie as usize);
+            equations.write_tie(tie as usize, &mut rows);
+            for (row, constant) in rows.coefficients.chunks_exact(layout.local_dim()).zip(&*rows.constant) {
+                for (a, value) in row.iter().enumerate() {
+                    own.right[a] += value * constant;
+                    own.normal[a].iter_mut().zip(&row[..=a]).for_each(|(sum, other)| *sum += value * other);
+                }
+                own.sum_of_squares += constant * constant;
+            }
+        }
+        own
     }
 }

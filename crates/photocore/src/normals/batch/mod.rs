@@ -136,6 +136,14 @@ struct Stretch {
     width: usize,
 }
 
+/// Normal equations of the ties of one local block: lower triangle, right-hand side and sum of squares.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct TieSums {
+    pub normal: [[f64; 3]; 3],
+    pub right: [f64; 3],
+    pub sum_of_squares: f64,
+}
+
 /// Equations of local blocks of one pattern, with their elimination. With the normal matrix N = L L^T of a local block, v = L^-1 n and V =
 /// L^-1 N_local,other. The Schur complement subtracts V^T V from the other normal equations, and V^T v from their right-hand side.
 ///
@@ -167,6 +175,8 @@ pub(super) struct Batch {
     parts: Vec<Part>,
     /// Scratch memory for the unknowns of the segments.
     spans: Vec<(usize, Range<usize>)>,
+    /// Normal equations of the ties of each local block; empty if no tie is local.
+    own: Vec<TieSums>,
     constants: Vec<f64>,
     local_rows: Vec<f64>,
     retained_rows: Vec<f64>,

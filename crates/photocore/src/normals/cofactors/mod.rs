@@ -2,12 +2,14 @@
 
 mod others;
 
+use std::ops::Range;
 use std::time::Instant;
 
 use self::others::Others;
 use super::assembly::TieEquations;
-use super::equations::{Equations, Prior};
+use super::equations::{Equations, Prior, TieBuffer};
 use super::incidence::Batches;
+use super::layout::Layout;
 use super::system::System;
 use super::vectorised::dot;
 use super::watch::Control;
@@ -53,6 +55,7 @@ impl Cofactors {
     /// the information. None if memory is insufficient.
     pub(super) fn collect(
         system: &System,
+        equations: &dyn Equations,
         control: &Control,
         found: &[AtNode],
         [retained, pairs, information]: [Vec<f64>; 3],
@@ -60,9 +63,14 @@ impl Cofactors {
         let layout = &system.layout;
         let (rows, l) = (layout.rows(), layout.local_dim());
         let mut local = control.allocated(zeros(layout.locals() * l * l))?;
-        let mut equations = control.allocated(zeros(layout.equations()))?;
-        let (of_groups, of_ties) = equations.split_at_mut(layout.groups() * rows);
+        let mut leverages = control.allocated(zeros(layout.equations()))?;
+        let (of_groups, of_ties) = leverages.split_at_mut(layout.groups() * rows);
         let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
+        let mut put = |tie: usize, values: &[f64]| {
+            ties[layout.tie_block(tie)].copy_from_slice(values);
+            let diagonal = values.iter().step_by(layout.ties()[tie].rows + 1);
+            of_ties[layout.tie_rows(tie)].iter_mut().zip(diagonal).for_each(|(to, &leverage)| *to = leverage);
+        };
         for (index, at_node) in found.iter().enumerate() {
             let mut values = at_node.equations.chunks_exact(rows.max(1));
             let mut blocks = at_node.local.chunks_exact(l * l).peekable();
@@ -78,18 +86,19 @@ impl Cofactors {
             }
             let mut values = &at_node.ties[..];
             for &tie in system.ties.at(index) {
-                let (tie, rows) = (tie as usize, layout.ties()[tie as usize].rows);
-                let (own, rest) = values.split_at(rows * rows);
-                ties[layout.tie_block(tie)].copy_from_slice(own);
-                let diagonal = own.iter().step_by(rows + 1);
-                of_ties[layout.tie_rows(tie)]
-                    .iter_mut()
-                    .zip(diagonal)
-                    .for_each(|(to, &leverage)| *to = leverage);
+                let (own, rest) = values.split_at(layout.tie_block(tie as usize).len());
+                put(tie as usize, own);
                 values = rest;
             }
         }
-        Some(Self { local, retained, equations, ties, pairs, groups: None, information })
+        let of_locals = leverages_of_local_ties(layout, equations, &local);
+        let mut values = &of_locals[..];
+        for tie in (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_some()) {
+            let (own, rest) = values.split_at(layout.tie_block(tie).len());
+            put(tie, own);
+            values = rest;
+        }
+        Some(Self { local, retained, equations: leverages, ties, pairs, groups: None, information })
     }
 }
 
@@ -168,6 +177,28 @@ impl AtNode {
         found.seconds = start.elapsed().as_secs_f64();
         found
     }
+}
+
+/// Computes a Q a^T of the equations of each tie of a local block, one square block per tie; `cofactors` are those of the local blocks.
+fn leverages_of_local_ties(layout: &Layout, equations: &dyn Equations, cofactors: &[f64]) -> Vec<f64> {
+    let l = layout.local_dim();
+    let part = |ties: Range<usize>| {
+        let (mut buffer, mut found) = (TieBuffer::default(), Vec::new());
+        for tie in ties {
+            let Some(local) = layout.ties()[tie].local else { continue };
+            let q = &cofactors[local as usize * l * l..][..l * l];
+            let mut rows = buffer.rows(layout, tie);
+            equations.write_tie(tie, &mut rows);
+            for own in rows.coefficients.chunks_exact(l) {
+                let mut product = [0.0; 3];
+                product.iter_mut().zip(q.chunks_exact(l)).for_each(|(sum, row)| *sum = dot(row, own));
+                found.extend(rows.coefficients.chunks_exact(l).map(|other| dot(&product[..l], other)));
+            }
+        }
+        found
+    };
+    let count = if layout.has_local_ties() { layout.ties().len() } else { 0 };
+    parallel::by_parts(count, MANY, &part)
 }
 
 /// Computes a Q a^T of the equations of each tie at a supernode, one square block per tie.

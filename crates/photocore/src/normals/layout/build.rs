@@ -55,6 +55,8 @@ impl Layout {
             ties: Vec::new(),
             tie_ptr: vec![0],
             block_ptr: vec![0],
+            local_tie_ptr: Vec::new(),
+            local_ties: Vec::new(),
             places: None,
             free: Vec::new(),
             apart: Vec::new(),
@@ -102,7 +104,11 @@ impl Layout {
         let sound = |tie: &Tie| {
             let mut retained = tie.retained.clone();
             retained.sort_unstable();
-            let exist = retained.last().is_some_and(|&last| (last as usize) < self.retained());
+            let exist = match (tie.local, retained.last()) {
+                (None, Some(&last)) => (last as usize) < self.retained(),
+                (Some(local), None) => (local as usize) < self.locals,
+                _ => false,
+            };
             let once = retained.windows(2).all(|pair| pair[0] < pair[1]);
             tie.rows > 0 && exist && once
         };
@@ -114,6 +120,19 @@ impl Layout {
         for tie in &ties {
             self.tie_ptr.push(self.tie_ptr[self.tie_ptr.len() - 1] + tie.rows);
             self.block_ptr.push(self.block_ptr[self.block_ptr.len() - 1] + tie.rows.pow(2));
+        }
+        let of_locals = || ties.iter().zip(0..).filter_map(|(tie, index)| Some((tie.local? as usize, index)));
+        (self.local_tie_ptr, self.local_ties) = (Vec::new(), Vec::new());
+        if of_locals().next().is_some() {
+            let mut ptr = vec![0; self.locals + 1];
+            of_locals().for_each(|(local, _)| ptr[local + 1] += 1);
+            (0..self.locals).for_each(|local| ptr[local + 1] += ptr[local]);
+            let (mut next, mut sorted) = (ptr.clone(), vec![0; ptr[self.locals]]);
+            for (local, tie) in of_locals() {
+                sorted[next[local]] = tie;
+                next[local] += 1;
+            }
+            (self.local_tie_ptr, self.local_ties) = (ptr, sorted);
         }
         self.ties = ties;
         Ok(self)

@@ -11,7 +11,7 @@ use thiserror::Error;
 ///
 /// The vector of unknowns is `[local blocks | retained blocks]`. A group of `rows` equations involves one local block, one main retained
 /// block and optional *shared* retained blocks, such as the camera of several photos. The groups of a local block are consecutive. A
-/// [`Tie`] involves any retained blocks, but not a local block.
+/// [`Tie`] involves any retained blocks, or one local block.
 ///
 /// Kernels are specialised for main blocks. A retained block is either main or shared, never both; blocks that most groups involve should
 /// be shared.
@@ -33,6 +33,9 @@ pub struct Layout {
     tie_ptr: Vec<usize>,
     /// Offset of the square matrix of each tie, and the end of the last.
     block_ptr: Vec<usize>,
+    /// The ties of local block `i` are `local_ties[local_tie_ptr[i]..local_tie_ptr[i + 1]]`; both vectors are empty if no tie is local.
+    local_tie_ptr: Vec<usize>,
+    local_ties: Vec<u32>,
     places: Option<Vec<[f64; 3]>>,
     /// Index ranges of the free unknowns of each retained block; empty if every unknown is free.
     free: Vec<Vec<Range<usize>>>,
@@ -46,11 +49,14 @@ pub struct Layout {
     contributions: Vec<Vec<u32>>,
 }
 
-/// Equations among retained blocks, such as a distance between two retained points or a relative pose of two photos.
+/// Equations among retained blocks, such as a distance between two retained points or a relative pose of two photos; or equations of one
+/// local block, such as a height of a point. The latter are part of the elimination of the block.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tie {
     /// Number of equations.
     pub rows: usize,
+    /// The local block of equations without retained blocks.
+    pub local: Option<u32>,
     /// The retained blocks, each once, in any order.
     pub retained: Vec<u32>,
 }
@@ -145,8 +151,10 @@ pub enum LayoutError {
         /// Supernode of the front.
         front: usize,
     },
-    /// A tie has zero equations or unknowns, or refers to a missing or duplicate block.
-    #[error("tie {tie} has no equations or unknowns, or names a block twice or one that does not exist")]
+    /// A tie has zero equations or unknowns, refers to a missing or duplicate block, or to a local block and others.
+    #[error(
+        "tie {tie} has no equations or unknowns, or names a block twice or one that does not exist, or has a local block and others"
+    )]
     Tie {
         /// Index of the tie.
         tie: usize,
@@ -263,7 +271,21 @@ impl Layout {
 
     /// Returns the unknowns of a tie, block by block: the columns of its coefficients.
     pub fn tie_columns(&self, tie: usize) -> impl Iterator<Item = usize> + '_ {
-        self.unknowns_of(&self.ties[tie].retained)
+        let Tie { local, retained, .. } = &self.ties[tie];
+        local.map_or(0..0, |local| self.local_range(local as usize)).chain(self.unknowns_of(retained))
+    }
+
+    /// Returns the ties of a local block.
+    pub fn ties_of(&self, local: usize) -> &[u32] {
+        match self.local_tie_ptr.get(local..local + 2) {
+            Some(ends) => &self.local_ties[ends[0]..ends[1]],
+            None => &[],
+        }
+    }
+
+    /// Whether any tie belongs to a local block.
+    pub(super) fn has_local_ties(&self) -> bool {
+        !self.local_ties.is_empty()
     }
 
     /// Number of unknowns.
