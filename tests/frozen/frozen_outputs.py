@@ -287,7 +287,9 @@ def differences(
             default=0.0,
         )
         for one, other in zip(before, after, strict=True):
-            if not equal(one, other, relative, relative * size + absolute):
+            if isinstance(one, dict | list):
+                yield from differences(one, other, f"{place}:*", relative=relative, absolute=absolute)
+            elif not equal(one, other, relative, relative * size + absolute):
                 yield place, before, after
                 return
     elif not equal(before, after, relative, absolute):
