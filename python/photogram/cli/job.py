@@ -311,11 +311,18 @@ class Without:
 
 
 def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
-    """Return the roles of options and arguments of a command that are paths."""
-    found = {}
-    for each in _options(command)[0]:
+    """Return the roles of options and arguments of a command that are paths.
+
+    A path of a class of options without a role is an input file.
+    """
+    found: dict[str, Reads | Writes] = {}
+    options, grouped = _options(command)
+    inputs = {each.name for _, own in grouped.values() for each in own}
+    for each in options:
         if (role := _mark(each, (Reads, Writes))) is not None:
             found[each.name] = role
+        elif _holds_path(each.annotation) and each.name in inputs:
+            found[each.name] = Reads.FILE
         elif _holds_path(each.annotation):
             raise TypeError(f"{command.__name__}: {each.name} must be marked as one of Reads or Writes")
     return found
@@ -456,6 +463,8 @@ def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> A
     for name in given:
         try:
             given[name] = parsers[name](given[name]) if parsers[name] else given[name]
+        except InputError:
+            raise
         except ValueError as error:
             raise misuse(names[name], "form", form=str(error), value=given[name]) from None
     for name in names:
@@ -466,7 +475,10 @@ def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> A
         known = error.phrase.fields if error.phrase else {}
         if known.get("what") not in names:
             raise
-        raise typer.BadParameter(str(known["message"]), param_hint=names[known["what"]]) from None
+        message = known["message"]
+        if "options" in message.fields:
+            message = phrase(message.code, options=[names[name] for name in message.fields["options"]])
+        raise typer.BadParameter(str(message), param_hint=names[known["what"]]) from None
 
 
 def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[str, str]:
