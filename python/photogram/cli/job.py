@@ -311,18 +311,11 @@ class Without:
 
 
 def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
-    """Return the roles of options and arguments of a command that are paths.
-
-    A path of a class of options without a role is an input file.
-    """
-    found: dict[str, Reads | Writes] = {}
-    options, grouped = _options(command)
-    inputs = {each.name for _, own in grouped.values() for each in own}
-    for each in options:
+    """Return the roles of options and arguments of a command that are paths."""
+    found = {}
+    for each in _options(command)[0]:
         if (role := _mark(each, (Reads, Writes))) is not None:
             found[each.name] = role
-        elif _holds_path(each.annotation) and each.name in inputs:
-            found[each.name] = Reads.FILE
         elif _holds_path(each.annotation):
             raise TypeError(f"{command.__name__}: {each.name} must be marked as one of Reads or Writes")
     return found
@@ -337,6 +330,13 @@ def _holds_path(kind: object) -> bool:
     return kind is Path or any(_holds_path(part) for part in get_args(kind))
 
 
+def _with_role(parameter: Parameter) -> Parameter:
+    """Return a field of a class of options; its path without a role is an input file."""
+    if not _holds_path(parameter.annotation) or _mark(parameter, (Reads, Writes)) is not None:
+        return parameter
+    return parameter.replace(annotation=Annotated[parameter.annotation, Reads.FILE])
+
+
 def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[Parameter]]]]:
     """Return options and arguments of a command, and its option classes."""
     options: list[Parameter] = []
@@ -345,7 +345,7 @@ def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tu
         kind, *marks = get_args(parameter.annotation) or (parameter.annotation,)
         if isinstance(kind, type) and is_dataclass(kind):
             without = [name for mark in marks if isinstance(mark, Without) for name in mark.names]
-            own = [option_of(each, kind) for each in fields(kind) if each.name not in without]
+            own = [_with_role(option_of(each, kind)) for each in fields(kind) if each.name not in without]
             grouped[parameter.name] = kind, own
             options += own
         elif parameter.name != "job":
