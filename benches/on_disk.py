@@ -26,7 +26,7 @@ from photogram.adjustment.adjustment import Progress
 from photogram.distributed import Division
 from photogram.distributed.division import bytes_of
 from photogram.distributed.executors import connected
-from photogram.formats import Wishes, to_files
+from photogram.formats import ReadOptions, to_files
 from photogram.formats.in_parts import adjusted_on_disk, planned_on_disk
 from photogram.formats.project import Project
 from photogram.network.block import Block
@@ -100,11 +100,11 @@ def carried_out(project: Path, run: Path, workers: int, parts: int, memory: str)
     with connected("local", workers, bytes_of(memory)) as client:
         division = Division(cluster=client, parts=parts, memory=memory)
         start = time.perf_counter()
-        plan = planned_on_disk(project, Wishes(), run, division)
+        plan = planned_on_disk(project, ReadOptions(), run, division)
         print(f"divided and planned in {time.perf_counter() - start:,.0f} s")
         print("\n".join(plan.lines()), flush=True)
         start = time.perf_counter()
-        found = adjusted_on_disk(project, Wishes(), run, division, progress=told(start))
+        found = adjusted_on_disk(project, ReadOptions(), run, division, progress=told(start))
         seconds = time.perf_counter() - start
         peaks = client.run(peak_memory)
     print("\n".join(found.lines()))

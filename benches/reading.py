@@ -68,7 +68,7 @@ def main(records: int) -> None:
         for name, content in binary_files(_model(photos, points, xy)).items():
             (place / name).write_bytes(content)
         timed("COLMAP, binary", lambda: read_model(place))
-        timed("  the whole project", lambda: formats.read(place, "colmap"))
+        timed("  the whole project", lambda: formats.read(place, file_format="colmap"))
         _control_network(place / "network.net", photos, points, xy)
 
 

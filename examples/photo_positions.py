@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from photogram import Result, adjust, formats
-from photogram.formats import Frame, PhotoFiles, Wishes, from_frame, read_metadata
+from photogram.formats import Frame, ReadOptions, from_frame, read_metadata
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "project"))
 FRAME = Frame("topocentric", "EPSG:4979", (47.38, 8.54, 450.0))
@@ -58,7 +58,7 @@ def main() -> Result:
             assert photo.deviations is not None
             print(f"{name}  position: {photo.position.source:8}sd: {photo.deviations.sd}")
         print("standard deviations by source:", found.sources())
-        project = formats.read(folder, wishes=Wishes(photos=PhotoFiles(folder / "photos")))
+        project = formats.read(folder, ReadOptions(photos_dir=folder / "photos"))
     result = adjust(project.block, unit_variance="unity")
     sd = np.sqrt(np.diagonal(result.photo_covariances[:, :3, :3], axis1=1, axis2=2)).mean(axis=0)
     print("of adjusted positions, metres:", np.round(sd, 3))

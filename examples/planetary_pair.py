@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from photogram import Attitudes, Result, Spheroid, adjust, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import POINT_TYPES, ControlNetwork, measures_of, network_text, points_of
 from photogram.network import geocentric_to_geographic, geographic_to_geocentric
@@ -162,8 +162,8 @@ def main(folder: str = "pair") -> Result:
     """Write the pair, adjust it, and print what came of it."""
     place = Path(folder)
     truth = simulate(place)
-    wishes = Wishes(cubes=place / "images.lis", jigsaw=str(place / "settings.txt"))
-    project = formats.read(place / "pair.net", wishes=wishes)
+    options = ReadOptions(cubes=place / "images.lis", jigsaw=str(place / "settings.txt"))
+    project = formats.read(place / "pair.net", options)
     result = adjust(project.block)
     sphere = project.block.spheroid
     assert sphere is not None

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from photogram import Camera, InnerConstraints, Result, Spheroid, adjust, read_result, simulate
 from photogram.cli import app
-from photogram.formats import Wishes, read, to_files
+from photogram.formats import ReadOptions, read, to_files
 from photogram.formats.supplements import with_control
 from photogram.giant import Project, write_project
 from photogram.results.datum import check_points
@@ -206,7 +206,7 @@ def test_plain_projects_say_how_good_they_are(project, tmp_path):
     text = table.read_text()
     table.write_text(text.replace("0.01,0.02,0.03", ",,"))
     for name in ("check", "control"):
-        wished = read(folder, wishes=Wishes(sd={name: (0.5,)}))
+        wished = read(folder, ReadOptions(sd={name: (0.5,)}))
         assert (wished.block.point_check_sd[wished.checks] == 0.5).all()
     row = next(line for line in text.splitlines() if line.endswith(",check"))
     cells = row.split(",")

@@ -1,6 +1,7 @@
 """`photogram adjust` in parts."""
 
 import re
+from dataclasses import fields
 from inspect import signature
 
 import numpy as np
@@ -16,9 +17,8 @@ from photogram import adjust, adjust_in_parts, read_result
 from photogram.cli import app
 from photogram.cli.in_parts import TAKEN
 from photogram.cli.job import _option
-from photogram.cli.projects import Additions
 from photogram.distributed import Division
-from photogram.formats import read
+from photogram.formats import ReadOptions, read
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ REFUSED = {
 
 def test_every_option_is_taken_or_refused_of_a_project_on_disk():
     """What is read batch by batch left options out without a word; whoever adds one decides what it does."""
-    of_files = {each.name for each in signature(Additions, eval_str=True).parameters.values()}
+    of_files = {each.name for each in fields(ReadOptions)}
     command = next(each for each in app.registered_commands if each.callback.__name__ == "adjust")
     options = {
         _option(each)

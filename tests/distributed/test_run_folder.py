@@ -23,7 +23,7 @@ from photogram.distributed.files import alone
 from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.run import partition, read_node
 from photogram.distributed.shelf import shelf
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.in_parts import planned_on_disk
 
 
@@ -150,9 +150,9 @@ def test_more_parts_than_photos_are_refused(block, tmp_path):
 def test_a_run_from_disk_has_the_same_limits(block, tmp_path):
     path = project_of(block, tmp_path / "project")
     with pytest.raises(InputError, check=lambda error: error.code == "parts.too-many"):
-        planned_on_disk(path, Wishes(), tmp_path / "run", Division(parts=100_000))
+        planned_on_disk(path, ReadOptions(), tmp_path / "run", Division(parts=100_000))
     with alone(tmp_path / "run"), pytest.raises(InputError, check=lambda error: error.code == "parts.busy"):
-        planned_on_disk(path, Wishes(), tmp_path / "run", Division(parts=2))
+        planned_on_disk(path, ReadOptions(), tmp_path / "run", Division(parts=2))
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/net/tcp"), reason="no /proc/net")

@@ -10,7 +10,7 @@ from test_parts import OPTIONS, tied_block
 from message_codes import raises
 from photogram import Distance, InputError, Position
 from photogram.distributed.run import partition, read_manifest, read_node
-from photogram.formats import Project, Wishes, read, to_files
+from photogram.formats import Project, ReadOptions, read, to_files
 from photogram.formats.plain import batches
 from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network import Relative
@@ -46,7 +46,7 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
     block = read(project).block
     expected = partition(block, tmp_path / "whole", 4, OPTIONS, "")
     assert streamable(project)
-    own = Streamed(project, Wishes(), tmp_path / "parts")
+    own = Streamed(project, ReadOptions(), tmp_path / "parts")
     np.testing.assert_array_equal(own.images, np.bincount(block.image_photos))
     assert own.source(OPTIONS) == own.source(OPTIONS)
     tree, counts = own.counted(4)
@@ -74,7 +74,7 @@ def test_names_may_come_with_all_that_the_file_has(project, tmp_path, monkeypatc
     table = pd.read_parquet(project / "images.parquet")
     names = [*(f"unseen {row}" for row in range(1000)), *sorted(set(table["point"]))]
     table.assign(point=pd.Categorical(table["point"], names)).to_parquet(folder / "images.parquet")
-    of_names, of_texts = (Streamed(each, Wishes(), tmp_path / each.name) for each in (folder, project))
+    of_names, of_texts = (Streamed(each, ReadOptions(), tmp_path / each.name) for each in (folder, project))
     np.testing.assert_array_equal(of_names.images, of_texts.images)
     found = of_names.divided(tmp_path / "parts", 4, OPTIONS, "")
     expected = of_texts.divided(tmp_path / "others", 4, OPTIONS, "")
@@ -112,7 +112,7 @@ def test_a_photo_that_is_not_there_is_named(project, tmp_path):
     table.loc[7, "photo"] = "nowhere"
     table.to_parquet(folder / "images.parquet")
     with raises(InputError, "error.unknown") as raised:
-        Streamed(folder, Wishes(), tmp_path / "parts").counted(2)
+        Streamed(folder, ReadOptions(), tmp_path / "parts").counted(2)
     assert raised.value.file.name == "images.parquet"
     fields = raised.value.phrase.fields
     assert (fields["kind"], fields["name"]) == ("photo", "nowhere")
@@ -124,7 +124,7 @@ def test_features_are_refused(project, tmp_path):
     with (folder / "project.toml").open("a") as file:
         file.write('[features]\nd = { distance = ["a", "b"] }\n')
     with pytest.raises(InputError, match=r"\[features\] require joint covariances"):
-        Streamed(folder, Wishes(), tmp_path / "parts")
+        Streamed(folder, ReadOptions(), tmp_path / "parts")
 
 
 def test_a_free_project_is_refused_before_its_images_are_read(tmp_path):
@@ -135,7 +135,7 @@ def test_a_free_project_is_refused_before_its_images_are_read(tmp_path):
         tmp_path / "free",
     )
     with pytest.raises(InputError, match=r"the block requires a datum.* photogram\.adjust_in_parts\("):
-        Streamed(project, Wishes(), tmp_path / "parts")
+        Streamed(project, ReadOptions(), tmp_path / "parts")
 
 
 def test_what_has_to_be_read_whole_is_not_streamed(project, tmp_path):

@@ -64,6 +64,7 @@ def test_options_of_one_name_are_written_alike():
         "without",
         # Of a lens and of its terms, of formats and of lenses, of splines and of trajectories.
         "camera",
+        "cameras",
         "model",
         "to",
         "knots",

@@ -9,7 +9,7 @@ import pytest
 from photogram import Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_marks import _fitted, axis_hints
-from photogram.formats import Wishes, read
+from photogram.formats import ReadOptions, read
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 
@@ -34,7 +34,7 @@ def archive(folder: Path, model: str, b: tuple[float, float] | None = None) -> R
                     reading += form[:, 1:] @ [b1 * x + b2 * y, b2 * x - b1 * y]
                     row[2:4] = map(repr, reading.tolist())
             (folder / table).write_text("\n".join(map(",".join, rows)) + "\n")
-    block = read(folder, wishes=Wishes(settings=[f"film.model={model}"])).block
+    block = read(folder, ReadOptions(settings=[f"film.model={model}"])).block
     return adjust(block, unit_variance="unity")
 
 
@@ -72,7 +72,7 @@ def test_a_single_mark_is_no_axis(tmp_path: Path) -> None:
     row = keep[k].split(",")
     keep[k] = ",".join([*row[:2], repr(float(row[2]) + 6.0), row[3]])
     (tmp_path / "fiducial_images.csv").write_text("\n".join(keep) + "\n")
-    result = adjust(read(tmp_path, wishes=Wishes(settings=["film.model=conformal"])).block)
+    result = adjust(read(tmp_path, ReadOptions(settings=["film.model=conformal"])).block)
     assert axis_hints(result) == []
 
 

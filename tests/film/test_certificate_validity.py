@@ -10,7 +10,7 @@ from message_codes import coded, has_code
 from photogram import InputError
 from photogram.cli import app
 from photogram.errors import ContradictionError
-from photogram.formats import Project, Wishes, read
+from photogram.formats import Project, ReadOptions, read
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 
@@ -31,7 +31,7 @@ def dated(folder: Path, *years: int, flown: str = "1983-07-02", more: tuple[str,
     named = ", ".join(f"'{year}.toml'" for year in years)
     return read(
         folder,
-        wishes=Wishes(
+        ReadOptions(
             settings=[f"film.certificate=[{named}]", *([f"film.flown={flown}"] * bool(flown)), *more]
         ),
     )

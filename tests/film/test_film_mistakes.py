@@ -11,8 +11,8 @@ from message_codes import coded
 from photogram import InputError
 from photogram.cli import app
 from photogram.errors import ContradictionError
-from photogram.formats import Wishes, read
-from photogram.formats.supplements import deviations
+from photogram.formats import ReadOptions, read
+from photogram.formats.read_options import deviations
 from photogram.network import Fiducial
 
 ARCHIVE = files("photogram") / "examples" / "archive"
@@ -93,12 +93,12 @@ def test_deviations_of_marks_may_be_said_beside_a_plain_project(folder: Path) ->
     changed(folder / "project.toml", "fiducial_images = 0.2\n", "")
     with pytest.raises(InputError, match=r"or as fiducial_images to \[sd\]"):
         read(folder)
-    wishes = Wishes(sd=deviations(["fiducial_images=0.3"]))
-    observations = read(folder, wishes=wishes).block.observations
+    options = ReadOptions(sd=deviations(["fiducial_images=0.3"]))
+    observations = read(folder, options).block.observations
     found = {float(np.max(each.sd)) for each in observations if isinstance(each, Fiducial)}  # type: ignore[arg-type]
     assert found == {0.3}
     with pytest.raises(InputError, match="--sd fiducial_images requires a plain project"):
-        read(Path(str(ARCHIVE)).parent / "galveston", wishes=wishes)
+        read(Path(str(ARCHIVE)).parent / "galveston", options)
     with pytest.raises(InputError, match="one of photos, images, points, fiducials, fiducial_images"):
         deviations(["fiducial=0.3"])
 

@@ -10,7 +10,7 @@ import pytest
 
 from message_codes import refused
 from photogram import InputError
-from photogram.formats import Project, Wishes, read, read_marks, write_marks
+from photogram.formats import Project, ReadOptions, read, read_marks, write_marks
 from photogram.io.csv_text import csv_text
 from photogram.network import Fiducial
 from test_film import project, project_again
@@ -140,5 +140,5 @@ def test_the_command_takes_marks_both_ways(tmp_path: Path, run: Callable[..., An
         assert content.startswith("# y of the camera is taken to count down")
         (tmp_path / f"{table}.csv").write_text(content)
     assert "sd" not in (tmp_path / "fiducial_images.csv").read_text().splitlines()[-1]
-    again = read(tmp_path, wishes=Wishes(settings=["sd.fiducial_images=0.2"]))
+    again = read(tmp_path, ReadOptions(settings=["sd.fiducial_images=0.2"]))
     assert len(again.block.observations) == len(own.block.observations)

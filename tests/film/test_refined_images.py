@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from photogram import Attitudes, Result, adjust, diagnose
 from photogram.cli import app
-from photogram.formats import Wishes, read, to_files
+from photogram.formats import ReadOptions, read, to_files
 from photogram.formats.adjusted import table_files
 from photogram.network.film_reduction import as_seen, camera_images
 
@@ -21,7 +21,7 @@ PHOTOS = ("photo", "x", "y", "z", "omega", "phi", "kappa")
 def archive(folder: Path, *said: str) -> Result:
     for each in ARCHIVE.iterdir():
         (folder / each.name).write_bytes(each.read_bytes())
-    return adjust(read(folder, wishes=Wishes(settings=said)).block, unit_variance="unity", tolerance=1e-9)
+    return adjust(read(folder, ReadOptions(settings=said)).block, unit_variance="unity", tolerance=1e-9)
 
 
 def without_films(folder: Path, refined: bytes) -> Path:

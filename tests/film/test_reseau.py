@@ -9,7 +9,7 @@ import pytest
 from message_codes import raises
 from photogram import InputError, _photocore, adjust
 from photogram.film import interior_orientation
-from photogram.formats import Project, Wishes, read, to_files
+from photogram.formats import Project, ReadOptions, read, to_files
 from photogram.network import Film, FilmPlacement, FilmSize, Readings, Reseau, Scanner
 
 ARCHIVE = files("photogram") / "examples" / "archive"
@@ -93,7 +93,7 @@ def archive(folder: Path, cells: str, *said: str) -> Project:
     for each in ARCHIVE.iterdir():
         (folder / each.name).write_bytes(each.read_bytes())
     (folder / "films.csv").write_text(f"film,sd_m,sd_photo_m,sd_b1,sd_b2,{LOCAL}\nroll-7,5e-4,{cells}\n")
-    return read(folder, wishes=Wishes(settings=said))
+    return read(folder, ReadOptions(settings=said))
 
 
 WHOLE = "1e-4,1e-4,1e-4,local,0.006,0.006,0.004,-115,-115,46,46,6,6"
@@ -130,10 +130,10 @@ def test_one_step_and_two_are_the_same_where_marks_alone_tell(tmp_path: Path) ->
     (tmp_path / "scanners.csv").write_text(
         "scanner,pitch_mm,origin_column,origin_row,Sx,Sy,alpha_rad\nscanner,0.02,6000,6000,1.00001,0.99998,2e-5\n"
     )
-    project = read(tmp_path, wishes=Wishes(settings=said))
+    project = read(tmp_path, ReadOptions(settings=said))
     inside = adjust(project.block, unit_variance="unity", tolerance=1e-9)
     before = adjust(
-        read(tmp_path, wishes=Wishes(settings=[*said, "film.interior=before"])).block, unit_variance="unity"
+        read(tmp_path, ReadOptions(settings=[*said, "film.interior=before"])).block, unit_variance="unity"
     )
     assert (np.abs(inside.film - before.film) < 1e-3 * inside.film_sd).all()
     shifts = {each.name: each.position for each in inside.unknowns if each.kind == "pattern"}

@@ -41,7 +41,7 @@ def damaged(content: bytes, random: np.random.Generator) -> bytes:
     return bytes(data)
 
 
-def check_damaged(source, place, file_format, times, seed, wishes=None):
+def check_damaged(source, place, file_format, times, seed, options=None):
     """Read damaged copies of a folder or file: each is read, or refused with a place."""
     random = np.random.default_rng(seed)
     refused = 0
@@ -59,7 +59,7 @@ def check_damaged(source, place, file_format, times, seed, wishes=None):
             files = [copy]
         victim = files[int(random.integers(len(files)))]
         victim.write_bytes(damaged(victim.read_bytes(), random))
-        error = refusal(copy, file_format, wishes)
+        error = refusal(copy, file_format, options)
         if error is not None:
             refused += 1
             assert error.file is not None, f"{number}: {error}"
@@ -67,10 +67,10 @@ def check_damaged(source, place, file_format, times, seed, wishes=None):
     return refused
 
 
-def refusal(path, file_format, wishes):
+def refusal(path, file_format, options):
     """Return why a path is refused; None where it is read."""
     try:
-        formats.read(path, file_format, wishes)
+        formats.read(path, options, file_format=file_format)
     except InputError as error:
         return error
     return None

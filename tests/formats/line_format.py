@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram import Attitudes, Camera, InputError
-from photogram.formats import Format, Project, Wishes
+from photogram.formats import Format, Project, ReadOptions
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import cards, has_suffix
 from photogram.formats.images import lens_of, sizes_of, to_corner
@@ -23,7 +23,7 @@ from photogram.words import phrase
 FILE, TITLE = "block.lines", "file of lines"
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read a file; errors of the builder name the line."""
     block = BlockBuilder(path, TITLE)
     for card in cards(path):

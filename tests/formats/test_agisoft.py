@@ -86,7 +86,7 @@ def test_a_fault_is_named_with_its_line(tmp_path, old, new, words):
     assert old in text
     (tmp_path / "cameras.xml").write_text(text.replace(old, new, 1))
     with refused("cameras.xml", *words):
-        formats.read(tmp_path / "cameras.xml", "agisoft")
+        formats.read(tmp_path / "cameras.xml", file_format="agisoft")
 
 
 def test_further_tangential_terms_have_a_camera(tmp_path):
@@ -199,9 +199,9 @@ def test_projects_of_photoscan_have_a_list_of_chunks(tmp_path):
     np.testing.assert_array_equal(project.block.photo_positions, block.photo_positions)
     assert fields_of(project.messages, "format.model-chosen") == {"n": 2, "names": ["A", "B"], "model": 0}
     with refused("format.missing what=sensors"):
-        formats.read(path, None, formats.Wishes(model=1))
+        formats.read(path, formats.ReadOptions(model=1))
     with refused("format.models n=2 model=2"):
-        formats.read(path, None, formats.Wishes(model=2))
+        formats.read(path, formats.ReadOptions(model=2))
 
 
 @pytest.mark.parametrize("named", [True, False])

@@ -29,7 +29,7 @@ def named(project):
 
 @pytest.mark.parametrize("file", FILES)
 def test_the_sample_is_the_truth_and_comes_out_as_the_dense_adjustment(file):
-    project = formats.read(sample("blocksexchange", file), None, formats.Wishes(sd={"gnss": (0.05,)}))
+    project = formats.read(sample("blocksexchange", file), formats.ReadOptions(sd={"gnss": (0.05,)}))
     check_poses(project.block, truth()["photos"])
     assert agreement(project).median < 1e-8
     held = {
@@ -52,7 +52,7 @@ def test_the_sample_is_the_truth_and_comes_out_as_the_dense_adjustment(file):
 def test_a_round_trip_gives_the_same_adjustment(tmp_path):
     project = formats.read(EXAMPLE)
     place = written(project, tmp_path / "there", "blocks_exchange") / "block.xml"
-    other = formats.read(place, None, formats.Wishes(sd={"images": (0.5,), "gnss": (0.03,)}))
+    other = formats.read(place, formats.ReadOptions(sd={"images": (0.5,), "gnss": (0.03,)}))
     same_blocks(project.block, other.block, 1e-9)
     own = [each for each in project.block.observations if each.KIND == "distance"]
     block = other.block.replace(image_sd=0.5, observations=[*other.block.observations, *own])
@@ -147,7 +147,7 @@ def test_a_fault_is_named_with_its_line(tmp_path, old, new, words):
     path = tmp_path / "block.xml"
     path.write_text(text.replace(old, new, 1))
     with refused("block.xml", *words):
-        formats.read(path, "blocks_exchange")
+        formats.read(path, file_format="blocks_exchange")
 
 
 def test_entities_are_not_read(tmp_path):
@@ -156,7 +156,7 @@ def test_entities_are_not_read(tmp_path):
         '<?xml version="1.0"?><!DOCTYPE b [<!ENTITY a "aaaa">]><BlocksExchange>&a;</BlocksExchange>'
     )
     with refused("xml.entities"):
-        formats.read(path, "blocks_exchange")
+        formats.read(path, file_format="blocks_exchange")
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -176,4 +176,4 @@ def test_packed_files_are_read_as_they_are(tmp_path):
     with zipfile.ZipFile(packed, "a") as archive:
         archive.writestr("other.xml", "<x/>")
     with refused("xml.archive n=2"):
-        formats.read(packed, "blocks_exchange")
+        formats.read(packed, file_format="blocks_exchange")

@@ -8,7 +8,7 @@ from test_plain_project import EXAMPLE, written
 
 from message_codes import has_code, refused
 from photogram import InputError, adjust, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.self_check import agreement
 
 GALVESTON = EXAMPLE.parent / "galveston"
@@ -52,7 +52,7 @@ def test_tables_of_pixels_are_the_truth(tmp_path, file, origin):
     one = tmp_path / "camera.csv"
     lines = cameras.read_text().splitlines()
     one.write_text("\n".join(lines[:2]) + "\n")
-    project = formats.read(table, None, Wishes(cameras=one, pixel_origin=origin))
+    project = formats.read(table, ReadOptions(cameras=one, pixel_origin=origin))
     known = {(each["photo"], each["point"]): each for each in truth()["observations"]}
     block = project.block
     assert len(block.image_xy) == len(known)
@@ -70,7 +70,7 @@ def test_a_table_of_pixels_says_what_is_not_used(tmp_path):
     path = tmp_path / "images.csv"
     path.write_text("\n".join([f"{lines[first]},use", *marked]) + "\n")
     (tmp_path / "camera.csv").write_text("camera,width,height,f\nA,4000,3000,3600\n")
-    project = formats.read(path, None, Wishes(cameras=tmp_path / "camera.csv"))
+    project = formats.read(path, ReadOptions(cameras=tmp_path / "camera.csv"))
     assert len(project.block.image_xy) == len(marked) - 1
     assert any(has_code(each, "pixels.unused", n=1) for each in project.messages)
 
@@ -123,8 +123,8 @@ def test_damaged_collections_end_in_a_message(tmp_path, name, source):
 def test_damaged_tables_of_pixels_end_in_a_message(tmp_path):
     lines = sample("project", "cameras.csv").read_text().splitlines()
     (tmp_path / "camera.csv").write_text("\n".join(lines[:2]) + "\n")
-    wishes = Wishes(cameras=tmp_path / "camera.csv")
-    assert check_damaged(sample("pixels", "images.csv"), tmp_path, "pixels", 500, 2, wishes) > 50
+    options = ReadOptions(cameras=tmp_path / "camera.csv")
+    assert check_damaged(sample("pixels", "images.csv"), tmp_path, "pixels", 500, 2, options) > 50
 
 
 def test_damaged_giant_projects_end_in_a_message(tmp_path):

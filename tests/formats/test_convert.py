@@ -111,7 +111,7 @@ def test_every_format_that_is_written_keeps_its_rays(tmp_path, name):
         path.write_bytes(content)
     where = tmp_path / "there"
     main = formats.FORMATS[name].files
-    block = formats.read(where / main[0] if main else where, name).block
+    block = formats.read(where / main[0] if main else where, file_format=name).block
     assert len(block.photo_ids) == len(project.block.photo_ids)
     rays = image_directions(project.block)
     count = len(block.image_xy)

@@ -10,7 +10,7 @@ from damaged import check_damaged
 
 from message_codes import fields_of, refused
 from photogram import Attitudes, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.self_check import agreement
 from test_roma import read as read_roma
 
@@ -53,7 +53,7 @@ def check_sample(project, tolerance):
 def test_the_tables_of_the_sample_are_the_truth(tmp_path):
     cameras = table_of_cameras(tmp_path / "cameras.csv")
     place = copied(sample("dbat"), tmp_path / "block")
-    project = formats.read(place, None, Wishes(cameras=cameras))
+    project = formats.read(place, ReadOptions(cameras=cameras))
     check_sample(project, 1e-11)
     held = np.isfinite(project.block.point_sd).all(axis=1)
     np.testing.assert_array_equal(project.block.point_sd[held], [(0.02, 0.02, 0.03)] * 5)
@@ -63,15 +63,15 @@ def test_the_tables_of_the_sample_are_the_truth(tmp_path):
 
 @pytest.mark.parametrize("header", ["point,label,X,Y,Z,sX,sY,sZ", "X,Y,Z,sX,sY,sZ"])
 def test_control_in_the_folder_may_have_other_headers(tmp_path, header):
-    wishes = Wishes(cameras=table_of_cameras(tmp_path / "cameras.csv"))
+    options = ReadOptions(cameras=table_of_cameras(tmp_path / "cameras.csv"))
     place = copied(sample("dbat"), tmp_path / "block")
-    before = formats.read(place, None, wishes).block
+    before = formats.read(place, options).block
     control = place / "control.txt"
     rows = [line.split(",") for line in control.read_text().splitlines() if not line.startswith("#")]
     if not header.startswith("point"):
         rows = [[row[0], *row[2:]] for row in rows]  # a word less than there are cells
     control.write_text("\n".join([header, *(",".join(row) for row in rows), ""]))
-    after = formats.read(place, None, wishes).block
+    after = formats.read(place, options).block
     np.testing.assert_array_equal(after.point_sd, before.point_sd)
     np.testing.assert_array_equal(after.point_positions, before.point_positions)
 
@@ -124,7 +124,7 @@ def test_an_export_is_the_truth(tmp_path):
     assert agreement(project).median < 1e-11
     np.testing.assert_allclose(project.block.image_sd, 0.5 * 0.0024)
     assert any(each.code == "dbat.control" for each in project.messages)
-    other = formats.read(tmp_path, None, Wishes(sd={"images": (1.0,), "control": (0.1,)}))
+    other = formats.read(tmp_path, ReadOptions(sd={"images": (1.0,), "control": (0.1,)}))
     np.testing.assert_allclose(other.block.image_sd, 0.0024)
     assert set(other.block.point_sd[np.isfinite(other.block.point_sd)]) == {0.1}
 
@@ -144,7 +144,7 @@ def test_deviations_of_control_that_are_not_computed_do_not_hold_it(tmp_path):
     assert ("read.negative", 1) in {(each.code, each.fields.get("number")) for each in project.lacks}
     row = block.point_ids.index(second[0])
     assert np.isfinite(block.point_sd[row]).tolist() == [True, True, False]
-    held = formats.read(path, None, Wishes(sd={"control": (0.1,)}))
+    held = formats.read(path, ReadOptions(sd={"control": (0.1,)}))
     assert not held.checks
 
 
@@ -179,7 +179,7 @@ def test_a_fault_of_an_export_is_named_with_its_line(tmp_path, line, change, wor
     lines[line - 1] = change(lines[line - 1])
     path.write_text("\n".join(lines) + "\n")
     with refused(*words):
-        formats.read(path, "dbat")
+        formats.read(path, file_format="dbat")
 
 
 MEASURED = """Project Units: meters
@@ -205,7 +205,7 @@ def test_tables_of_measurements_are_the_truth(tmp_path):
     (tmp_path / "a-3dpts.txt").write_text(COMPUTED + "\n".join(computed) + "\n")
     cameras = table_of_cameras(tmp_path / "cameras.csv")
     cameras.write_text("\n".join(cameras.read_text().splitlines()[:2]) + "\n")
-    project = formats.read(tmp_path / "a-2dpts.txt", None, Wishes(cameras=cameras))
+    project = formats.read(tmp_path / "a-2dpts.txt", ReadOptions(cameras=cameras))
     assert project.block.photo_ids == ["1", "2", "3", "4"]
     known = list(truth()["points"].values())
     for name, start in zip(project.block.point_ids, project.starts, strict=True):
@@ -327,7 +327,7 @@ def test_a_fault_of_a_script_is_named_with_its_line(sxb, old, new, words):
 def test_damaged_tables_end_in_a_message(tmp_path):
     cameras = table_of_cameras(tmp_path / "cameras.csv")
     place = copied(sample("dbat"), tmp_path / "block")
-    assert check_damaged(place, tmp_path / "there", "dbat", 250, 1, Wishes(cameras=cameras)) > 50
+    assert check_damaged(place, tmp_path / "there", "dbat", 250, 1, ReadOptions(cameras=cameras)) > 50
 
 
 def test_damaged_exports_end_in_a_message(tmp_path):

@@ -11,7 +11,6 @@ import photogram
 from message_codes import has_code
 from photogram import InputError, MinimumConstraints, adjust, formats
 from photogram.cli import app
-from photogram.formats import Wishes
 from photogram.network import geographic_to_geocentric
 
 EXAMPLES = Path(photogram.__file__).parent / "examples"
@@ -46,7 +45,8 @@ def written(project, name, folder):
         path.write_bytes(content)
     main = formats.FORMATS[name].files
     path = folder / "there" / main[0] if main else folder / "there"
-    return formats.read(path, name, Wishes(cameras=path.parent / "cameras.csv" if name == "pixels" else None))
+    cameras = path.parent / "cameras.csv" if name == "pixels" else None
+    return formats.read(path, file_format=name, cameras=cameras)
 
 
 @pytest.fixture(scope="module")

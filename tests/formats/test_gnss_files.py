@@ -10,7 +10,7 @@ import pytest
 from formats.photographs import EXAMPLE, block_with_pictures, picture
 from message_codes import refused
 from photogram import InputError, LeverArm, Message, Position, Spheroid, adjust, formats
-from photogram.formats import GnssFile, PhotoFiles, Wishes, read_metadata
+from photogram.formats import ReadOptions, read_metadata
 from photogram.network import geographic_to_geocentric, local_frames
 
 SD = (0.012, 0.011, 0.025)
@@ -95,7 +95,7 @@ def test_positions_of_each_program_adjust_a_model_and_a_plain_project(tmp_path, 
     folder, truth, places = flown
     path = written(tmp_path, PROGRAMS[program](places))
     crs = "EPSG:4979" if program in ("pix4d", "plain") else None
-    read = formats.read(folder / project, wishes=Wishes(sd={"images": (0.5,)}, gnss=GnssFile(path, crs)))
+    read = formats.read(folder / project, ReadOptions(sd={"images": (0.5,)}, gnss=path, gnss_crs=crs))
     found = positions(read)
     assert {name.partition(".")[0] for name in found} == set(places)
     back, turned = formats.from_frame(
@@ -127,14 +127,14 @@ def test_systems_of_coordinates_are_those_of_the_option(tmp_path, flown):
     utm, _ = from_frame("EPSG:32632", earth, turned, Frame("geocentric"))
     rows = (f"{name}.JPG,{x!r},{y!r},{z!r}" for name, (x, y, z) in zip(places, utm.tolist(), strict=True))
     path = written(tmp_path, ("utm.csv", "\n".join(rows)))
-    wishes = Wishes(sd={"gnss": (0.02, 0.02, 0.04)}, gnss=GnssFile(path, "EPSG:32632"))
-    found = positions(formats.read(folder / "plain", wishes=wishes))
+    options = ReadOptions(sd={"gnss": (0.02, 0.02, 0.04)}, gnss=path, gnss_crs="EPSG:32632")
+    found = positions(formats.read(folder / "plain", options))
     geographic = written(tmp_path, pix4d(places))
-    other = positions(formats.read(folder / "plain", wishes=Wishes(gnss=GnssFile(geographic, "EPSG:4979"))))
+    other = positions(formats.read(folder / "plain", ReadOptions(gnss=geographic, gnss_crs="EPSG:4979")))
     apart = [np.linalg.norm(np.subtract(found[each].position, other[each].position)) for each in found]
     assert max(apart) < 0.1  # the origin of the frame differs by centimetres
     with pytest.raises(InputError, match="--gnss-crs"):
-        formats.read(folder / "plain", wishes=Wishes(gnss=GnssFile(geographic)))
+        formats.read(folder / "plain", ReadOptions(gnss=geographic))
 
 
 def test_positions_without_a_system_are_in_the_frame_of_the_project(tmp_path, flown):
@@ -144,8 +144,8 @@ def test_positions_without_a_system_are_in_the_frame_of_the_project(tmp_path, fl
         for name, (x, y, z) in zip(truth.block.photo_ids, truth.photo_positions.tolist(), strict=True)
     )
     path = written(tmp_path, ("local.csv", "photo,x,y,z\n" + "\n".join(rows)))
-    wishes = Wishes(sd={"gnss": (0.02,)}, gnss=GnssFile(path))
-    project = formats.read(folder / "plain", wishes=wishes)
+    options = ReadOptions(sd={"gnss": (0.02,)}, gnss=path)
+    project = formats.read(folder / "plain", options)
     assert project.frame.kind == "cartesian"
     np.testing.assert_array_equal(
         [each.position for each in positions(project).values()], truth.photo_positions
@@ -160,7 +160,7 @@ def test_positions_without_a_system_are_in_the_frame_of_the_project(tmp_path, fl
     (tmp_path / "moved").mkdir()
     for name, content in formats.to_files(moved, "colmap").items():
         (tmp_path / "moved" / name).write_bytes(content)
-    result = adjust(formats.read(tmp_path / "moved", wishes=wishes).block)
+    result = adjust(formats.read(tmp_path / "moved", options).block)
     np.testing.assert_allclose(result.photo_positions, truth.photo_positions, atol=0.1)
 
 
@@ -168,8 +168,8 @@ def test_positions_without_a_system_are_in_the_frame_of_the_project(tmp_path, fl
 def test_an_antenna_has_a_lever_arm(tmp_path, flown, sd):
     folder, _, places = flown
     path = written(tmp_path, plain(places))
-    wishes = Wishes(gnss=GnssFile(path, "EPSG:4979", (*ANTENNA, sd)))
-    arms = [each.lever_arm for each in positions(formats.read(folder / "plain", wishes=wishes)).values()]
+    options = ReadOptions(gnss=path, gnss_crs="EPSG:4979", gnss_antenna=(*ANTENNA, sd))
+    arms = [each.lever_arm for each in positions(formats.read(folder / "plain", options)).values()]
     if sd == 0.0:
         np.testing.assert_array_equal(arms, [ANTENNA] * len(arms))
         return
@@ -183,7 +183,7 @@ def test_events_belong_to_photos_in_their_order_and_must_be_as_many(tmp_path, fl
     folder, _, places = flown
     path = written(tmp_path, rtklib(places, extra=1))
     with pytest.raises(InputError, match=r"7 events.*got 6") as caught:
-        formats.read(folder / "plain", wishes=Wishes(gnss=GnssFile(path)))
+        formats.read(folder / "plain", ReadOptions(gnss=path))
     assert caught.value.file == path
 
 
@@ -200,8 +200,8 @@ def test_events_belong_to_all_pictures_of_a_folder_by_their_times(tmp_path, flow
         image.new("RGB", (16, 12)).save(tmp_path / "photos" / f"{name}.JPG", exif=exif)
     rows = {name: places.get(name, (8.5, 47.4, 500.0)) for name in names}
     path = written(tmp_path, rtklib(rows))
-    wishes = Wishes(gnss=GnssFile(path), photos=PhotoFiles(tmp_path / "photos"))
-    project = formats.read(folder / "plain", wishes=wishes)
+    options = ReadOptions(gnss=path, photos_dir=tmp_path / "photos")
+    project = formats.read(folder / "plain", options)
     found = positions(project)
     back, _ = formats.from_frame(
         "EPSG:4979", np.array([each.position for each in found.values()]), np.zeros((6, 3, 3)), project.frame
@@ -209,7 +209,7 @@ def test_events_belong_to_all_pictures_of_a_folder_by_their_times(tmp_path, flow
     np.testing.assert_allclose(back, [places[name] for name in found], rtol=0, atol=1e-6)
     path.write_text(path.read_text().replace("10:07:54", "10:08:59"))
     with refused("photos.interval") as caught:
-        formats.read(folder / "plain", wishes=wishes)
+        formats.read(folder / "plain", options)
     assert caught.value.record is not None
 
 
@@ -277,7 +277,7 @@ def test_positions_of_a_file_replace_those_of_the_project(tmp_path, flown):
     toml.write_text(toml.read_text() + '[frame]\nkind = "topocentric"\norigin = [47.38, 8.54, 554.0]\n')
     some = {name: place for name, place in places.items() if name != "DJI_0104"}
     path = written(tmp_path, plain(some))
-    found = positions(formats.read(tmp_path / "own", wishes=Wishes(gnss=GnssFile(path, "EPSG:4979"))))
+    found = positions(formats.read(tmp_path / "own", ReadOptions(gnss=path, gnss_crs="EPSG:4979")))
     assert len(found) == 6
     np.testing.assert_array_equal(found["DJI_0104"].position, (1, 2, 3))
     assert np.linalg.norm(found["DJI_0103"].position) > 10
@@ -355,5 +355,5 @@ def test_tie_points_and_points_are_no_positions_of_photos(tmp_path, kind):
 def test_a_file_without_positions_is_rejected(tmp_path, flown, kind):
     path = written(tmp_path, ("table.csv", TIE_POINTS[kind]))
     with pytest.raises(InputError) as caught:
-        formats.read(EXAMPLE, wishes=Wishes(gnss=GnssFile(path)))
+        formats.read(EXAMPLE, ReadOptions(gnss=path))
     assert caught.value.file == path

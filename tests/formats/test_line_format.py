@@ -5,7 +5,7 @@ import pytest
 from line_format import FORMAT
 
 from photogram import InputError
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.models import lost
 
 TEXT = """\
@@ -22,7 +22,7 @@ image B Q 500.0 1500.0
 
 def project_of(folder, text):
     (folder / "block.lines").write_text(text)
-    return FORMAT.read(folder / "block.lines", Wishes())
+    return FORMAT.read(folder / "block.lines", ReadOptions())
 
 
 def test_a_file_is_read_and_written(tmp_path):

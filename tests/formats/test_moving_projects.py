@@ -15,7 +15,7 @@ from test_plain_project import change, written
 import test_moving
 from message_codes import rejected
 from photogram import Attitudes, InputError, adjust, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.block_contents import motions
 from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network import Lens, Polynomial, Smoothness, Spline, Table, Timed, Trajectory
@@ -458,7 +458,7 @@ def test_photos_that_move_are_not_adjusted_in_parts(moving_projects):
         InputError,
         match="must not contain rolling shutters or trajectories, unlike photo DJI_0",
     ):
-        Streamed(drone, Wishes(), moving_projects / "run")
+        Streamed(drone, ReadOptions(), moving_projects / "run")
 
 
 def test_a_drone_that_is_taken_to_stand_still_does_not_fit(tmp_path):

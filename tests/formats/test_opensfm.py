@@ -219,7 +219,7 @@ def test_the_largest_of_several_models_is_taken(tmp_path):
     assert len(project.block.photo_ids) == 6
     names = ["2 photos", "6 photos"]
     assert fields_of(project.messages, "format.model-chosen") == {"n": 2, "names": names, "model": 1}
-    one = formats.read(tmp_path, None, formats.Wishes(model=0))
+    one = formats.read(tmp_path, formats.ReadOptions(model=0))
     assert len(one.block.photo_ids) == 2
     assert any(each.code == "format.unknown-images" for each in one.messages)
 

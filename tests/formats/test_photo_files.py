@@ -11,7 +11,7 @@ from example_scripts import load
 from formats.photographs import EXAMPLE, ORIGIN, block_with_pictures, dji, packet, picture, tags
 from message_codes import refused
 from photogram import Position, formats
-from photogram.formats import PhotoFiles, Wishes, read_metadata
+from photogram.formats import ReadOptions, read_metadata
 from photogram.formats.metadata.adding import located
 from photogram.formats.metadata.merged import Photos
 from photogram.formats.metadata.pictures import DOP_ALONE, RADIAL
@@ -36,7 +36,7 @@ def flown(tmp_path):
 def adjusted(folder, **kinds):
     """Read a block with positions of its pictures."""
     sd = kinds.pop("sd", {})
-    return formats.read(folder, wishes=Wishes(sd=sd, photos=PhotoFiles(folder / "photos", **kinds)))
+    return formats.read(folder, ReadOptions(sd=sd, photos_dir=folder / "photos", **kinds))
 
 
 def positions(project):
@@ -87,7 +87,7 @@ def test_positions_without_rtk_have_nothing_in_common(tmp_path):
         picture(path, gps=tags(longitude, latitude, height - 47.0, tag_31=3.0))
 
     block_with_pictures(tmp_path, write=write)
-    found = positions(adjusted(tmp_path, crs="EPSG:4326+geoid=47"))
+    found = positions(adjusted(tmp_path, photos_crs="EPSG:4326+geoid=47"))
     for each in found.values():
         assert each.shift is None
         assert not np.any(each.lever_arm)
@@ -103,12 +103,15 @@ def test_heights_of_exif_need_a_word(tmp_path):
     with refused("photos.height-kind option=--photos-crs"):
         adjusted(tmp_path)
     with refused("photos.wgs84 crs=EPSG:25832 option=--photos-crs"):
-        adjusted(tmp_path, crs="EPSG:25832")
+        adjusted(tmp_path, photos_crs="EPSG:25832")
     ellipsoidal, above = (
-        positions(adjusted(tmp_path, crs=crs))["DJI_0101"] for crs in ("EPSG:4979", "EPSG:4326+geoid=47")
+        positions(adjusted(tmp_path, photos_crs=crs))["DJI_0101"]
+        for crs in ("EPSG:4979", "EPSG:4326+geoid=47")
     )
     assert np.linalg.norm(np.subtract(above.position, ellipsoidal.position)) < 1.0  # each amid its own photos
-    heights = [adjusted(tmp_path, crs=crs).frame.origin[2] for crs in ("EPSG:4979", "EPSG:4326+geoid=47")]
+    heights = [
+        adjusted(tmp_path, photos_crs=crs).frame.origin[2] for crs in ("EPSG:4979", "EPSG:4326+geoid=47")
+    ]
     assert heights[1] - heights[0] == 47.0
 
 
@@ -247,7 +250,7 @@ def test_solutions_that_are_not_fixed_and_accuracies_of_exif_are_told(tmp_path):
             picture(path, gps=tags(*place, **({"tag_31": 3.0} if number < 6 else {"tag_11": 1.2})))
 
     block_with_pictures(tmp_path, write=write)
-    project = adjusted(tmp_path, crs="EPSG:4979", sd={"gnss": (5.0,)})
+    project = adjusted(tmp_path, photos_crs="EPSG:4979", sd={"gnss": (5.0,)})
     fixes = [own.fields for own in map(attrgetter("phrase"), project.messages) if own.code == "photos.fix"]
     assert [(own["fix"], own["names"]) for own in fixes] == [
         ("float", ["DJI_0102.JPG"]),
@@ -368,7 +371,7 @@ def test_folders_that_say_nothing_are_refused(tmp_path, flown):
         read_metadata(folder / "project.toml")
     picture(tmp_path / "others" / "a.jpg", xmp=packet(dji(*PLACE)))
     with refused("photos.none"):
-        formats.read(folder, wishes=Wishes(photos=PhotoFiles(tmp_path / "others")))
+        formats.read(folder, ReadOptions(photos_dir=tmp_path / "others"))
 
 
 def test_the_command_writes_tables_that_a_project_reads(run, flown):

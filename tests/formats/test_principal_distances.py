@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 
 
 def read(folder, reader, cameras, image="px"):
@@ -12,7 +12,7 @@ def read(folder, reader, cameras, image="px"):
     (folder / "cameras.csv").write_text(cameras)
     if reader == "pixels":
         (folder / "measured.csv").write_text("photo,point,column,row\na,1,100,200\nb,1,120,210\n")
-        return formats.read(folder / "measured.csv", None, Wishes(cameras=folder / "cameras.csv"))
+        return formats.read(folder / "measured.csv", ReadOptions(cameras=folder / "cameras.csv"))
     (folder / "project.toml").write_text(f'[project]\nformat = 1\n[units]\nimage = "{image}"\n')
     (folder / "photos.csv").write_text("photo\na\nb\n")
     (folder / "images.csv").write_text("photo,point,x,y\na,1,100,200\nb,1,120,210\n")

@@ -10,7 +10,7 @@ from test_plain_project import written
 
 from message_codes import refused
 from photogram import Attitudes, Camera, InputError, adjust, formats
-from photogram.formats import Wishes, supplements
+from photogram.formats import ReadOptions, supplements
 from photogram.network.directions import image_directions
 
 FOCAL = {"A": 8.67, "B": 9.315}
@@ -43,7 +43,7 @@ def check(project, image, position, attitude):
 
 
 def test_the_patb_sample_is_the_truth():
-    project = formats.read(sample("patb"), None, Wishes(sd={"control": (0.02, 0.02, 0.03)}))
+    project = formats.read(sample("patb"), ReadOptions(sd={"control": (0.02, 0.02, 0.03)}))
     check(project, 1e-7, 6e-6, 2e-12)
     assert int(np.count_nonzero(np.isfinite(project.block.point_sd).all(axis=1))) == 5
     assert any("first record" in str(each) for each in project.messages)
@@ -54,7 +54,7 @@ def test_the_patb_sample_is_the_truth():
 def test_the_bingo_sample_is_the_truth(tmp_path):
     cameras = tmp_path / "cameras.csv"
     cameras.write_text("camera,c\nA,8.67\nB,9.315\n")
-    project = formats.read(sample("bingo"), None, Wishes(cameras=cameras))
+    project = formats.read(sample("bingo"), ReadOptions(cameras=cameras))
     names = {str(101 + row): name for row, name in enumerate(truth()["photos"])}
     project = project.replace(
         block=project.block.replace(photo_ids=[names[name] for name in project.block.photo_ids])
@@ -111,7 +111,7 @@ def test_a_fault_is_named_with_its_line(tmp_path, file, old, new, words):
         formats.read(tmp_path)
 
 
-SD = Wishes(sd={"control": (0.02, 0.02, 0.03)})
+SD = ReadOptions(sd={"control": (0.02, 0.02, 0.03)})
 
 
 def pinholes():
@@ -171,7 +171,7 @@ def test_patb_keeps_the_digits_that_are_stated(tmp_path):
     assert "image coordinates have 1e-4 micrometres, positions 1e-5" in lost
     place = written(project, tmp_path, "patb")
     assert [len(line) for line in (place / "block.ori").read_text().splitlines()[:3]] == [80, 80, 64]
-    other = formats.read(place, None, SD)
+    other = formats.read(place, SD)
     assert other.block.photo_ids == project.block.photo_ids
     assert sorted(other.block.point_ids) == sorted(project.block.point_ids)
     assert len(other.checks) == len(project.checks) == 2
@@ -207,7 +207,7 @@ def test_heights_alone_are_control_of_patb(tmp_path):
     positions, sd = block.point_positions.copy(), block.point_sd.copy()
     positions[held, :2], sd[held, :2] = np.nan, np.inf
     partly = project.replace(block=block.replace(point_positions=positions, point_sd=sd))
-    other = formats.read(written(partly, tmp_path, "patb"), None, SD)
+    other = formats.read(written(partly, tmp_path, "patb"), SD)
     for row in held:
         own = other.block.point_ids.index(block.point_ids[row])
         np.testing.assert_array_equal(np.isfinite(other.block.point_sd[own]), [False, False, True])
@@ -232,4 +232,4 @@ def test_damaged_blocks_end_in_a_message(tmp_path, seed):
 def test_damaged_bingo_blocks_end_in_a_message(tmp_path):
     cameras = tmp_path / "cameras.csv"
     cameras.write_text("camera,c\nA,8.67\nB,9.315\n")
-    assert check_damaged(sample("bingo"), tmp_path, "bingo", 500, 4, Wishes(cameras=cameras)) > 50
+    assert check_damaged(sample("bingo"), tmp_path, "bingo", 500, 4, ReadOptions(cameras=cameras)) > 50

@@ -6,7 +6,7 @@ import pytest
 
 from message_codes import rejected
 from photogram import InputError
-from photogram.formats import Wishes, read, to_files
+from photogram.formats import ReadOptions, read, to_files
 from photogram.formats.plain.settings import read_settings
 
 TABLES = {
@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def said(folder: Path, *words: str):
-    return read(folder, wishes=Wishes(settings=words))
+    return read(folder, ReadOptions(settings=words))
 
 
 def test_what_is_said_goes_before_the_file(folder: Path) -> None:
@@ -39,7 +39,10 @@ def test_what_is_said_goes_before_the_file(folder: Path) -> None:
 @pytest.mark.parametrize("text", ["quarry, east", "a = b", "1\nx = 2", "1.2.3"])
 def test_texts_may_go_without_quotation_marks(folder: Path, text: str) -> None:
     for word in (text, f"'{text}'") if "\n" not in text else (text,):
-        assert read_settings(folder / "project.toml", Wishes(settings=[f"project.name={word}"])).name == text
+        assert (
+            read_settings(folder / "project.toml", ReadOptions(settings=[f"project.name={word}"])).name
+            == text
+        )
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from photogram import Block, formats
 from photogram.cli import adjust as adjusting
 from photogram.cli.components import UnitVarianceName
 from photogram.distributed import Division
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.images import to_corner
 from photogram.formats.supplements import self_calibrated, with_control
 
@@ -180,7 +180,7 @@ def _adjusted(
 ) -> list[str]:
     """Do what the command does, by the Python interface: read, find first values, adjust, report."""
     sd = {"control": (0.02,), "images": (0.5,), "gnss": (0.1,)}
-    project = formats.read(path, None, Wishes(sd=sd, cameras=_cameras(path)))
+    project = formats.read(path, ReadOptions(sd=sd, cameras=_cameras(path)))
     if control is not None:
         project = with_control(project, control, sd, crs)
     if calibrated:

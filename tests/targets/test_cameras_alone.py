@@ -89,4 +89,4 @@ def test_they_are_no_formats_of_projects():
     assert set(FORMATS_OF_CAMERAS) == set(CAMERA_FORMATS)
     assert not set(FORMATS_OF_CAMERAS) & set(formats.FORMATS)
     with refused("format.unknown what=format value=mrcal"):
-        formats.read(PROJECT, "mrcal")
+        formats.read(PROJECT, file_format="mrcal")

@@ -37,7 +37,7 @@ def option(
     Parameters
     ----------
     default
-        Default value.
+        Default value, or a class whose constructor returns it.
     low, high
         Smallest and largest value; excluded if `is_open`.
     kind
@@ -48,7 +48,10 @@ def option(
         Name on the command line; empty: the name of the field.
     """
     limits = {"low": low, "high": high, "open": is_open}
-    return field(default=default, metadata={**limits, "kind": kind, "parse": parse, "name": name})
+    metadata = {**limits, "kind": kind, "parse": parse, "name": name}
+    if isinstance(default, type):
+        return field(default_factory=default, metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 class Checked:
@@ -104,13 +107,14 @@ def checks_of(kind: Any) -> dict[str, Check]:
 def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | None:
     """Return the check of a type; None if values of the type are not checked."""
     from photogram.arguments import arrays
-    from photogram.arguments.objects import require_kind
+    from photogram.arguments.objects import path_of, require_kind
 
     simple: dict[str, Check] = {
         "int": arrays.whole_number,
         "float": arrays.number,
         "bool": arrays.truth_value,
         "str": _text,
+        "Path": path_of,
         "Floats": arrays.numbers,
         "Indices": arrays.whole_numbers,
         "Bools": arrays.truth_values,

@@ -15,7 +15,8 @@ from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_document, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import Folder, Input, InputFile, Job, OutputFile, Reads, Writes, with_job
-from photogram.cli.projects import EXAMPLE, Additions, read_project
+from photogram.cli.projects import EXAMPLE, read_project
+from photogram.formats.read_options import ReadOptions
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
@@ -147,7 +148,7 @@ def relative(
     path: Input,
     out: Annotated[Path, Writes.FILE],
     photos: str | None = None,
-    added: Additions,
+    reading: ReadOptions,
 ) -> None:
     """Orient pairs of photos relatively and join their models to a strip.
 
@@ -161,7 +162,7 @@ def relative(
     from photogram.formats.reduced_coordinates import given_control
     from photogram.io.csv_text import csv_text
 
-    project = read_project(job, path, added)
+    project = read_project(job, path, reading)
     names = project.block.photo_ids if photos is None else [each.strip() for each in photos.split(",")]
     strip = strip_of(project.block, names)
     control = given_control(project)

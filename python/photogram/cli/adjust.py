@@ -22,9 +22,10 @@ from photogram.cli.job import (
     with_job,
 )
 from photogram.cli.options import OrderingName, Snooping, Threads, check_alone
-from photogram.cli.projects import EXAMPLE, NOTHING, Additions, described, read_project
+from photogram.cli.projects import EXAMPLE, described, read_project
 from photogram.cli.statement_output import OfHead, stated, statement_files
 from photogram.distributed.division import Division
+from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import replace
 from photogram.words import phrase
 
@@ -46,7 +47,7 @@ def adjust(
     path: Input,
     out: Folder,
     documents: Documents,
-    added: Additions,
+    reading: ReadOptions,
     choices: Choices,
     snoop: bool = False,
     snooping: Snooping,
@@ -76,12 +77,12 @@ def adjust(
     documents.check_plots(job, out)
     parts = None if run is None and division == Division() else replace(division, folder=run)
     on_disk = partial(adjusted_on_disk, job, path, out, choices=choices, threads=threads, is_plan=plan)
-    if parts and added == NOTHING and on_disk(parts):
+    if parts and reading == ReadOptions() and on_disk(parts):
         return
-    project = read_project(job, path, added)
+    project = read_project(job, path, reading)
     check_maps(documents.map)  # now that all inputs are known, which it must not be
     project = choices.of(project)
-    asked = wanted.asked(project, added, project.block.linear_unit) if statement else None
+    asked = wanted.asked(project, reading, project.block.linear_unit) if statement else None
     sections = described(project)
     if not job.quiet:
         print_sections(sections, "`photogram info`")
@@ -276,7 +277,7 @@ def adjusted_block(
 def result_at(
     job: Job,
     path: Path,
-    added: Additions,
+    reading: ReadOptions,
     threads: int | None,
     *,
     choices: Choices = Choices(),  # noqa: B008  # frozen
@@ -288,14 +289,14 @@ def result_at(
     from photogram.formats.results import is_result
 
     if is_result(path):
-        if replace(added, sd=None) != NOTHING or choices != Choices() or keep_all:
+        if replace(reading, sd={}) != ReadOptions() or choices != Choices() or keep_all:
             raise misuse("PATH", "saved-result")
         job.reads(path)
         result = read_result(path)
         if not isinstance(result, Result):
             raise misuse("PATH", "collection")
         return result, None
-    project = choices.of(read_project(job, path, added))
+    project = choices.of(read_project(job, path, reading))
     block, started = started_block(project, keep_all=keep_all)
     whole = project if fitted else project.replace(features={})
     return adjusted_block(job, whole, started or block, choices=choices, threads=threads), project

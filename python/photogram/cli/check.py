@@ -11,7 +11,8 @@ from photogram.cli.console import print_sections
 from photogram.cli.documents import TEXT, PageAndJson
 from photogram.cli.job import Folder, Input, Job, Reads, with_job
 from photogram.cli.options import Threads
-from photogram.cli.projects import EXAMPLE, Additions, described, read_project
+from photogram.cli.projects import EXAMPLE, described, read_project
+from photogram.formats.read_options import ReadOptions
 
 if TYPE_CHECKING:
     pass
@@ -26,7 +27,7 @@ def check_project(
     path: Input,
     out: Folder,
     documents: PageAndJson,
-    added: Additions,
+    reading: ReadOptions,
     threads: Threads = None,
 ) -> None:
     """Search for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.
@@ -36,7 +37,7 @@ def check_project(
     from photogram import diagnose
 
     documents.place(out)  # rejected before any input is read
-    project = read_project(job, path, added)
+    project = read_project(job, path, reading)
     if not job.quiet:
         print_sections(described(project), "`photogram info`")
     with job.status("checking"):

@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from copy import copy
-from dataclasses import Field
+from dataclasses import MISSING, Field
 from functools import cache, partial
 from inspect import Parameter
 from pathlib import Path
@@ -64,16 +64,16 @@ def option_of(field: Field[Any], kind: type) -> Parameter:
     hint: Any = field.metadata.get("kind")
     if hint is None:
         hint = eval(str(field.type), vars(sys.modules[kind.__module__]))
-    default = None if field.default == () else field.default
+    default = None if field.default in ((), MISSING) else field.default
     if field.metadata.get("kind") is not None and default is None:
         hint |= None
     if name := field.metadata.get("name"):
         hint = Annotated[hint, typer.Option(name)]
     low, high = (field.metadata.get(name, limit) for name, limit in (("low", -math.inf), ("high", math.inf)))
-    if hint is int:
+    if int in (hint, field.metadata.get("kind")):
         limits = (("min", low), ("max", high))
         closed: dict[str, Any] = {name: limit for name, limit in limits if isinstance(limit, int)}
-        hint = Annotated[int, typer.Option(**closed)] if closed else int
+        hint = Annotated[hint, typer.Option(**closed)] if closed else hint
     parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=hint)
     parameter = declared(parameter, kind.__name__)
     if hint in (float, float | None) and -low < UNLIMITED:

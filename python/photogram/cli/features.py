@@ -11,7 +11,7 @@ from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_sections
 from photogram.cli.job import Input, Job, OutputFile, OutputFolder, with_job
 from photogram.cli.options import Threads
-from photogram.cli.projects import Additions
+from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import dataclass, fields
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def features(
     coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None,
     out: OutputFolder = None,
     json: OutputFile = None,
-    added: Additions,
+    reading: ReadOptions,
     threads: Threads = None,
     strict: bool = False,
 ) -> None:
@@ -72,7 +72,7 @@ def features(
     from photogram.show.page import Document
 
     definitions = wanted.definitions()
-    result, project = result_at(job, path, added, threads, fitted=False)
+    result, project = result_at(job, path, reading, threads, fitted=False)
     if project is not None:
         declared = dict(project.features)
     else:

@@ -10,7 +10,8 @@ from photogram.cli.console import print_sections
 from photogram.cli.documents import PageAndJson
 from photogram.cli.job import Folder, Input, Job, OutputFolder, Reads, with_job
 from photogram.cli.options import Threads
-from photogram.cli.projects import NOTHING, Additions, read_project
+from photogram.cli.projects import read_project
+from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import replace
 from photogram.messages import counted
 from photogram.words import phrase
@@ -27,7 +28,7 @@ def film(
     path: Input,
     out: Folder,
     documents: PageAndJson,
-    added: Additions,
+    reading: ReadOptions,
     threads: Threads = None,
     strict: bool = False,
 ) -> None:
@@ -41,17 +42,17 @@ def film(
     """
     from photogram.film import compare_steps
 
-    found = compare_steps(*(_adjusted(job, path, added, how, threads) for how in ("inside", "before")))
+    found = compare_steps(*(_adjusted(job, path, reading, how, threads) for how in ("inside", "before")))
     code = found.inside.verdict.exit_code(strict=strict)
     documents.conclude(job, "film", found, out, code=code)
 
 
-def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: int | None) -> Result:
+def _adjusted(job: Job, path: Path, reading: ReadOptions, interior: str, threads: int | None) -> Result:
     """Adjust the block with the requested interior orientation of films."""
     from photogram import InputError
 
-    settings = [*(added.settings or []), f"film.interior={interior}"]
-    project = read_project(job, path, replace(added, settings=settings))
+    settings = [*reading.settings, f"film.interior={interior}"]
+    project = read_project(job, path, replace(reading, settings=settings))
     if not project.block.passages:
         raise InputError(phrase("command.no-film"), file=path)
     block, started = started_block(project, keep_all=False)
@@ -77,7 +78,7 @@ def marks(
     if has_marks(path):
         files, told = _tables(job, path, name)
     else:
-        files = write_marks(read_project(job, path, NOTHING))
+        files = write_marks(read_project(job, path, ReadOptions()))
         told = [("For MicMac", [counted(len(files), "file")])]
     written = {} if out is None else {out / file: content for file, content in files.items()}
     job.finish(written, summary=lambda: print_sections(told, "--out DIR"))

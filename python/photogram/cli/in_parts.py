@@ -43,7 +43,7 @@ def adjusted_on_disk(
     is_plan: bool,
 ) -> bool:
     """Plan or adjust a project batch by batch; False if this is impossible."""
-    from photogram.formats import Wishes
+    from photogram.formats import ReadOptions
     from photogram.formats.plain.batches import streamable
 
     if not streamable(path):
@@ -54,14 +54,14 @@ def adjusted_on_disk(
             raise misuse(name, "parquet-in-parts", options=typed)
     from photogram.formats import in_parts
 
-    wishes, folder = Wishes(), Path(division.folder or target / "run")
+    reading, folder = ReadOptions(), Path(division.folder or target / "run")
     change = choices.options
     if is_plan:
-        print_plan(in_parts.planned_on_disk(path, wishes, folder, division, change=change))
+        print_plan(in_parts.planned_on_disk(path, reading, folder, division, change=change))
         return True
     with adjustment_status(job) as progress:
         found = in_parts.adjusted_on_disk(
-            path, wishes, folder, division, change=change, threads=threads, progress=progress
+            path, reading, folder, division, change=change, threads=threads, progress=progress
         )
     lines = [*found.lines(), str(phrase("command.node-results", folder=folder / "results"))]
     job.finish(

@@ -330,6 +330,13 @@ def _holds_path(kind: object) -> bool:
     return kind is Path or any(_holds_path(part) for part in get_args(kind))
 
 
+def _with_role(parameter: Parameter) -> Parameter:
+    """Return a field of a class of options; its path without a role is an input file."""
+    if not _holds_path(parameter.annotation) or _mark(parameter, (Reads, Writes)) is not None:
+        return parameter
+    return parameter.replace(annotation=Annotated[parameter.annotation, Reads.FILE])
+
+
 def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[Parameter]]]]:
     """Return options and arguments of a command, and its option classes."""
     options: list[Parameter] = []
@@ -338,7 +345,7 @@ def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tu
         kind, *marks = get_args(parameter.annotation) or (parameter.annotation,)
         if isinstance(kind, type) and is_dataclass(kind):
             without = [name for mark in marks if isinstance(mark, Without) for name in mark.names]
-            own = [option_of(each, kind) for each in fields(kind) if each.name not in without]
+            own = [_with_role(option_of(each, kind)) for each in fields(kind) if each.name not in without]
             grouped[parameter.name] = kind, own
             options += own
         elif parameter.name != "job":
@@ -456,6 +463,8 @@ def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> A
     for name in given:
         try:
             given[name] = parsers[name](given[name]) if parsers[name] else given[name]
+        except InputError:
+            raise
         except ValueError as error:
             raise misuse(names[name], "form", form=str(error), value=given[name]) from None
     for name in names:
@@ -466,7 +475,10 @@ def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> A
         known = error.phrase.fields if error.phrase else {}
         if known.get("what") not in names:
             raise
-        raise typer.BadParameter(str(known["message"]), param_hint=names[known["what"]]) from None
+        message = known["message"]
+        if "options" in message.fields:
+            message = phrase(message.code, options=[names[name] for name in message.fields["options"]])
+        raise typer.BadParameter(str(message), param_hint=names[known["what"]]) from None
 
 
 def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[str, str]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from photogram.cli.console import print_sections
 from photogram.cli.job import Input, Job, OutputFile, Reads, Writes, with_job
-from photogram.cli.projects import EXAMPLE, Additions, described, read_project
+from photogram.cli.projects import EXAMPLE, described, read_project
+from photogram.formats.read_options import ReadOptions
 from photogram.messages import counted, listed
 from photogram.words import phrase
 
@@ -24,7 +25,7 @@ def info(
     *,
     path: Input,
     json: OutputFile = None,
-    added: Additions,
+    reading: ReadOptions,
 ) -> None:
     """Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.
 
@@ -32,7 +33,7 @@ def info(
     """
     from photogram.io.json import to_json
 
-    project = read_project(job, path, added)
+    project = read_project(job, path, reading)
     sections = [*described(project), *_asked(project)]
     job.finish(
         {} if json is None else {json: to_json(dict(sections))},
@@ -66,13 +67,13 @@ def convert(
     path: Input,
     out: Annotated[Path, Writes.EITHER],
     to: str | None = None,
-    added: Additions,
+    reading: ReadOptions,
 ) -> None:
     """Write a project in another format and list the data that the format cannot contain."""
     from photogram.formats import cannot_hold, target
 
     chosen = target(out, to)
-    project = read_project(job, path, added)
+    project = read_project(job, path, reading)
     lost = cannot_hold(project, chosen.format.name)
     sections = [
         *described(project),
@@ -98,7 +99,7 @@ def metadata(
     """
     from photogram.formats import read_metadata
     from photogram.formats.metadata.adding import gnss_files
-    from photogram.formats.supplements import deviations
+    from photogram.formats.read_options import deviations
 
     given = deviations(sd or [])
     found = read_metadata(path, mrk_antenna=mrk_antenna)

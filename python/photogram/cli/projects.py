@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-import typer
-
-from photogram.cli.command_classes import misuse
-from photogram.cli.job import InputFile, Job
-from photogram.lazy_dataclasses import dataclass
+from photogram.cli.job import Job
+from photogram.formats.read_options import ReadOptions
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:
@@ -21,103 +17,16 @@ if TYPE_CHECKING:
 
 EXAMPLE = ("project",)  # The packaged example, a directory of photogram.examples
 
-OriginName = Literal["corner", "center"]
 
+def read_project(job: Job, path: Path, options: ReadOptions) -> Project:
+    """Read a project; its files become inputs of the job."""
+    from photogram.formats import read
 
-@dataclass(frozen=True)
-class Additions:
-    """Options for additional data of a project."""
-
-    file_format: Annotated[str | None, typer.Option("--format")] = None
-    control: InputFile = None
-    control_crs: str | None = None
-    columns: str | None = None
-    roles: str | None = None
-    images: InputFile = None
-    names: InputFile = None
-    camera: InputFile = None
-    sd: list[str] | None = None
-    settings: Annotated[list[str] | None, typer.Option("--set")] = None
-    photos_dir: InputFile = None
-    photos_crs: str | None = None
-    gnss: InputFile = None
-    gnss_crs: str | None = None
-    gnss_antenna: str | None = None
-    mrk_antenna: bool = False
-    pixel_origin: OriginName | None = None
-    model: Annotated[int | None, typer.Option(min=0)] = None
-    angles: Literal["deg", "gon", "rad"] | None = None
-    keep_repeated: bool = False
-    cubes: InputFile = None
-    jigsaw: str | None = None
-
-
-NOTHING = Additions()
-
-
-def read_project(job: Job, path: Path, added: Additions) -> Project:
-    """Read a project with additional data; its files become inputs of the job."""
-    from photogram.formats import GnssFile, PhotoFiles, Wishes, read
-    from photogram.formats.columns import columns_given
-    from photogram.formats.names import with_names
-    from photogram.formats.supplements import deviations, with_control, with_images, with_repeated, with_sd
-
-    if added.photos_dir is None and added.photos_crs:
-        raise misuse("--photos-crs", "requires", options="--photos-dir DIR")
-    if added.photos_dir is None and added.gnss is None and added.mrk_antenna:
-        raise misuse("--mrk-antenna", "requires", options="--photos-dir DIR or --gnss FILE")
-    if added.gnss is None and (added.gnss_crs or added.gnss_antenna):
-        option = "--gnss-crs" if added.gnss_crs else "--gnss-antenna"
-        raise misuse(option, "requires", options="--gnss FILE")
-    if added.cubes is None and added.jigsaw is not None:
-        raise misuse("--jigsaw", "requires", options="--cubes LIST")
     job.reads_inside(path)
-    sd = deviations(added.sd or [])
-    columns = columns_given(added.columns, added.roles)
-    origin = None if added.pixel_origin is None else added.pixel_origin
-    wishes = Wishes(
-        cameras=added.camera,
-        pixel_origin=origin,
-        model=added.model,
-        angles=None if added.angles is None else added.angles,
-        sd=sd,
-        columns=columns,
-        photos=None
-        if added.photos_dir is None
-        else PhotoFiles(added.photos_dir, added.photos_crs, added.mrk_antenna),
-        gnss=None
-        if added.gnss is None
-        else GnssFile(added.gnss, added.gnss_crs, _antenna(added.gnss_antenna), added.mrk_antenna),
-        cubes=added.cubes,
-        jigsaw=added.jigsaw,
-        settings=added.settings or (),
-    )
-    project = with_sd(read(path, added.file_format, wishes), sd)
+    project = read(path, options)
     job.reads(*project.details.get("further inputs", ()))
     job.spares(*project.details.get("photo pictures", ()))
-    if added.keep_repeated:
-        project = with_repeated(project)
-    if added.images is not None:
-        project = with_images(project, added.images, origin)
-    if added.names is not None:
-        project = with_names(project, added.names)
-    if added.control is not None:
-        project = with_control(project, added.control, sd, added.control_crs, columns)
     return project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
-
-
-def _antenna(text: str | None) -> tuple[float, float, float, float] | None:
-    """Return antenna position and standard deviation of `X,Y,Z` or `X,Y,Z,SD`."""
-    if text is None:
-        return None
-    try:
-        x, y, z, sd = map(float, (text if text.count(",") == 3 else f"{text},0").split(","))
-    except ValueError:
-        sd = x = y = z = math.nan
-    if not (math.isfinite(x + y + z) and sd >= 0):
-        form = "3 or 4 numbers in metres, such as 0.0,0.08,0.1,0.01"
-        raise misuse("--gnss-antenna", "form", form=form, value=text)
-    return x, y, z, sd
 
 
 def described(project: Project) -> list[TitledLines]:

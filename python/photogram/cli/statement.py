@@ -10,8 +10,8 @@ from photogram.cli.choices import Choices
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.job import Folder, Input, Job, with_job
 from photogram.cli.options import Threads
-from photogram.cli.projects import Additions
 from photogram.cli.statement_output import StatementOptions, stated, statement_files
+from photogram.formats.read_options import ReadOptions
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def statement(
     out: Folder,
     wanted: StatementOptions,
     crs: str | None = None,
-    added: Additions,
+    reading: ReadOptions,
     choices: Choices,
     keep_all: bool = False,
     threads: Threads = None,
@@ -42,9 +42,9 @@ def statement(
     survey, in the table of control or by --sd check=0.01. --example is the project of `photogram new --kind
     survey`.
     """
-    result, project = result_at(job, path, added, threads, choices=choices, keep_all=keep_all)
+    result, project = result_at(job, path, reading, threads, choices=choices, keep_all=keep_all)
     project = project or _project_beside(job, path, result)
-    asked = wanted.asked(project, added, result.block.linear_unit)
+    asked = wanted.asked(project, reading, result.block.linear_unit)
     assumed = () if project is None else project.lacks
     with job.status("stating"):
         found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
@@ -70,7 +70,7 @@ def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
         return None
     # Only the settings concern the statement: all figures are from the result.
     job.reads(settings)
-    project = read(settings.parent, "plain")
+    project = read(settings.parent, file_format="plain")
     own, block = result.block, project.block
     if set(own.photo_ids) == set(block.photo_ids) and set(own.point_ids) == set(block.point_ids):
         return project

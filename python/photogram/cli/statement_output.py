@@ -13,7 +13,7 @@ from photogram.arguments.fields import option
 from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark
 from photogram.cli.job import InputFile, Job, Without
-from photogram.cli.projects import Additions
+from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.words import phrase
 
@@ -66,10 +66,9 @@ class StatementOptions:
         for name in self.given:
             raise misuse(f"--{name.replace('_', '-')}", "requires", options="--statement")
 
-    def asked(self, project: Project | None, added: Additions, unit: str) -> dict[str, Any]:
+    def asked(self, project: Project | None, reading: ReadOptions, unit: str) -> dict[str, Any]:
         """Return checked settings of a statement from options or project; lengths are in a unit."""
         from photogram.formats.plain.keys import read_sentences
-        from photogram.formats.supplements import deviations
         from photogram.results.statement.request import Asked, length_of
 
         declared = {} if project is None else project.statement
@@ -81,7 +80,7 @@ class StatementOptions:
             asked["area"] = length_of(self.area, unit, area=True)
         if self.text is not None:
             asked["text"] = read_sentences(self.text)
-        sd = deviations(added.sd or []).get("check")
+        sd = reading.sd.get("check")
         if sd is not None:
             asked["sd"] = sd
         Asked.checked(**asked)

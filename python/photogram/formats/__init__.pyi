@@ -6,9 +6,6 @@ from .crs import to_frame as to_frame
 from .crs_results import Placed as Placed
 from .crs_results import placed as placed
 from .format import Format as Format
-from .format import GnssFile as GnssFile
-from .format import PhotoFiles as PhotoFiles
-from .format import Wishes as Wishes
 from .metadata.merged import Metadata as Metadata
 from .metadata.merged import PhotoRecord as PhotoRecord
 from .metadata.merged import read_metadata as read_metadata
@@ -17,6 +14,7 @@ from .micmac import read_marks as read_marks
 from .micmac import write_marks as write_marks
 from .project import Frame as Frame
 from .project import Project as Project
+from .read_options import ReadOptions as ReadOptions
 from .registry import FORMATS as FORMATS
 from .registry import adjusting as adjusting
 from .registry import cannot_hold as cannot_hold

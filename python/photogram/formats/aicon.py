@@ -21,8 +21,9 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import Card, cards, has_suffix, one_file
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.io.places import at_place
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -44,7 +45,7 @@ class _Reader:
         self.images: list[list[float]] = []  # Standard deviations
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read photo coordinates and the other files; cameras are required."""
     folder = path if path.is_dir() else path.parent
     images = one_file(folder, IMAGES) if path.is_dir() else path
@@ -56,7 +57,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     }
     if files[CAMERAS] is None:
         raise InputError(phrase("format.files", name=f"*{CAMERAS}"), file=images)
-    reader, files[IMAGES] = _Reader(images, wishes.sd.get("control")), images
+    reader, files[IMAGES] = _Reader(images, options.sd.get("control")), images
     readers = {CAMERAS: _cameras, POSES: _poses, POINTS: _points, IMAGES: _images, BARS: _bars}
     for suffix, take in readers.items():
         if (file := files[suffix]) is not None:

@@ -9,12 +9,13 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.formats.cards import END, angle_unit, cards, to_radians
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.reduced_coordinates import (
     HOLDS,
     ReducedBuilder,
@@ -32,16 +33,16 @@ TITLE = "BINGO block"
 IMAGES, ORIENTATION, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read `image.dat` and the orientation; the default angle unit is gon."""
     folder = path if path.is_dir() else path.parent
     images = folder / IMAGES if path.is_dir() else path
-    table = wishes.cameras or folder / CAMERAS
-    if wishes.cameras is None and not table.is_file():
+    table = options.cameras or folder / CAMERAS
+    if options.cameras is None and not table.is_file():
         raise InputError(phrase("format.cameras"), file=images)
     given = read_cameras(Tables(Settings(images, tables={"cameras": table}, image="mm"), []))
     known = {each.name: each for each in given.cameras}
-    block = ReducedBuilder(images, TITLE, wishes.sd)
+    block = ReducedBuilder(images, TITLE, options.sd)
     photo: str | None = None
     for card in cards(images):
         if not card.words or card.ends:
@@ -55,12 +56,12 @@ def read(path: Path, wishes: Wishes) -> Project:
             x, y = card.numbers(1, "x y").tolist()
             block.image(photo, card.words[0], x, y)
     if (folder / ORIENTATION).is_file():
-        _orientation(folder / ORIENTATION, block, wishes)
+        _orientation(folder / ORIENTATION, block, options)
     return block.reduced_project("mm")
 
 
-def _orientation(path: Path, block: ReducedBuilder, wishes: Wishes) -> None:
-    unit = angle_unit(wishes.angles, "gon", path)
+def _orientation(path: Path, block: ReducedBuilder, options: ReadOptions) -> None:
+    unit = angle_unit(options.angles, "gon", path)
     for card in cards(path):
         if not card.words or card.ends:
             continue

@@ -18,10 +18,11 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
+from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_lines
 from photogram.io.packed_numbers import pieces
 from photogram.messages import Message
@@ -52,11 +53,11 @@ def _place(path: Path) -> Path:
     return path / FILE if path.is_dir() else path
 
 
-def _read_bundler(path: Path, wishes: Wishes) -> Project:
+def _read_bundler(path: Path, options: ReadOptions) -> Project:
     """Read a Bundle file of version 0.3, and the list of photos in its folder."""
     from photogram.collection.formats import bundler
 
-    del wishes
+    del options
     place = _place(path)
     found = bundler.FORMAT.read(place, pieces(place))
     count = len(found.photo_parameters)
@@ -81,11 +82,11 @@ def _write_bundler(project: Project) -> Mapping[str, bytes]:
     return {FILE: bundler.FORMAT.to_bytes(found), LIST: "".join(f"{name}\n" for name in names).encode()}
 
 
-def _read_bal(path: Path, wishes: Wishes) -> Project:
+def _read_bal(path: Path, options: ReadOptions) -> Project:
     """Read a problem, optionally packed; photos and points have numbers."""
     from photogram.collection.formats import bal
 
-    del wishes
+    del options
     found = bal.FORMAT.read(path, pieces(path))
     return project_of(found, path, BAL.title, [str(row) for row in range(len(found.photo_parameters))])
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.project import Frame, Project
+from photogram.formats.read_options import ReadOptions
 from photogram.giant.files import present_files, to_bytes
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
@@ -26,12 +27,12 @@ def _recognises(path: Path) -> bool:
     return bool(present["COMMON"] and present["IMAGES"])
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read a project, with the refraction of its COMMON."""
     from photogram.giant import read_project  # detection of formats does not need the cards
     from photogram.giant.assembly import job_refraction
 
-    del wishes
+    del options
     found = read_project(path)
     block = found.to_block()
     block = block.replace(refraction=job_refraction(found.common))

@@ -14,8 +14,8 @@ from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone
 from photogram.distributed.plan import PartsPlan
 from photogram.distributed.run import Manifest, result_folder
-from photogram.formats.format import Wishes
 from photogram.formats.plain.batches import Streamed
+from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import dataclass
 
 
@@ -56,7 +56,7 @@ class OnDisk:
 
 def adjusted_on_disk(
     path: Path,
-    wishes: Wishes,
+    reading: ReadOptions,
     folder: Path,
     division: Division,
     *,
@@ -68,7 +68,7 @@ def adjusted_on_disk(
 
     `change` returns the options for the options of the project.
     """
-    with _run(path, wishes, folder, division, change, threads) as run:
+    with _run(path, reading, folder, division, change, threads) as run:
         outcome = run.adjust(progress)
         found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
         return OnDisk(outcome, run.manifest, found)
@@ -76,21 +76,21 @@ def adjusted_on_disk(
 
 def planned_on_disk(
     path: Path,
-    wishes: Wishes,
+    reading: ReadOptions,
     folder: Path,
     division: Division,
     *,
     change: Callable[[AdjustOptions], AdjustOptions] = lambda options: options,
 ) -> PartsPlan:
     """Plan an adjustment and write its parts to the folder."""
-    with _run(path, wishes, folder, division, change, None) as run:
+    with _run(path, reading, folder, division, change, None) as run:
         return run.plan()
 
 
 @contextmanager
 def _run(
     path: Path,
-    wishes: Wishes,
+    reading: ReadOptions,
     folder: Path,
     division: Division,
     change: Callable[[AdjustOptions], AdjustOptions],
@@ -98,7 +98,7 @@ def _run(
 ) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(alone(folder))
-        streamed = Streamed(path, wishes, folder)
+        streamed = Streamed(path, reading, folder)
         stack.callback(streamed.close)
         options = core_options(change(streamed.project.options), streamed.block)
         source = streamed.source(options)

@@ -13,11 +13,12 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
+from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_lines
 from photogram.io.json import Tree, read_json, to_json, unknown
 from photogram.io.numbers import finite_number
@@ -44,14 +45,14 @@ def place_of(path: Path) -> Path | None:
     return next((each for each in (path, path / "opensfm") if (each / MODEL).is_file()), None)
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read the largest or the requested model of a file, with its tracks."""
     folder = place_of(path)
     if folder is None:
         raise InputError(phrase("format.files", name=MODEL), file=path)
     block = BlockBuilder(folder / MODEL, TITLE)
     messages = block.messages
-    model = _model(read_json(folder / MODEL), wishes.model, messages)
+    model = _model(read_json(folder / MODEL), options.model, messages)
     block.frame = _frame(model)
     for name, each in model["cameras"].items():
         size = each["width"].whole(1), each["height"].whole(1)
@@ -73,7 +74,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         block.lacks.append(Phrase("read.tracks", {"file": TRACKS, "option": Phrase("option.images")}))
     sizes = np.array(block.sizes, dtype=float)[np.array(block.photo_cameras)[photos]]
     block.images(photos, tracks, sizes / 2 + sizes.max(axis=1, keepdims=True) * xy)
-    block.observations += _gps(shots, wishes, messages)
+    block.observations += _gps(shots, options, messages)
     messages += _beside(folder)
     colours = {
         name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)] for name, each in points.items()
@@ -153,7 +154,7 @@ def _poses(shots: dict[str, Tree]) -> tuple[Floats, Floats]:
     return _photocore.vector_rotations(vectors), translations
 
 
-def _gps(shots: dict[str, Tree], wishes: Wishes, messages: list[Message]) -> Observations[Position]:
+def _gps(shots: dict[str, Tree], options: ReadOptions, messages: list[Message]) -> Observations[Position]:
     given = {name: each["gps_position"].numbers(3) for name, each in shots.items() if "gps_position" in each}
     if not given or not any(position.any() for position in given.values()):
         return Observations()
@@ -164,7 +165,7 @@ def _gps(shots: dict[str, Tree], wishes: Wishes, messages: list[Message]) -> Obs
     deviations = []
     for name in given:
         dop = shots[name].get("gps_dop", UNKNOWN_DOP)
-        sd = np.broadcast_to(wishes.sd.get("gnss", (dop.number(),)), 3).copy()
+        sd = np.broadcast_to(options.sd.get("gnss", (dop.number(),)), 3).copy()
         if not (sd > 0).all():
             raise dop.error(phrase("format.positive", name="the standard deviation", value=float(sd.min())))
         if level:

@@ -19,10 +19,11 @@ from photogram.formats.cards import (
     one_file,
     to_radians,
 )
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.images import is_rotation
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.reduced_coordinates import (
     HOLDS,
     ReducedBuilder,
@@ -43,17 +44,17 @@ MICROMETRES = 1e-3
 DIGITS = 6  # Digits of principal distances in millimetres; files have three of micrometres
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read the image file, and orientation, control and names if present."""
     folder = path if path.is_dir() else path.parent
     images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
         raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
     names = names_beside(folder / NAMES)
-    block = ReducedBuilder(images, TITLE, wishes.sd)
+    block = ReducedBuilder(images, TITLE, options.sd)
     _images(images, names, block)
     if (orientation := one_file(folder, ORIENTATION)) is not None:
-        _orientation(orientation, names, block, wishes)
+        _orientation(orientation, names, block, options)
     if (control := one_file(folder, CONTROL)) is not None:
         _control(control, names, block)
     return block.reduced_project("um")
@@ -75,7 +76,7 @@ def _images(path: Path, names: dict[str, str], block: ReducedBuilder) -> None:
             block.image(photo, names.get(card.words[0], card.words[0]), x, y)
 
 
-def _orientation(path: Path, names: dict[str, str], block: ReducedBuilder, wishes: Wishes) -> None:
+def _orientation(path: Path, names: dict[str, str], block: ReducedBuilder, options: ReadOptions) -> None:
     lines = [card for card in cards(path) if card.words and not card.ends]
     row = 0
     while row < len(lines):
@@ -84,7 +85,7 @@ def _orientation(path: Path, names: dict[str, str], block: ReducedBuilder, wishe
         photo = names.get(head.words[0], head.words[0])
         centre = head.numbers(1, "X Y Z")
         if len(head.words) >= 7:
-            unit = angle_unit(wishes.angles, None, path)
+            unit = angle_unit(options.angles, None, path)
             angles = to_radians(head.numbers(4, "omega phi kappa"), unit)
             matrix = Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
         else:

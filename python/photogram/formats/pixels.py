@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.columns import PLAIN, in_units
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.schema import column_units
@@ -20,6 +20,7 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import camera_table, known_cameras
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
@@ -71,14 +72,14 @@ def _headings(begin: str) -> list[str]:
     return [word.strip().strip('"') for word in line.split(mark)]
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read a table; cameras are in `--camera FILE`, selected by a column `camera`."""
-    if wishes.cameras is None:
+    if options.cameras is None:
         raise InputError(phrase("format.cameras"), file=path)
     block = BlockBuilder(path, TITLE)
     messages = block.messages
     table = pixel_table(path, messages)
-    cameras = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}), messages))
+    cameras = read_cameras(Tables(Settings(path, tables={"cameras": options.cameras}), messages))
     for own in zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True):
         block.camera(*own)
     photos, points = table.names("photo"), table.names("point")
@@ -88,14 +89,14 @@ def read(path: Path, wishes: Wishes) -> Project:
     other = np.flatnonzero(of_photo[photos.rows] != which)
     if len(other):
         raise table.error(int(other[0]), phrase("pixels.camera"))
-    corner = corner_of(table, wishes.pixel_origin)
-    if wishes.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
+    corner = corner_of(table, options.pixel_origin)
+    if options.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
         messages.append(Message(phrase("pixels.origin")))
     xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], block.sizes[row], own))
     keep = table.flags("use")
     if not keep.all():
         messages.append(Message(phrase("pixels.unused", n=int(np.count_nonzero(~keep))), path))
-    sd = _sd(table, wishes)
+    sd = _sd(table, options)
     block.photos(photos.names, of_photo)
     block.points(points.names)
     block.images(photos.rows[keep], points.rows[keep], xy[keep], None if sd is None else sd[keep])
@@ -103,8 +104,8 @@ def read(path: Path, wishes: Wishes) -> Project:
     return block.project()
 
 
-def _sd(table: ColumnTable, wishes: Wishes) -> Floats | None:
-    default = wishes.sd.get("images", (1.0,))[0]
+def _sd(table: ColumnTable, options: ReadOptions) -> Floats | None:
+    default = options.sd.get("images", (1.0,))[0]
     if not {"sd", "sd_column"} & set(table.columns):
         return None
     common = table.numbers("sd", default)

@@ -7,10 +7,12 @@ from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
 from types import MappingProxyType
+from typing import Any
 
+from photogram.arguments.fields import options_of
 from photogram.errors import InputError, PhotogramError, message_of
 from photogram.formats.block_contents import check_images
-from photogram.formats.format import Format, Wishes, later
+from photogram.formats.format import Format, later
 from photogram.formats.format_coordinates import (
     in_pixels,
     in_topocentric,
@@ -21,6 +23,7 @@ from photogram.formats.models import lost
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import check_root
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass
@@ -74,9 +77,9 @@ def _written(name: str, project: Project) -> Mapping[str, bytes]:
     return CAMERA_FORMATS[name](rig_of_project(project))
 
 
-def _unread(path: Path, wishes: Wishes) -> Project:
+def _unread(path: Path, options: ReadOptions) -> Project:
     """Reject reading of a format with cameras only."""
-    del wishes
+    del options
     raise InputError(phrase("format.cameras-only"), file=path)
 
 
@@ -144,17 +147,15 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
     raise InputError(phrase(code, names=names, title=of_folder[0] if of_folder else ""), file=path)
 
 
-def read(path: Path, file_format: str | None = None, wishes: Wishes | None = None) -> Project:
+def read(path: Path, options: ReadOptions | None = None, **changes: Any) -> Project:
     """Read a project.
 
     Parameters
     ----------
     path
         A file or a folder, or a folder with a single file of a known format.
-    file_format
-        Name of the format; None: detected.
-    wishes
-        Data that the files do not contain, and other user settings.
+    options, changes
+        Data that the files do not contain, and other user settings; fields of :class:`ReadOptions`.
 
     Raises
     ------
@@ -162,21 +163,21 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
         If the path cannot be read or contains something else. The error has file, record and text.
     """
     path = Path(path)
-    chosen, path = _located(path, file_format)
+    options = options_of(ReadOptions, options, changes)
+    chosen, path = _located(path, options.file_format)
     with turned(f"reading {path}"):
         try:
-            wishes = wishes or Wishes()
-            if wishes.settings and chosen.name != "plain":
+            if options.settings and chosen.name != "plain":
                 raise InputError(phrase("format.settings", title=chosen.title))
-            if (kinds := [each for each in wishes.sd if each not in SD]) and chosen.name != "plain":
+            if (kinds := [each for each in options.sd if each not in SD]) and chosen.name != "plain":
                 raise InputError(phrase("format.kind", kind=kinds[0], title=chosen.title))
-            project = chosen.read(path, wishes)
+            project = chosen.read(path, options)
             own = getattr(project.details.get("settings"), "photo_files", None)
-            if wishes.photos or wishes.gnss or own:
-                from photogram.formats.metadata.adding import with_wished_photos
+            if options.photos_dir or options.gnss or own:
+                from photogram.formats.metadata.adding import with_photo_positions
 
-                project = with_wished_photos(project, wishes)
-            return project.replace(
+                project = with_photo_positions(project, options)
+            project = project.replace(
                 messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
             )
         except InputError as error:
@@ -187,6 +188,11 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
         except (ArithmeticError, LookupError, ValueError) as error:
             reason = f"{type(error).__name__}: {error}"
             raise InputError(phrase("format.value", title=chosen.title, reason=reason), file=path) from error
+    if options == ReadOptions():
+        return project
+    from photogram.formats.supplements import supplemented
+
+    return supplemented(project, options)
 
 
 def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:

@@ -12,8 +12,9 @@ import numpy as np
 from photogram.adjustment.options import AdjustOptions, DatumName
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.results.result import Result
 from photogram.results.result_files import SUMMARY, read_summary
 from photogram.words import phrase
@@ -74,9 +75,9 @@ def is_result(path: Path) -> bool:
     return path.is_dir() and (path / SUMMARY).is_file() and (path / "state.parquet").is_file()
 
 
-def _project(path: Path, wishes: Wishes) -> Project:
+def _project(path: Path, options: ReadOptions) -> Project:
     """Read the adjusted block of a result, with its adjustment settings."""
-    del wishes
+    del options
     result = read_result(path)
     if not isinstance(result, Result):
         raise InputError(phrase("results.collection"), file=path)

@@ -14,14 +14,15 @@ from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.models import carried, intersected, is_free
-from photogram.formats.names import with_other_names
+from photogram.formats.names import with_names, with_other_names
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
-from photogram.formats.plain.settings import WITH_SD, Settings
+from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.statement_tables import with_cover
 from photogram.formats.plain.tables import Tables, Transform, indices_of
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
+from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
@@ -45,25 +46,19 @@ SAME = 1e-3  # Largest difference (pixels) of equal observations of a point in a
 SIMILAR = 10.0  # Smallest improvement of the fit of control for which a similarity is applied to the model
 
 
-def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Return standard deviations by table from `images=0.5` or `control=0.02,0.02,0.03`."""
-    found = {}
-    for each in given:
-        name, equals, numbers = each.partition("=")
-        name = name.strip()
-        if name not in WITH_SD:
-            raise InputError(phrase("plain.sd-option", text=each, names=list(WITH_SD)))
-        counts = WITH_SD[name]
-        try:
-            values = tuple(float(number) for number in numbers.split(","))
-        except ValueError:
-            values = ()
-        if not equals or len(values) not in counts or not all(0 <= value < np.inf for value in values):
-            raise InputError(phrase("plain.sd-numbers", text=each, counts=list(counts)))
-        if name == "images" and not all(values):
-            raise InputError(phrase("plain.sd-of-images", text=each))
-        found[name] = values
-    return found
+def supplemented(project: Project, options: ReadOptions) -> Project:
+    """Return a project with the standard deviations, observations, names and control of options."""
+    project = with_sd(project, options.sd)
+    if options.keep_repeated:
+        project = with_repeated(project)
+    if options.images is not None:
+        project = with_images(project, options.images, options.pixel_origin)
+    if options.names is not None:
+        project = with_names(project, options.names)
+    if options.control is not None:
+        columns = options.control_columns
+        project = with_control(project, options.control, options.sd, options.control_crs, columns)
+    return project
 
 
 def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:

@@ -7,7 +7,7 @@ import pytest
 
 from example_scripts import load
 from photogram import formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.isis import network_text, read_network
 
 
@@ -31,7 +31,7 @@ class Pair:
             path.write_bytes(own.get("written", network_text)(network))
         if jigsaw and "=" not in jigsaw:
             jigsaw = str(self.folder / jigsaw)
-        return formats.read(path, wishes=Wishes(cubes=self.folder / "images.lis", jigsaw=jigsaw))
+        return formats.read(path, ReadOptions(cubes=self.folder / "images.lis", jigsaw=jigsaw))
 
     def with_points(self, **columns):
         """Return the network with other columns of its points."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from golden_data import SHARED
 from photogram import formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.isis import network_text, read_network
 
 LRO = SHARED / "moving" / "lro"
@@ -53,4 +53,4 @@ def with_coordinates(folder, answers):
 
 def project(path, folder, jigsaw):
     """Read a network of the pair."""
-    return formats.read(path, wishes=Wishes(cubes=listed(folder), jigsaw=jigsaw))
+    return formats.read(path, ReadOptions(cubes=listed(folder), jigsaw=jigsaw))

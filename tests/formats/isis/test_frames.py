@@ -8,7 +8,7 @@ import pytest
 import support_data
 
 from photogram import adjust, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import FORMAT, ControlNetwork, measures_of, network_text, points_of
@@ -65,7 +65,7 @@ def test_pointing_is_found_by_fixed_points(tmp_path, kind):
         each.write_text(json.dumps(moved(document, 0.0, 1e-4)))
     (tmp_path / "images.lis").write_text("".join(f"image {k}, {k}.json\n" for k in range(2)))
     words = "CAMSOLVE=angles OVEREXISTING=yes CAMERA_ANGLES_SIGMA=1"
-    project = formats.read(path, wishes=Wishes(cubes=tmp_path / "images.lis", jigsaw=words))
+    project = formats.read(path, ReadOptions(cubes=tmp_path / "images.lis", jigsaw=words))
     result = adjust(project.block, tolerance=1e-9)
     outcome = Outcome(contents_of(project.details), result)
     assert not any("behind" in each.text for each in result.messages)
@@ -87,7 +87,7 @@ def test_cubes_are_adjusted_and_stay_as_they_are(tmp_path):
     path = network(tmp_path, [image], image.to_ground(lines, samples))
     (tmp_path / "images.lis").write_text("LRO/own, own.cub\n")
     words = "CAMSOLVE=velocities TWIST=no CAMERA_ANGLES_SIGMA=1"
-    project = formats.read(path, wishes=Wishes(cubes=tmp_path / "images.lis", jigsaw=words))
+    project = formats.read(path, ReadOptions(cubes=tmp_path / "images.lis", jigsaw=words))
     result = adjust(project.block)
     assert result.converged
     files = FORMAT.results(adjusted(project, result), result)

@@ -7,7 +7,7 @@ import pytest
 
 from message_codes import fields_of, refused
 from photogram import adjust, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.isis import POINT_TYPES
 from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.network import geographic_to_geocentric
@@ -152,7 +152,7 @@ def test_what_is_missing_is_named(pair):
     other = pair.folder / "one.lis"
     other.write_text("SIM/left, left.json\n")
     with refused("isis.image name=SIM/right"):
-        formats.read(path, wishes=Wishes(cubes=other))
+        formats.read(path, ReadOptions(cubes=other))
     network = pair.network
     with refused("format.missing what=measures that are not ignored"):
         pair.project("", pair.with_points(ignore=np.ones(len(network.points), bool)))

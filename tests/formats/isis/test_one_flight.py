@@ -9,7 +9,7 @@ from test_frames import moved, network
 
 from message_codes import refused
 from photogram import adjust, formats
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import FORMAT
@@ -71,8 +71,10 @@ def observed(tmp_path):
 
 
 def project(folder, words):
-    wishes = Wishes(cubes=folder / "images.lis", jigsaw=f"OBSERVATIONS=yes CAMERA_ANGLES_SIGMA=1 {words}")
-    return formats.read(folder / "own.net", wishes=wishes)
+    options = ReadOptions(
+        cubes=folder / "images.lis", jigsaw=f"OBSERVATIONS=yes CAMERA_ANGLES_SIGMA=1 {words}"
+    )
+    return formats.read(folder / "own.net", options)
 
 
 @pytest.mark.parametrize("words", ["CAMSOLVE=angles OVEREXISTING=yes", "CAMSOLVE=accelerations"])

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from message_codes import fields_of
 from photogram import adjust, formats
 from photogram.cli import app
-from photogram.formats import Wishes
+from photogram.formats import ReadOptions
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import network_text, read_network
 from photogram.formats.isis.outcome import flagged, rejection_limit
@@ -74,7 +74,7 @@ def three(tmp_path):
 
 
 def test_wrong_measures_are_rejected(three):
-    project = formats.read(three / "own.net", wishes=Wishes(cubes=three / "images.lis", jigsaw=WORDS))
+    project = formats.read(three / "own.net", ReadOptions(cubes=three / "images.lis", jigsaw=WORDS))
     assert any(each.code == "error.at" or each.code == "isis.rejection" for each in project.messages)
     own = read_network(three / "own.net")
     assert np.bincount(own.point_of_measure).min() == 3
@@ -98,7 +98,7 @@ def _names(block):
 
 def test_a_multiplier_that_rejects_nothing_changes_nothing(three):
     words = f"{WORDS} REJECTION_MULTIPLIER=1e6"
-    project = formats.read(three / "own.net", wishes=Wishes(cubes=three / "images.lis", jigsaw=words))
+    project = formats.read(three / "own.net", ReadOptions(cubes=three / "images.lis", jigsaw=words))
     result = formats.adjusting(project, adjust)(project.block)
     np.testing.assert_array_equal(result.residuals, adjust(project.block).residuals)
     assert fields_of(result.messages, "isis.rejected")["n"] == 0

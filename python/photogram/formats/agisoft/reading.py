@@ -13,9 +13,9 @@ from photogram.formats.agisoft import TITLE
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.crs import GEOCENTRIC as EARTH
 from photogram.formats.crs import GEOGRAPHIC
-from photogram.formats.format import Wishes
 from photogram.formats.images import Y_DOWN, checked_rotation
 from photogram.formats.project import Project, Size
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
 from photogram.messages import Message
@@ -35,18 +35,18 @@ class _Similarity(NamedTuple):
     scale: float
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read the first or the requested chunk of a document."""
     root = read_stream(path, {}, "document")
     block = BlockBuilder(path, TITLE)
     block.remarks_on_systems = False  # Metashape defines heights of its systems
     block.lacks.append(Phrase("read.ties"))
-    chunk = _chunk(root, wishes.model, block.messages)
+    chunk = _chunk(root, options.model, block.messages)
     _sensors(chunk, block)
     shots = _shots(chunk, block)
     markers = _members(chunk, "markers", "marker")
     system = _with_poses(chunk, shots, markers, block)
-    accuracies = _accuracies(chunk, wishes)
+    accuracies = _accuracies(chunk, options)
     _gnss(block, shots, system, accuracies["gnss"])
     _markers(block, markers, system, accuracies["control"])
     _locations(chunk, block)
@@ -63,11 +63,11 @@ def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Elemen
     return chunks[taken]
 
 
-def _accuracies(chunk: Element, wishes: Wishes) -> dict[str, Floats]:
+def _accuracies(chunk: Element, options: ReadOptions) -> dict[str, Floats]:
     """Return default standard deviations of the user, else of the settings."""
     settings = _properties(_members(chunk, "settings", "property"), "accuracy_cameras", "accuracy_markers")
     return {
-        kind: np.broadcast_to(wishes.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
+        kind: np.broadcast_to(options.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
         for kind, name in (("gnss", "cameras"), ("control", "markers"))
     }
 

@@ -13,9 +13,9 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.blocks_exchange import TITLE
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.format import Wishes
 from photogram.formats.images import checked_rotation
 from photogram.formats.project import Frame, Project, Size
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
@@ -60,8 +60,8 @@ class _Group:
 class _Reader:
     """The contents of a file in the order of reading."""
 
-    def __init__(self, path: Path, wishes: Wishes) -> None:
-        self.block, self.wishes = BlockBuilder(path, TITLE), wishes
+    def __init__(self, path: Path, options: ReadOptions) -> None:
+        self.block, self.options = BlockBuilder(path, TITLE), options
         self.systems: dict[str, str] = {}
         self.groups: list[_Group] = []
         self.photos: list[tuple[int, int, str, Element]] = []  # Id, group, path and element
@@ -74,9 +74,9 @@ class _Reader:
         self.in_millimetres: Element | None = None  # The first observation in millimetres
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read a file with one block."""
-    found = _Reader(path, wishes)
+    found = _Reader(path, options)
     take: dict[str, Callable[[Element], None]] = {
         "SRS": lambda own: found.systems.__setitem__(own.word("Id"), own.word("Definition")),
         "Photogroup": partial(_group, found),
@@ -224,7 +224,7 @@ def _control(found: _Reader, element: Element) -> None:
                 "format.unknown", what="Category", value=category, names=["Full", "Horizontal", "Vertical"]
             )
         )
-    default = np.broadcast_to(found.wishes.sd.get("control", (np.nan,)), 3)
+    default = np.broadcast_to(found.options.sd.get("control", (np.nan,)), 3)
     horizontal = element.number("HorizontalAccuracy", float(default[0]))
     sd = np.array([horizontal, horizontal, element.number("VerticalAccuracy", float(default[2]))])
     check = element.word("CheckPoint").lower() in ("true", "1")
@@ -273,10 +273,10 @@ def _project(found: _Reader, srs: str) -> Project:
         block.pose(number, centre, matrix, crs=system(own))
     _set_frame(block, system(srs or (found.poses[0][3] if found.poses else "")))
     _add_points(found, system)
-    if "gnss" in found.wishes.sd:
+    if "gnss" in found.options.sd:
         for number, xyz, own in found.gnss:
             name = block.photo_ids[block.photo_rows[number]]
-            block.gnss(name, xyz, found.wishes.sd["gnss"], crs=system(own))
+            block.gnss(name, xyz, found.options.sd["gnss"], crs=system(own))
     elif found.gnss:
         block.lacks.append(Phrase("read.gnss", {"number": len(found.gnss), "option": option_sd("gnss")}))
     images = [each for each in found.images if each[0] in block.photo_rows]

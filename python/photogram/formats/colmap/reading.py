@@ -13,10 +13,10 @@ from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model, Pose
 from photogram.formats.colmap.files import read_model
-from photogram.formats.format import Wishes
 from photogram.formats.images import Y_DOWN
 from photogram.formats.names import NAMES, Colours, renamed
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
@@ -40,9 +40,9 @@ def place_of(path: Path) -> Path | None:
     return None
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read a model."""
-    del wishes
+    del options
     folder = place_of(path)
     if folder is None:
         raise InputError(phrase("colmap.files"), file=path)

@@ -12,8 +12,9 @@ from photogram.formats.dbat.script import (
     read_measurements,
     read_script,
 )
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import root_of
 
 __all__ = ["FORMAT"]
@@ -41,7 +42,7 @@ def _recognises(path: Path) -> bool:
     return _is_script(path) or is_export(path) or is_measurements(path)
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read an export file or tables of PhotoModeler, a DBAT script or its tables."""
     if path.is_dir():
         path = _the_file(path) or path
@@ -51,7 +52,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         take = read_script
     else:
         take = read_measurements if is_measurements(path) else read_export
-    return take(path, wishes).dbat_project(wishes)
+    return take(path, options).dbat_project(options)
 
 
 FORMAT = Format(name="dbat", title="PhotoModeler or DBAT block", recognises=_recognises, read=read)

@@ -16,9 +16,9 @@ from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.format import Wishes
 from photogram.formats.images import by_camera
 from photogram.formats.project import Project, Size
+from photogram.formats.read_options import ReadOptions
 from photogram.io.places import Failing
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
@@ -115,14 +115,14 @@ class DbatBuilder(BlockBuilder):
         self.image(photo, point, *xy.tolist())
         self.image_sd.append(sd)
 
-    def dbat_project(self, wishes: Wishes) -> Project:
+    def dbat_project(self, options: ReadOptions) -> Project:
         """Return the project; user-defined standard deviations are in pixels."""
         if not self.image_keys:
             raise self.place.error(phrase("format.missing", what="image observations"))
         photos, points, pixels = self.image_rows()
         cameras, sensors = np.array(self.photo_cameras)[photos], list(self.sensors.values())
         side = np.array(self.pixel_mm, dtype=float)[cameras, np.newaxis]
-        sd = side * np.broadcast_to(wishes.sd.get("images", np.array(self.image_sd)), pixels.shape)
+        sd = side * np.broadcast_to(options.sd.get("images", np.array(self.image_sd)), pixels.shape)
         if (missing := np.isnan(sd)).any():
             sd = np.where(missing, side, sd)
             fields = {"number": 1.0, "unit": "pixel", "option": option_sd("images")}

@@ -16,8 +16,8 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.cards import Card
 from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of
-from photogram.formats.format import Wishes
 from photogram.formats.project import Size
+from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
@@ -76,7 +76,7 @@ class _Lines:
             yield card
 
 
-def read_export(path: Path, wishes: Wishes) -> DbatBuilder:
+def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
     """Read an export file."""
     lines = _Lines(path)
     content = DbatBuilder(path, TITLE)
@@ -88,7 +88,7 @@ def read_export(path: Path, wishes: Wishes) -> DbatBuilder:
     cameras = _Cameras(content, default, _sensor(default, 0, "camera", size), size)
     for card in lines.until_empty():
         _photo(card, lines, cameras)
-    _control(lines, content, wishes)
+    _control(lines, content, options)
     for card in lines.until_empty():
         content.start(_number(card, 0), card.numbers(1, "X Y Z"), card.place)
     _measurements(lines, content)
@@ -161,8 +161,8 @@ def _photo(head: Card, lines: _Lines, cameras: _Cameras) -> None:
     content.pose(number, pose.numbers(1, "X Y Z"), Attitudes.of("omega_phi_kappa", angles).matrices[0])
 
 
-def _control(lines: _Lines, content: DbatBuilder, wishes: Wishes) -> None:
-    given, negative = wishes.sd.get("control"), 0
+def _control(lines: _Lines, content: DbatBuilder, options: ReadOptions) -> None:
+    given, negative = options.sd.get("control"), 0
     for card in lines.until_empty():
         number, position = _number(card, 0), card.numbers(1, "X Y Z")
         sd: Floats = card.numbers(4, "sx sy sz") if given is None else np.broadcast_to(given, 3)

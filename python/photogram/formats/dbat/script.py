@@ -12,11 +12,11 @@ from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError
 from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of, sensors_of_table
 from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, titled, untitled
-from photogram.formats.format import Wishes
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.files import read_beginning, read_lines
@@ -42,7 +42,7 @@ _GROUPS = {
 """Camera parameters by the words of `set_bundle_estimate_params`."""
 
 
-def read_script(path: Path, wishes: Wishes) -> DbatBuilder:
+def read_script(path: Path, options: ReadOptions) -> DbatBuilder:
     """Read a script and its tables."""
     root = read_stream(path, {}, "document")
     given = root.need("input")
@@ -62,7 +62,7 @@ def read_script(path: Path, wishes: Wishes) -> DbatBuilder:
     eo = given.child("prior_eo")
     for element, table in [] if eo is None else _tables(eo, base):
         take_poses(table, content, element.attributes.get("units", "degrees"))
-    sd = wishes.sd.get("control")
+    sd = options.sd.get("control")
     for name in ("ctrl_pts", "check_pts"):
         points = given.child(name)
         if points is not None:
@@ -307,18 +307,20 @@ def is_measurements(path: Path) -> bool:
     return any(line.startswith(_HEADER) for line in begin.splitlines()[:_FREE])
 
 
-def _with_sensors(path: Path, title: str, wishes: Wishes) -> DbatBuilder:
+def _with_sensors(path: Path, title: str, options: ReadOptions) -> DbatBuilder:
     """Return a block with the cameras of the user's table, otherwise of a file in the folder."""
     content = DbatBuilder(path, title)
-    for name, sensor in _sensors(path, wishes, content.messages).items():
+    for name, sensor in _sensors(path, options, content.messages).items():
         content.sensor(name, sensor)
     return content
 
 
-def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, Sensor]:
-    if wishes.cameras is not None:
-        table = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}, image="mm"), messages))
-        return sensors_of_table(table.cameras, table.sizes, table.pixel_mm, wishes.cameras)
+def _sensors(path: Path, options: ReadOptions, messages: list[Message]) -> dict[str, Sensor]:
+    if options.cameras is not None:
+        table = read_cameras(
+            Tables(Settings(path, tables={"cameras": options.cameras}, image="mm"), messages)
+        )
+        return sensors_of_table(table.cameras, table.sizes, table.pixel_mm, options.cameras)
     folder = path if path.is_dir() else path.parent
     files = [each for each in sorted(folder.glob("*.xml")) if "dbat_camera_version" in root_of(each)[1]]
     if len(files) != 1:
@@ -326,21 +328,21 @@ def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, S
     return read_camera_file(files[0], messages)
 
 
-def read_folder(path: Path, wishes: Wishes) -> DbatBuilder:
+def read_folder(path: Path, options: ReadOptions) -> DbatBuilder:
     """Read `images.txt`, `markpts.txt`, optionally `stations.txt`, `control.txt`."""
-    content = _with_sensors(path, "tables of DBAT", wishes)
+    content = _with_sensors(path, "tables of DBAT", options)
     take_photos(titled(path / PHOTOS), content)
     if (path / POSES).is_file():
         take_poses(titled(path / POSES), content)
     if (path / CONTROL).is_file():
-        take_points(titled(path / CONTROL), content, wishes.sd.get("control"))
+        take_points(titled(path / CONTROL), content, options.sd.get("control"))
     take_images(titled(path / IMAGES), content)
     return content
 
 
-def read_measurements(path: Path, wishes: Wishes) -> DbatBuilder:
+def read_measurements(path: Path, options: ReadOptions) -> DbatBuilder:
     """Read `NAME-2dpts.txt`, with initial positions of `NAME-3dpts.txt`."""
-    content = _with_sensors(path, "PhotoModeler measurements", wishes)
+    content = _with_sensors(path, "PhotoModeler measurements", options)
     if len(content.sensors) > 1:
         raise InputError(phrase("format.camera-column", n=len(content.sensors)), file=path)
     camera = next(iter(content.sensors))

@@ -13,7 +13,6 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import filled_lines
 from photogram.formats.csm.cubes import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.format import Wishes
 from photogram.formats.isis import TITLE
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
@@ -22,6 +21,7 @@ from photogram.formats.isis.reading import read_network
 from photogram.formats.isis.settings import Settings, read_settings
 from photogram.formats.isis.solving import observations_of, one_flight, solving
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.io.places import Place
 from photogram.messages import Message
 from photogram.network.geometry import Cartesian, Spheroid
@@ -30,14 +30,14 @@ from photogram.network.moving_photos import Timed
 from photogram.words import Phrase, option_sd, phrase
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read a control network, and the support data of the listed images."""
-    if wishes.cubes is None:
+    if options.cubes is None:
         raise InputError(phrase("isis.cubes"), file=path)
-    settings = read_settings(wishes.jigsaw or "")
+    settings = read_settings(options.jigsaw or "")
     network = read_network(path)
-    files = read_list(wishes.cubes)
-    images = _images(network, files, settings, wishes.cubes)
+    files = read_list(options.cubes)
+    images = _images(network, files, settings, options.cubes)
     seen = _seen(network, images, path)
     photos = {each.photo: own for own in images for each in own.supported.timed}
     starts = np.full((len(network.points), 3), np.nan)
@@ -45,7 +45,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     contents = PlanetaryContents(network, path, photos, settings, starts)
     unused = [serial for serial in files if serial not in {each.serial for each in images}]
     remarks = [Message(remark, each.path) for each in images for remark in each.supported.isd.remarks]
-    return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *remarks])
+    return _project(contents, seen, [*_left_out(network, unused, options.cubes), *remarks])
 
 
 def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings, cubes: Path) -> list[Image]:

@@ -11,7 +11,6 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.format import GnssFile, PhotoFiles, Wishes
 from photogram.formats.metadata.merged import (
     WITHOUT,
     Metadata,
@@ -30,6 +29,7 @@ from photogram.formats.plain.schema import AXES, deviation_columns
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame, Project
+from photogram.formats.read_options import ReadOptions
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
@@ -43,41 +43,46 @@ SIMILAR = 10.0  # Least improvement of the fit by a similarity transformation
 DETERMINED = 3.0  # Smallest ratio of spread across the line to misfit for positions that rotate a model
 
 
-def with_wished_photos(project: Project, wishes: Wishes) -> Project:
+def with_photo_positions(project: Project, options: ReadOptions) -> Project:
     """Return a project with positions of `--gnss` and of photo files."""
     settings = project.details.get("settings")
     own = settings if isinstance(settings, Settings) else None
-    files = wishes.photos or (None if own is None else own.photo_files)
-    sd = wishes.sd if own is None else own.sd
-    if wishes.gnss is not None:
-        project = with_gnss_file(project, wishes.gnss, sd, None if files is None else files.directory)
+    files = options if options.photos_dir or own is None else own.photo_files
+    sd = options.sd if own is None else own.sd
+    project = with_gnss_file(project, options, sd, None if files is None else files.photos_dir)
     return project if files is None else with_photo_files(project, files, sd)
 
 
 def with_gnss_file(
-    project: Project, file: GnssFile, sd: Mapping[str, tuple[float, ...]], directory: Path | None = None
+    project: Project,
+    options: ReadOptions,
+    sd: Mapping[str, tuple[float, ...]],
+    directory: Path | None = None,
 ) -> Project:
-    """Return a project whose positions are replaced by those in a file.
+    """Return a project whose positions are replaced by those in the file `options.gnss`.
 
     `sd` are standard deviations by table; `gnss` applies to positions without one. `directory` is the folder
     of all photographs, whose order assigns events to photos.
     """
-    metadata = read_gnss_file(file.path, project.block.photo_ids, directory, mrk_antenna=file.mrk_antenna)
+    path, antenna = options.gnss, options.gnss_antenna
+    if path is None:
+        return project
+    metadata = read_gnss_file(path, project.block.photo_ids, directory, mrk_antenna=options.mrk_antenna)
     keys = _keys(project, metadata, weighted_only=True)
     others = [
         each for each in project.block.observations if not (isinstance(each, Position) and each.photo in keys)
     ]
     messages = list(project.messages)
     if replaced := len(project.block.observations) - len(others):
-        messages.append(Message(phrase("photos.replaced", n=replaced), file.path))
+        messages.append(Message(phrase("photos.replaced", n=replaced), path))
     if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
-        code = "photos.events" if file.antenna else "photos.events-without-lever"
-        messages.append(Message.of(code, file.path))
+        code = "photos.events" if antenna else "photos.events-without-lever"
+        messages.append(Message.of(code, path))
     project = project.replace(block=project.block.replace(observations=others), messages=tuple(messages))
-    return _with_positions(project, metadata, keys, file.crs, sd, GNSS_CRS, file.antenna)
+    return _with_positions(project, metadata, keys, options.gnss_crs, sd, GNSS_CRS, antenna)
 
 
-def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple[float, ...]]) -> Project:
+def with_photo_files(project: Project, options: ReadOptions, sd: Mapping[str, tuple[float, ...]]) -> Project:
     """Return a project with positions in photo files as observations.
 
     Photos with an observed position are unchanged. RTK positions with standard deviations share a shift (0.05
@@ -85,8 +90,10 @@ def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple
     time. A model without georeference is transformed to the positions. `sd` are standard deviations by table;
     `gnss` applies to positions without one.
     """
-    metadata = read_metadata(files.directory, mrk_antenna=files.mrk_antenna)
-    return _with_positions(project, metadata, _keys(project, metadata), files.crs, sd, PHOTOS_CRS)
+    if options.photos_dir is None:
+        return project
+    metadata = read_metadata(options.photos_dir, mrk_antenna=options.mrk_antenna)
+    return _with_positions(project, metadata, _keys(project, metadata), options.photos_crs, sd, PHOTOS_CRS)
 
 
 def _with_positions(

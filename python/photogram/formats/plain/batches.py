@@ -24,7 +24,6 @@ from photogram.distributed.parts import AtHome, Names, Part, assembled_part
 from photogram.distributed.run import Manifest, divided, places_of
 from photogram.errors import InputError
 from photogram.formats.builder import ASSUMED_SD
-from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.photos import image_coordinates, read_images, read_photos
@@ -32,6 +31,7 @@ from photogram.formats.plain.reading import read_tables
 from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables, Transform
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.io.parquet import coded
 from photogram.messages import missing_columns, unknown_name
 from photogram.network.block import checked, refuse_passages
@@ -67,8 +67,8 @@ def streamable(path: Path) -> bool:
 class Streamed:
     """A project that is read batch by batch."""
 
-    def __init__(self, path: Path, wishes: Wishes, folder: Path) -> None:
-        settings = read_settings(path / SETTINGS if path.is_dir() else path, wishes)
+    def __init__(self, path: Path, options: ReadOptions, folder: Path) -> None:
+        settings = read_settings(path / SETTINGS if path.is_dir() else path, options)
         if settings.features:
             raise InputError(phrase("plain.parts-features"), file=settings.path)
         self._folder = folder / "buckets"
@@ -76,7 +76,7 @@ class Streamed:
         self._folder.mkdir(parents=True)
         self._settings = settings
         held = self._without_images()
-        self.project: Project = read_tables(Tables(held, []), wishes)
+        self.project: Project = read_tables(Tables(held, []), options)
         if self.project.options.datum in ("inner", "minimum"):
             raise InputError(phrase("plain.parts-datum"), file=settings.path)
         if self.project.block.timed:

@@ -13,7 +13,6 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import (
     ASSUMED,
@@ -44,6 +43,7 @@ from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.tables import Tables, Transform, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.project import Project, Unused
+from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import Spheroid
@@ -58,20 +58,20 @@ DIFFER = 1e-6  # Largest difference of the positions of a point in two tables
 _USES = ("control", "check", "off")
 
 
-def read(path: Path, wishes: Wishes) -> Project:
+def read(path: Path, options: ReadOptions) -> Project:
     """Read the project of a folder, or of a file of settings."""
-    settings = read_settings(path / SETTINGS if path.is_dir() else path, wishes)
-    return read_tables(Tables(settings, unread_tables(settings)), wishes)
+    settings = read_settings(path / SETTINGS if path.is_dir() else path, options)
+    return read_tables(Tables(settings, unread_tables(settings)), options)
 
 
-def read_tables(tables: Tables, wishes: Wishes) -> Project:
+def read_tables(tables: Tables, options: ReadOptions) -> Project:
     """Read the tables of a project."""
     settings = tables.settings
     if "images" not in settings.tables:
         raise InputError(phrase("error.missing", name="images.csv"), file=settings.path)
     tables, seams = with_seams(tables)
     transform = Transform(settings, tables.messages)
-    cameras = read_cameras(tables if wishes.cameras is None else _with_cameras(tables, wishes.cameras))
+    cameras = read_cameras(tables if options.cameras is None else _with_cameras(tables, options.cameras))
     trajectories = read_trajectories(tables)
     control = tables.read("control")
     # A frame without origin is defined by control, which is therefore transformed first.

@@ -253,6 +253,8 @@ def _declared() -> Iterator[tuple[str, Schema]]:
 
 TABLES: Mapping[str, Schema] = dict(_declared())
 """Tables in the order of reading and writing."""
+WITH_SD = {name: each.deviations for name, each in TABLES.items() if each.deviations} | {"check": (1, 3)}
+"""Check points have the standard deviations of the table of control."""
 
 
 def column_units(name: str, length: str = "m", angle: str = "deg", image: str = "px") -> Units:

@@ -11,11 +11,11 @@ from typing import Any
 
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
-from photogram.formats.columns import PLAIN, Columns, columns_given
-from photogram.formats.format import PhotoFiles, Wishes
+from photogram.formats.columns import Columns, columns_given
 from photogram.formats.plain.keys import KEYS, read_keys
-from photogram.formats.plain.schema import TABLES
+from photogram.formats.plain.schema import TABLES, WITH_SD
 from photogram.formats.project import Frame
+from photogram.formats.read_options import ReadOptions
 from photogram.io.toml import Table, read_document
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
@@ -24,8 +24,6 @@ from photogram.words import Phrase, phrase
 
 VERSION = 1
 WITH_CRS = tuple(name for name, each in TABLES.items() if each.has_system)
-WITH_SD = {name: each.deviations for name, each in TABLES.items() if each.deviations} | {"check": (1, 3)}
-"""Check points have the standard deviations of the table of control."""
 ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
 
 LENGTHS = next(key.words for key in KEYS if key.field == "length").split()
@@ -67,7 +65,7 @@ class Settings:
     columns: Mapping[str, Columns] = field(default_factory=dict)
     # By name, as arguments of :func:`photogram.features`
     features: Mapping[str, Definition] = field(default_factory=dict)
-    photo_files: PhotoFiles | None = None  # Folder of photographs with positions; None without
+    photo_files: ReadOptions | None = None  # Options of a folder of photographs with positions
     # Contents of `[check]` and `[statement]`, as arguments of :meth:`photogram.Result.statement`
     statement: Mapping[str, Any] = field(default_factory=dict)
     # Default model of films; whether interior orientation is estimated in the adjustment, or fitted in
@@ -91,16 +89,16 @@ class Settings:
         )
 
 
-def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
+def read_settings(path: Path, reading: ReadOptions | None = None) -> Settings:
     """Read a file of settings, and find its tables, named or in its folder."""
-    wishes = wishes or Wishes()
-    file = read_document(path, _SECTIONS, wishes.settings)
+    reading = reading or ReadOptions()
+    file = read_document(path, _SECTIONS, reading.settings)
     project = file.optional("project")
     if project.value("format", "") is not VERSION:
         raise project.value_error("format", "plain.version", version=VERSION)
     values = read_keys(file)
     options, photo_files = values["options"], values["photo_files"]
-    photo_files |= {"crs": photo_files.get("crs") or None}
+    photo_files |= {"photos_crs": photo_files.get("photos_crs") or None}
     if options.get("loss") == "none":
         del options["loss"]
     if options.get("unit_variance") == "free":  # Earlier versions wrote this word for the default.
@@ -110,13 +108,13 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
         frame=Frame(**values["frame"]),
         options=AdjustOptions(**options),
         **values[""],
-        sd=_deviations(file.optional("sd")) | dict(wishes.sd),
+        sd=_deviations(file.optional("sd")) | dict(reading.sd),
         tables=_tables(file.optional("tables")),
         crs={name: file.table(name).text("crs") for name in WITH_CRS if "crs" in file.optional(name)},
         columns={name: _columns(file.table(name)) for name in WITH_CRS if name in file}
-        | ({} if wishes.columns == PLAIN else {"control": wishes.columns}),
+        | ({"control": reading.control_columns} if reading.columns or reading.roles else {}),
         features=_features(file.optional("features")),
-        photo_files=PhotoFiles(**photo_files) if photo_files.get("directory") else None,
+        photo_files=ReadOptions(**photo_files) if photo_files.get("photos_dir") else None,
         statement=values["statement"],
     )
 

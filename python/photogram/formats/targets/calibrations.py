@@ -9,9 +9,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.format import Wishes
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES
 from photogram.formats.project import Project, Unused
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.targets import TITLE
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
@@ -35,10 +35,10 @@ MIDDLE = 0.5  # Centre of the first pixel, from the upper-left corner: projects 
 NEAR = 1e-6  # Largest distance of control from board points, relative to the spacing
 
 
-def read_project(path: Path, wishes: Wishes) -> Project:
+def read_project(path: Path, options: ReadOptions) -> Project:
     """Read corners, with initial values, as the block of their calibration."""
-    sd = wishes.sd.get("images")
-    origin = wishes.pixel_origin or "center"
+    sd = options.sd.get("images")
+    origin = options.pixel_origin or "center"
     found = read(path, sd0=None if sd is None else sd[0], pixel_origin=origin)
     return project_of(found, path)
 
