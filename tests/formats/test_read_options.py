@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import InputError, formats
+from photogram import Distance, InputError, formats
 from photogram.formats import ReadOptions
 from photogram.formats.read_options import REQUIRED, deviations
 
@@ -64,3 +64,10 @@ def test_options_add_control_and_names(tmp_path):
     project = formats.read(EXAMPLE, control=str(tmp_path / "control.csv"), names=tmp_path / "names.csv")
     row = project.block.point_ids.index("P")
     np.testing.assert_array_equal(project.block.point_sd[row], 0.05)
+
+
+def test_observations_follow_new_names_of_points(tmp_path):
+    (tmp_path / "names.csv").write_text("point,name\nsouth-1,P\n")
+    project = formats.read(EXAMPLE, names=tmp_path / "names.csv")
+    [distance] = project.block.observations.of_type(Distance)
+    assert distance.points == ("north-1", "P") == (distance.first, distance.second)

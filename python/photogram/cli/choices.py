@@ -8,7 +8,7 @@ import typer
 
 from photogram.cli.command_classes import misuse
 from photogram.cli.components import MaxBiasRatio, UnitVarianceName
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.adjustment.options import AdjustOptions
@@ -32,9 +32,8 @@ class Choices:
 
     def options(self, options: AdjustOptions) -> AdjustOptions:
         """Return the options of a project with the options of the user."""
-        from photogram.adjustment.options import AdjustOptions
-
-        return AdjustOptions(
+        return replace(
+            options,
             datum=self.datum or (None if self.hold else options.datum),
             unit_variance=self.unit_variance or options.unit_variance,
             loss=options.loss if self.loss is None else None if self.loss == "none" else self.loss,

@@ -53,7 +53,9 @@ def with_other_names(project: Project, new: Mapping[str, str]) -> Project:
     }
     again = project.repeated
     return project.replace(
-        block=project.block.replace(point_ids=ids, observations=project.block.observations),
+        block=project.block.replace(
+            point_ids=ids, observations=project.block.observations.with_point_names(new)
+        ),
         details=details,
         features={
             each: (kind, [new.get(point, point) for point in points])

@@ -191,6 +191,15 @@ class Observations(Sequence[_Row]):
                 values[row] = value
         return values
 
+    def with_point_names(self, new: Mapping[str, str]) -> Observations[_Row]:
+        """Return the observations with new names of points, by previous name."""
+        found = []
+        for columns in self.columns:
+            table = {name: [new.get(one, one) for one in columns.table[name]] for name in columns.kind.POINTS}
+            points = [tuple(new.get(one, one) for one in row) for row in columns.table["points"]]
+            found.append(replace(columns, table={**columns.table, **table, "points": points}))
+        return Observations(found)
+
     def of_type(self, kind: type[_Kind]) -> list[_Kind]:
         """Return the observations of one type, in order."""
         same = [columns for columns in self.columns if issubclass(columns.kind, kind)]
