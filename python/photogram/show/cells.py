@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.show import page, quantity
 from photogram.show.angles import degrees_written
-from photogram.show.page import Cell, Column, Document, Drawing, Facts, Part, Remarks, Text
+from photogram.show.page import Cell, Column, Document, Drawing, Facts, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, chosen, long
 
 _SIGNS = {
@@ -36,9 +36,13 @@ def unit_written(unit: str) -> str:
 
 
 def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Document:
-    """Return the visible sections of a document with formatted tables and drawn plots."""
-    whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in document.sections]
-    return replace(document, sections=[section for section in whole if section.parts], details=())
+    """Return the visible parts of a document with formatted tables and drawn plots."""
+
+    def visible(sections: Sequence[Section]) -> list[Section]:
+        whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in sections]
+        return [section for section in whole if section.parts]
+
+    return replace(document, sections=visible(document.sections), details=visible(document.details))
 
 
 def _written(parts: Sequence[Part], numeral: Callable[[str], str], draw: Draw) -> list[Any]:

@@ -69,7 +69,7 @@ def titled_lines(document: Document, *keys: str, width: int = sys.maxsize) -> li
         titled.append((title, [textwrap.fill(line, width) for line in ended]))
     titled.append(("Key figures", fact_lines([*document.head, *document.highlights])))
     every = [each for each in (*document.sections, *document.details) if each.key in keys or not keys]
-    for section in formatted(replace(document, sections=every)).sections:
+    for section in formatted(replace(document, sections=every, details=())).sections:
         parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
         intro = textwrap.wrap("" if keys else section.intro, WIDTH)
         titled.append((section.title, _spaced([intro, *parts]) if parts else []))

@@ -20,7 +20,7 @@ NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # Numbers that the script of a
 
 def page_html(page: Document) -> bytes:
     """Return a page as self-contained HTML (UTF-8)."""
-    page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title)), inlined)
+    page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title), details=()), inlined)
     tables = (part for part in page.parts(layers=True) if isinstance(part, Table))
     known = {cell.id for table in tables for row in table.rows for cell in row if cell.id}
     links = [("verdict", page.first), *((each.key, each.title) for each in page.sections if each.title)]

@@ -33,7 +33,7 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
 
     `author` is a property of the file.
     """
-    titled = formatted(replace(page, title=page.title or page.what), inlined)
+    titled = formatted(replace(page, title=page.title or page.what, details=()), inlined)
     footer = f"{page.what} – {page.title}" if page.title else page.what
     record = _record(titled) | {"author": author or [], "footer": footer, "fonts": FONTS, "longest": LONGEST}
     data = json.dumps(record, default=_record, ensure_ascii=False)
