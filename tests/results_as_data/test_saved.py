@@ -384,7 +384,7 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
             lambda document: document["kept"].update(state={"tuple": []}),
             "error.content content=state of an adjustment",
         ),
-        (lambda document: document["kept"]["result"].update(cameras=["x"]), "argument.kind name=cameras[0]"),
+        (lambda document: document["kept"]["result"].update(cameras=["x"]), "error.kind kind=AdjustedCamera"),
         (
             lambda document: document["kept"]["block"].update(point_ids="x"),
             "argument.kind name=point_ids",

@@ -10,7 +10,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
+from functools import cache, partial, reduce
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from photogram.lazy_dataclasses import field, fields, replace
@@ -18,7 +18,7 @@ from photogram.lazy_dataclasses import field, fields, replace
 Options = TypeVar("Options")
 Check = Callable[[str, Any], Any]
 """Function of name and value; returns the converted value or raises an error."""
-_SEQUENCE = re.compile(r"(?:list|tuple|Sequence)\[(\w+)(?:, \.\.\.)?\]")
+_SEQUENCE = re.compile(r"(?:list|tuple|Sequence)\[([\w.]+)(?:, \.\.\.)?\]")
 _TUPLE = re.compile(r"tuple\[((?:int|float|str|, )+)(, \.\.\.)?\]")
 
 
@@ -119,7 +119,7 @@ def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | N
         "Indices": arrays.whole_numbers,
         "Bools": arrays.truth_values,
     }
-    kind: Any = eval(of, {"Literal": Literal}) if of.startswith("Literal[") else names.get(of)
+    kind: Any = eval(of, {"Literal": Literal}) if of.startswith("Literal[") else _named(of, names)
     if get_origin(kind) is Literal:
         return partial(_word, get_args(kind))
     if _is_own_class(kind):
@@ -131,7 +131,7 @@ def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | N
         return instance
     if (match := _TUPLE.fullmatch(of)) is None:
         match = _SEQUENCE.fullmatch(of)
-        return simple.get(of) if match is None else partial(_sequence, names.get(match[1]))
+        return simple.get(of) if match is None else partial(_sequence, _named(match[1], names))
     inner = [simple[each] for each in match[1].split(", ")]
 
     def elements(name: str, value: Any) -> tuple[Any, ...]:
@@ -143,6 +143,12 @@ def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | N
         return tuple(check(f"{name}[{row}]", each) for row, (check, each) in enumerate(pairs))
 
     return elements
+
+
+def _named(text: str, names: Mapping[str, Any]) -> Any:
+    """Return the type with a name, which may have the names of modules before dots; None if it is unknown."""
+    first, *others = text.split(".")
+    return reduce(lambda found, name: getattr(found, name, None), others, names.get(first))
 
 
 def _text(name: str, value: Any) -> str:
