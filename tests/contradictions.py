@@ -80,7 +80,6 @@ EXCLUSIVE = (
     ("covariances are scaled", "covariances are not scaled"),
     ("residuals agree", "residuals do not"),
     ("one cause", "no cause"),
-    ("not converged", "take observations out"),
     ("withheld", "handed out"),
     ("nothing grave", "grave"),
 )

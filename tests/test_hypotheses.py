@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result
-from photogram.network import Attitude
-from photogram.network.geometry import rotation_matrix
+from photogram.network import Attitude, rotation_matrix
 from photogram.results.findings import duplicates
 from photogram.statistics.findings import IMAGES, Removed
 from photogram.words import phrase

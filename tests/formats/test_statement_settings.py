@@ -204,12 +204,12 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             'class_h = "5cm"',
             'class_h = "0cm"',
-            "error.key statement class_h: error.at class h: error.positive 0.0",
+            "error.key statement class_h: error.at classes h: error.positive 0.0",
         ),
         (
             'class_v = "0.1 m"',
             'class_v = "1e999m"',
-            "error.key statement class_v: error.at class v: error.positive inf",
+            "error.key statement class_v: error.at classes v: error.positive inf",
         ),
         (
             'area = "12.5km2"',

@@ -434,7 +434,7 @@ def _with_job(
             if ending and (job.is_example or values[first]):
                 source = values[first][0] if several and values[first] else values[first]
                 shown = name if job.is_example else ""
-                values["out"] = values["out"] or default_out(source, ending, shown)
+                values["out"] = values.get("out") or default_out(source, ending, shown)
                 job.writes_inside(values["out"])
             for group, (kind, fields) in grouped.items():
                 values[group] = _made(kind, fields, values)
