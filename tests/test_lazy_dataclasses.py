@@ -5,6 +5,7 @@ import inspect
 import pickle
 import subprocess
 import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
@@ -114,3 +115,35 @@ def test_threads_make_it_once():
 def test_options_that_it_does_not_have_are_refused():
     with pytest.raises(TypeError, match="slots"):
         lazy_dataclasses.dataclass(slots=True)
+
+
+@pytest.mark.parametrize("frozen", [True, False])
+def test_threads_create_one_class_at_once(frozen):
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        for _ in range(100):
+
+            @lazy_dataclasses.dataclass(frozen=frozen)
+            class Shared:
+                first: int
+                second: list = lazy_dataclasses.field(default_factory=list)
+
+                def __post_init__(self):
+                    object.__setattr__(self, "third", self.first + 1)
+
+            ready, made = threading.Barrier(4), []
+
+            def create(kind=Shared, ready=ready, made=made):
+                ready.wait()
+                made.append(kind(first=1))
+
+            threads = [threading.Thread(target=create) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            assert made == [Shared(1)] * 4
+            assert [one.third for one in made] == [2] * 4
+    finally:
+        sys.setswitchinterval(interval)

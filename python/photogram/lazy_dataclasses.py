@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import asdict, field, fields, replace
 from functools import partial
-from threading import RLock
+from threading import RLock, active_count
 from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
 
 __all__ = ["asdict", "converting_dataclass", "dataclass", "field", "fields", "replace"]
@@ -36,11 +36,27 @@ class _Later:
                 for name in waiting & APART:
                     setattr(self.of, name, vars(other)[name])
             elif self.name in waiting:
-                for name in waiting - APART:
+                # Other threads wait at the placeholder of `__init__`; without it, they would call a base.
+                init = "__init__" in waiting and active_count() > 1
+                if init and not self.of.__doc__:
+                    self.of.__doc__ = self.of.__name__  # Otherwise the signature, which `__init__` defines
+                for name in waiting - APART - ({"__init__"} if init else set()):
                     delattr(self.of, name)
                 dataclasses.dataclass(**(self.options | {"repr": False, "eq": False}))(self.of)
+                if init:
+                    type.__setattr__(self.of, "__init__", self._init())
         made = vars(self.of)[self.name]
         return made.__get__(instance, owner) if hasattr(made, "__get__") else made
+
+    def _init(self) -> Any:
+        """Return `__init__` of the finished dataclass."""
+        named = [(each.name, each.type, each) for each in dataclasses.fields(self.of)]
+        hook = {"__post_init__": None} if hasattr(self.of, "__post_init__") else {}
+        options = {"eq": False, "repr": False, "frozen": self.options["frozen"]}
+        other = dataclasses.make_dataclass("Other", named, namespace=hook, **options)
+        init = vars(other)["__init__"]
+        init.__qualname__ = f"{self.of.__qualname__}.__init__"
+        return init
 
 
 def _declared(
