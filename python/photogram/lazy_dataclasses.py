@@ -52,8 +52,10 @@ class _Later:
         """Return `__init__` of the finished dataclass."""
         named = [(each.name, each.type, each) for each in dataclasses.fields(self.of)]
         hook = {"__post_init__": None} if hasattr(self.of, "__post_init__") else {}
-        options = {"eq": False, "repr": False, "frozen": self.options["frozen"]}
-        other = dataclasses.make_dataclass("Other", named, namespace=hook, **options)
+        frozen = self.options["frozen"]
+        other = dataclasses.make_dataclass(
+            "Other", named, namespace=hook, eq=False, repr=False, frozen=frozen
+        )
         init = vars(other)["__init__"]
         init.__qualname__ = f"{self.of.__qualname__}.__init__"
         return init
