@@ -9,7 +9,7 @@ import pytest
 
 from photogram import Camera, adjust, diagnose, first_values, simulate, snoop
 from photogram.diagnosis import names as names_of_points
-from photogram.results.snooping_result import exchanged_names
+from photogram.results.exchanged_names import exchanged_names
 from photogram.words import Phrase
 
 

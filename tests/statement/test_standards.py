@@ -13,7 +13,7 @@ import photogram
 from message_codes import nested_codes
 from photogram import InputError
 from photogram.results.statement import standards
-from photogram.results.statement.layout import (
+from photogram.results.statement.lengths import (
     angle_to_diagonal,
     at_reference,
     length_test,

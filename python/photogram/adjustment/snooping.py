@@ -33,6 +33,7 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
+from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.hypotheses import hypotheses
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
@@ -54,7 +55,7 @@ from photogram.results.network_trial import (
 from photogram.results.result import Result
 from photogram.results.snooping_log import Aside, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
-from photogram.results.snooping_result import Exchange, Snooped, exchanged_names, recorded
+from photogram.results.snooping_result import Snooped, recorded
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase, phrase
 

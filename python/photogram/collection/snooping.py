@@ -29,6 +29,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.subset import image_rows
+from photogram.results.exchanged_names import exchanged_names
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
@@ -40,7 +41,7 @@ from photogram.results.network_trial import (
 )
 from photogram.results.snooping_log import Aside, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
-from photogram.results.snooping_result import Snooped, exchanged_names
+from photogram.results.snooping_result import Snooped
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays, meet
 from photogram.network.subset import kept_images
+from photogram.results.exchanged_names import exchanged_names
 from photogram.results.result import Result
-from photogram.results.snooping_result import exchanged_names
 from photogram.words import phrase
 
 BAD_PHOTO = 4.0  # A bad photo exceeds the median residual of the median photo by this factor,

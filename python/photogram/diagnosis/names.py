@@ -17,9 +17,9 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.subset import kept_images, of_photos
+from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
-from photogram.results.snooping_result import Exchange, exchanged_names
 from photogram.statistics.limits import normal_limit
 
 CENTRES = 3  # Number of photos whose neighbourhood is examined

@@ -24,7 +24,7 @@ from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
 from photogram.results.result import Result
-from photogram.results.statement import comparison, layout
+from photogram.results.statement import comparison, layout, lengths
 from photogram.results.statement.figures import Figures, root_mean
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
@@ -223,7 +223,7 @@ class Lengths:
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
     limit: tuple[float, float, float] | None  # A, K and B; B may be infinite
-    test: layout.LengthTest
+    test: lengths.LengthTest
     expansion: float | None
 
 
@@ -337,16 +337,16 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         joint = comparison.turned_jointly(comparison.turned_to_east(block, positions), joint)
         positions = comparison.plan_positions(block, positions)
     pairs = np.array([[names.index(each["from"]), names.index(each["to"])] for each in asked.lengths])
-    measured, covariance = layout.measured_lengths(positions, joint, pairs)
+    measured, covariance = lengths.measured_lengths(positions, joint, pairs)
     temperatures = np.array([each.get("temperature", math.nan) for each in asked.lengths], dtype=float)
     turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
     if turned and asked.expansion is not None:
-        measured = layout.at_reference(measured, temperatures, asked.expansion)
+        measured = lengths.at_reference(measured, temperatures, asked.expansion)
     extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
     ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
     lines = [str(each["line"]) for each in asked.lengths]
     calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
-    test = layout.length_test(
+    test = lengths.length_test(
         measured,
         calibrated,
         covariance=covariance,
@@ -354,7 +354,7 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         lines=lines,
         limit=asked.limit,
         diagonal=float(np.linalg.norm(extent)),
-        off_diagonal=layout.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
+        off_diagonal=lengths.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]

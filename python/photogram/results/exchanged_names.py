@@ -1,0 +1,185 @@
+"""Exchanged names of two points on a photo: each image fits the other point.
+
+For a point with its rays, one of them suspected, T is the minimum of the sum of squared residuals in standard
+deviations. Given coordinates are included, and photos are fixed at their adjustment by the other
+observations. Images i and j of a photo are exchanged if T of both points with the given names is larger than
+
+    T(exchanged) + 2 ln(k / 0.0001),    T(exchanged) < 3 max(1, s^2) chi2(0.999; m)
+
+(:mod:`photogram.statistics.likelihood`). The factor 3 accounts for the uncertainty of photos.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.block import Block
+from photogram.network.directions import seen_without_lenses
+from photogram.network.rays import Rays, counts_of, meet, sums_of
+from photogram.statistics.likelihood import are_exchanged
+from photogram.words import Phrase
+
+MOST = 40  # Largest number of excluded images of a photo
+UNCERTAIN = 3.0  # Factor of T for errors of photos, which are fixed here
+STEPS = 4  # Gauss-Newton steps from the intersection of the rays
+HELD = 1e-6  # Standard deviation of fixed coordinates, relative to an image at the distance of the object
+
+
+@dataclass(frozen=True)
+class Exchange:
+    photos: tuple[str, ...]  # several if the images do not determine the photo
+    points: tuple[str, str]
+    # as_named, exchanged: T of both points with the given names, and with exchanged names on the first of the
+    # photos
+    as_named: float
+    exchanged: float
+    dimension: int  # degrees of freedom of both
+
+    @property
+    def sentence(self) -> Phrase:
+        one, other = self.points
+        photos = [Phrase("named.photo", {"photo": photo.removeprefix("photo ")}) for photo in self.photos]
+        return Phrase("exchange", {"one": one, "other": other, "photos": photos})
+
+    @property
+    def probable(self) -> Phrase:
+        """The sentence for a network that was not adjusted without it."""
+        one, other = self.points
+        return Phrase("exchange.probable", {"one": one, "other": other, "photos": list(self.photos)})
+
+    @property
+    def reason(self) -> Phrase:
+        fields = {"named": self.as_named, "exchanged": self.exchanged, "dimension": self.dimension}
+        return Phrase(f"exchange.reason{'' if math.isfinite(self.as_named) else '.apart'}", fields)
+
+
+def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
+    """Find exchanged names among the images that a network with `variance` of unit weight does not use."""
+    plain, seen = seen_without_lenses(block)
+    mounted = {each.photo for each in block.mounts}
+    on_frames = np.array([name in mounted for name in block.photo_ids])
+    pairs = _pairs(plain, used[seen], on_frames)
+    if not pairs:
+        return []
+    fit = _Fit(plain, used[seen])
+    wanted = sorted({(i, k) for pair in pairs for i in pair for k in pair})
+    found = dict(zip(wanted, fit.of(wanted), strict=True))
+    passing: dict[tuple[int, int], list[tuple[float, float, int, int]]] = {}
+    for i, j in pairs:
+        as_named = found[i, i][0] + found[j, j][0]
+        left = found[i, j][0] + found[j, i][0]
+        dimension = found[i, j][1] + found[j, i][1]
+        better = all(found[a, b][0] < found[a, a][0] for a, b in ((i, j), (j, i)))
+        if better and are_exchanged(
+            as_named, left, dimension, pairs=len(pairs), variance=max(variance, 1.0), uncertain=UNCERTAIN
+        ):
+            one, other = sorted((int(plain.image_points[i]), int(plain.image_points[j])))
+            photo = int(plain.image_photos[i])
+            passing.setdefault((one, other), []).append((left, as_named, dimension, photo))
+    # The most certain pairs first; each point is in one pair only.
+    exchanges, taken = list[Exchange](), set[int]()
+    for points, ways in sorted(passing.items(), key=lambda each: min(each[1])[0] - min(each[1])[1]):
+        if taken.isdisjoint(points):
+            taken |= set(points)
+            left, as_named, dimension, _ = min(ways)
+            photos = [plain.photo_ids[photo] for *_, photo in sorted(ways)]
+            names = plain.point_ids[points[0]], plain.point_ids[points[1]]
+            exchanges.append(Exchange(tuple(photos), names, as_named, left, dimension))
+    return exchanges
+
+
+def _pairs(block: Block, used: Bools, on_frames: Bools) -> list[tuple[int, int]]:
+    """Return pairs of excluded images on the same photo."""
+    out = np.flatnonzero(~used & ~on_frames[block.image_photos])
+    out = out[np.argsort(block.image_photos[out], kind="stable")]
+    bounds = np.flatnonzero(np.diff(block.image_photos[out], prepend=-1, append=-1))
+    return [
+        pair
+        for first, last in pairwise(bounds.tolist())
+        if last - first <= MOST
+        for pair in combinations(out[first:last].tolist(), 2)
+        if block.image_points[pair[0]] != block.image_points[pair[1]]
+    ]
+
+
+class _Fit:
+    def __init__(self, block: Block, used: Bools) -> None:
+        self.block, self.used = block, used
+        self.rays = Rays.of(block)
+        self.order = np.argsort(block.image_points, kind="stable")
+        counts = np.bincount(block.image_points, minlength=len(block.point_ids))
+        self.start = np.concatenate([[0], np.cumsum(counts)])
+
+    def of(self, wanted: list[tuple[int, int]]) -> list[tuple[float, int]]:
+        """Return T and its dimension for points of images, each with the ray of another image."""
+        of_images = [np.append(self._others(image), place) for image, place in wanted]
+        sizes = [len(each) for each in of_images]
+        problem, rows = np.repeat(np.arange(len(wanted)), sizes), np.concatenate(of_images)
+        points = self.block.image_points[[image for image, _ in wanted]]
+        squares = self._squares(problem, rows, points)
+        held = np.isfinite(self._prior_sd(points)).sum(axis=1)
+        dimensions = 2 * np.array(sizes) + held - 3
+        return list(zip(squares.tolist(), dimensions.tolist(), strict=True))
+
+    def _others(self, image: int) -> Indices:
+        """Return the other images of a point, on other photos: used ones, if any."""
+        block, point = self.block, self.block.image_points[image]
+        own = self.order[self.start[point] : self.start[point + 1]]
+        own = own[block.image_photos[own] != block.image_photos[image]]
+        good = own[self.used[own]]
+        found: Indices = good if len(good) else own
+        return found
+
+    def _prior_sd(self, points: Indices) -> Floats:
+        """(n, 3) standard deviations of given coordinates; not used in geographic space."""
+        sd = self.block.point_sd[points]
+        if self.block.geographic:
+            return np.full(sd.shape, np.inf)
+        return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
+
+    def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
+        """(n,) minimum sums of squares of images `rows` of points `own`; infinite behind cameras."""
+        block, rays, count = self.block, self.rays, len(points)
+        sd = block.image_sd[rows]
+
+        def total(values: Floats) -> Floats:
+            return sums_of(own, values, count)
+
+        across, right = rays.equations()
+        position = meet(total(across[rows]), total(right[rows]), counts_of(own, count))
+        # The axes are those of the block if priors are used, and a component may be unknown.
+        given = block.point_positions[points] - self.rays.axes.origin
+        prior_sd = self._prior_sd(points)
+        held = np.isfinite(prior_sd)
+        known = held.all(axis=1)
+        position[known] = given[known]
+        there = np.isfinite(position[own, 0])
+        if not there.any():
+            return np.full(count, np.inf)
+        photos = block.image_photos[rows]
+        reach = np.median(np.linalg.norm(position[own] - rays.centres[photos], axis=1)[there])
+        distances = np.abs(block.known_distances("exchanged names")[photos])
+        least = HELD * float(np.median(sd)) * reach / float(np.median(distances))
+        weight = np.where(held, 1 / np.maximum(np.where(held, prior_sd, 1.0), least) ** 2, 0.0)
+        squares = np.full(count, np.nan)
+        with np.errstate(all="ignore"):
+            for _ in range(STEPS):
+                residuals, in_front = rays.residuals(position[own], rows)
+                residuals = residuals / sd
+                partials = rays.partials(position[own], rows) / sd[:, :, np.newaxis]
+                apart = np.where(held, given - position, 0.0)
+                squares = total((residuals**2).sum(axis=1, keepdims=True))[:, 0]
+                squares = squares + (weight * apart**2).sum(axis=1)
+                normal = total(np.einsum("mki,mkj->mij", partials, partials))
+                normal[:, range(3), range(3)] += weight
+                vector = total(np.einsum("mki,mk->mi", partials, residuals)) + weight * apart
+                sound = np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(vector).all(axis=1)
+                sound[sound] &= np.linalg.cond(normal[sound]) < 1e14
+                position[sound] += np.linalg.solve(normal[sound], vector[sound, :, np.newaxis])[..., 0]
+        behind = np.bincount(own, ~in_front, count) > 0
+        return np.where(behind | ~np.isfinite(squares), np.inf, squares)
