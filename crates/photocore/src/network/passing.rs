@@ -223,22 +223,11 @@ impl Bundle {
         rows: &mut GroupRows<'_>,
         own: &mut Composed,
     ) {
-        if !self.passages.is_empty() {
-            return self.observe_passing(stations, group, local, rows, own);
+        if self.passages.is_empty() {
+            let timed = self.compose_timed(stations, group, own);
+            return stations.write(self.space, timed.then_some(&*own), &self.images[group], local, rows);
         }
-        let timed = self.compose_timed(stations, group, own);
-        stations.write(self.space, timed.then_some(&*own), &self.images[group], local, rows);
-    }
-
-    /// Writes the equations of an image with corrections, starting from the equations of pose, point and camera.
-    fn observe_passing(
-        &self,
-        stations: &Stations,
-        group: usize,
-        local: usize,
-        rows: &mut GroupRows<'_>,
-        own: &mut Composed,
-    ) {
+        // With corrections, the equations follow from those of pose, point and camera.
         let columns = self.columns(group, rows.shared.len() / 2);
         columns.with_plain(1, |plain| {
             let timed = self.compose_timed(stations, group, own).then_some(&*own);
