@@ -13,7 +13,7 @@ from pathlib import Path
 import erfa
 import numpy as np
 
-from photogram.show.forms import summary
+from photogram.show.forms import titled_lines
 from photogram.stellar import (
     ARCSEC,
     GRAD,
@@ -59,7 +59,8 @@ def adjustment_lines() -> list[str]:
     # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
     noisy = ("weighted sum of squares, plate", "weighted sum of squares, stars")
     figures = section_lines(plate(), "How much, how good", "Remarks")
-    return [*summary(plate().document()), "", *(line for line in figures if not line.startswith(noisy))]
+    summary = [line for title, lines in titled_lines(plate().document(), []) for line in (title, *lines, "")]
+    return [*summary, *(line for line in figures if not line.startswith(noisy))]
 
 
 def parameter_lines() -> list[str]:

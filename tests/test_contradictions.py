@@ -21,7 +21,7 @@ from photogram.comparator import calibrate as calibrate_comparator
 from photogram.giant import Project, write_project
 from photogram.perspective_center import run_deck
 from photogram.perspective_center.document import set_document
-from photogram.show.forms import summary
+from photogram.show.forms import titled_lines
 from photogram.show.judgement import remarks_section
 
 EXAMPLES = files("photogram") / "examples"
@@ -277,7 +277,7 @@ def test_projectors(tmp_path, options, broken):
     run = run_deck(deck, **options)
     for each in run.results:
         alone = replace(run, results=[each])
-        text = "\n".join(summary(set_document(each), "parameters"))
+        text = "\n".join(line for _, lines in titled_lines(set_document(each), []) for line in lines)
         assert_one_judgement(each.verdict, alone.document(), text, None)
         document = json.loads(alone.to_json())["sets"][0]
         assert document["verdict"]["next"] == [str(step) for step in each.verdict.next]

@@ -14,7 +14,7 @@ import photogram
 from photogram.io import json as json_files
 from photogram.show import html, quantity
 from photogram.show.cells import written
-from photogram.show.forms import record, summary, table_text, text, to_json
+from photogram.show.forms import record, table_text, text, titled_lines, to_json
 from photogram.show.methods import Documented
 from photogram.show.page import (
     Cell,
@@ -200,12 +200,12 @@ def test_a_json_document_has_members_and_tables():
 
 
 def test_a_summary_has_judgement_advice_tables_by_key_and_highlights():
-    head, *lines = summary(document(), "points")
-    assert head == "Survey: A"
-    assert lines[:3] == ["  verdict: A can be used", "  next: Measure again.", "  next: Look at A."]
-    assert lines[3] == "  Two points."
-    assert lines[-1].split() == ["rms", "3", "um"]
-    assert len(summary(document())) == len(lines) + 1 - 4
+    verdict, advice, figures, (title, lines) = titled_lines(document(), ["points"])
+    assert verdict == ("Verdict", ["A can be used."])
+    assert advice == ("What to do next", ["Measure again.", "Look at A."])
+    assert [line.split() for line in figures[1]] == [["rms", "3", "um"]]
+    assert (title, lines[-1]) == ("Points", "Two points.")
+    assert titled_lines(document(), []) == [verdict, advice, figures]
 
 
 def test_documents_of_several_things_are_layers_of_one():

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from photogram import InputError, adjust, formats
+from photogram.cli.console import SHOWN, print_document
 from photogram.formats.adjusted import excel_file, table_files
 from photogram.io import json
 from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES
 from photogram.show.cells import written
-from photogram.show.forms import MAX_ROWS, fact_lines, record, summary, text
+from photogram.show.forms import fact_lines, record, text, titled_lines
 from photogram.show.html import page_html
 from photogram.show.page import Document, Fact, Layers, Section, probability_written
 from photogram.show.quantity import (
@@ -147,11 +148,14 @@ def test_parts_of_many_things_are_columns_of_json():
     assert records(members_of_each([], "kind")) == []
 
 
-def test_a_summary_has_the_first_rows_of_its_tables_also_of_those_in_layers():
-    table = Table("rows", "Rows", [Quantity(np.arange(MAX_ROWS + 2), head="Row")])
-    document = Document("What", "", [], [], [], [Section("rows", "Rows", [Layers("layers", [table])])])
-    first, head, *rows = summary(document, "rows")
-    assert (first, head.strip()) == ("What", "Row")
-    assert [line.strip() for line in rows[-2:]] == [str(MAX_ROWS - 1), "and 2 more rows"]
-    assert document.tables() == []
+def test_a_command_prints_the_first_rows_of_its_tables_also_of_those_in_layers(capsys):
+    table = Table("rows", "Rows", [Quantity(np.arange(SHOWN + 1), head="Row")])
+    parts = [Layers("layers", [table]), Table("others", "Others", table.columns)]
+    document = Document("What", "", [], [], [], [Section("section", "Rows", parts)])
+    assert len(titled_lines(document, ["section"])[0][1]) > 2 * SHOWN
+    print_document(document, "report.txt", "rows")
+    first, title, head, *rows = capsys.readouterr().out.splitlines()
+    assert (first, title, head.strip()) == ("What", "Rows", "Row")
+    assert [line.strip() for line in rows[-2:]] == [str(SHOWN - 2), "and 2 more lines in report.txt"]
+    assert table not in document.tables()
     assert document.table("rows") is table

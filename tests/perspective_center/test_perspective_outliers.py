@@ -8,7 +8,7 @@ import pytest
 from photogram import InputError
 from photogram.perspective_center import Grid, Run, determine
 from photogram.perspective_center.document import set_document
-from photogram.show.forms import summary
+from photogram.show.forms import titled_lines
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_a_blunder_on_a_plate_of_eight_points_is_named(eight):
     assert message.code == "projector.outliers"
     assert (message.phrase.fields["set"], round(message.phrase.fields["limit"], 2)) == (1, 4.0)
     assert "point 3 Y (t " in str(message)
-    last = summary(set_document(result), "parameters")[-1]
+    last = titled_lines(set_document(result), [])[-1][1][-1]
     assert f" {len(result.outliers)} (studentized residuals beyond 4.00: " in last
     assert "3 Y (+" in last
     document = json.loads(Run([result], result.messages).to_json())

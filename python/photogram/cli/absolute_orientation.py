@@ -108,7 +108,7 @@ def absolute_orientation(
             outputs.write(path, content)
     job.conclude(
         written,
-        summary=lambda: print_document(document, "parameters", "control", remarks=result.problems),
+        summary=lambda: print_document(document, TEXT, "parameters", "control", remarks=result.problems),
         code=result.verdict.exit_code(strict=strict),
     )
 

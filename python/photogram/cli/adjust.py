@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from photogram.cli.choices import Choices
 from photogram.cli.command_classes import misuse
-from photogram.cli.console import print_remark, print_sections, print_summary
+from photogram.cli.console import OF_NETWORKS, print_document, print_remark, print_sections
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.in_parts import DIVIDING, adjusted_on_disk, print_plan
 from photogram.cli.job import (
@@ -150,7 +150,7 @@ def _finish(
         documents.as_json(told),
         documents.data(result),
         documents.charts(result, sizes, quiet=job.quiet),
-        summary=lambda: print_summary(document, "report.txt"),
+        summary=lambda: print_document(document, "report.txt", *OF_NETWORKS),
         code=code or (0 if stated is None else stated.exit),
     )
 

@@ -19,7 +19,7 @@ from photogram.cli.calibration_options import (
 from photogram.cli.choices import LossName
 from photogram.cli.command_classes import misuse
 from photogram.cli.components import COMPONENTS, MaxBiasRatio
-from photogram.cli.console import print_document, print_remark, print_summary
+from photogram.cli.console import OF_NETWORKS, print_document, print_remark
 from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import (
     Folder,
@@ -131,7 +131,7 @@ class Planned:
             | documents.drawings(document.drawings, target)
             | documents.page(job, "calibrate", target, lambda: document),
             documents.as_json(plan),
-            summary=lambda: print_document(document, "views", "parameters"),
+            summary=lambda: print_document(document, "report.txt", "views", "parameters"),
             code=0 if plan.enough else NOT_GOOD_ENOUGH,
         )
 
@@ -211,7 +211,7 @@ def calibrate(
     job.finish(
         {out / name: content for name, content in files.items()} | drawn | page,
         documents.as_json(found),
-        summary=lambda: print_summary(document, "report.txt", "uncertainty", "board", "views"),
+        summary=lambda: print_document(document, "report.txt", *OF_NETWORKS, "uncertainty", "board", "views"),
         code=found.verdict.exit_code(strict=strict),
     )
 

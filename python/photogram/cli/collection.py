@@ -9,7 +9,7 @@ import typer
 
 from photogram.cli.command_classes import misuse
 from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, MaxBiasRatio, snooped
-from photogram.cli.console import print_sections, print_summary
+from photogram.cli.console import OF_NETWORKS, print_document, print_sections
 from photogram.cli.documents import TEXT, Documents
 from photogram.cli.job import Input, Job, OutputFolder, Without, adjustment_status, with_job
 from photogram.cli.options import OrderingName, Threads, check_alone
@@ -94,7 +94,7 @@ def collection(
 
     def summarize() -> None:
         print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
-        print_summary(result.document, "the report")
+        print_document(result.document, "the report", *OF_NETWORKS)
 
     job.finish(
         written,

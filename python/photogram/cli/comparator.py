@@ -151,7 +151,7 @@ def _summarize(calibrations: list[Calibration]) -> None:
     """Print verdict, analysis of variance, linear parameters and problems of each."""
     for calibration in calibrations:
         remarks = [message.text for message in calibration.messages]
-        print_document(calibration.document(), "variance", "linear", remarks=remarks)
+        print_document(calibration.document(), "listing.txt", "variance", "linear", remarks=remarks)
 
 
 @with_job()

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
 NOT_USABLE = 4
-SHOWN = 24  # Lines of a section that the summary of a command shows at most
+SHOWN = 40  # Maximum number of lines of a section in the summary of a command
 
-SUMMARY = ("remarks", "components", "removed", "features", "tests", "worst")
-"""Sections of the document of a network that the summary of a command shows."""
+OF_NETWORKS = ("remarks", "components", "removed", "features", "tests", "worst")
+"""Sections of the document of a network in the summary of a command."""
 
 EXTRAS = {
     "contourpy": "report",
@@ -49,31 +49,24 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 output = Console(highlight=False, soft_wrap=True, emoji=False)
 
 
-def print_sections(summary: Iterable[TitledLines], whole: str, most: int = SHOWN) -> None:
+def print_sections(summary: Iterable[TitledLines], whole: str) -> None:
     """Print titled sections, shortened; `whole` names the complete file."""
     for title, lines in summary:
         if not lines:
             continue
         output.print(f"[bold]{escape(title)}[/]")
-        for line in lines[:most]:
+        for line in lines[:SHOWN]:
             output.print(f"  {escape(line)}")
-        if len(lines) > most:
-            output.print(f"  and {len(lines) - most} more lines in {whole}")
+        if len(lines) > SHOWN:
+            output.print(f"  and {len(lines) - SHOWN} more lines in {whole}")
 
 
-def print_summary(document: Document, whole: str, *keys: str) -> None:
-    """Print verdict, advice, key figures and some sections of a document."""
+def print_document(document: Document, whole: str, *keys: str, remarks: Iterable[object] = ()) -> None:
+    """Print verdict, advice, key figures, some sections and tables of a document, then remarks."""
     from photogram.show.forms import titled_lines
 
-    print_sections(titled_lines(document, *SUMMARY, *keys), whole)
-
-
-def print_document(document: Document, *tables: str, remarks: Iterable[object] = ()) -> None:
-    """Print the summary of a document with some tables, then remarks."""
-    from photogram.show.forms import summary
-
-    for line in summary(document, *tables):
-        output.print(escape(line))
+    output.print(escape(": ".join(filter(None, (document.what, document.title)))))
+    print_sections(titled_lines(document, keys), whole)
     for remark in remarks:
         print_remark(remark)
 

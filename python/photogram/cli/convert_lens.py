@@ -80,7 +80,7 @@ def convert_lens(
     job.finish(
         {} if out is None else {out / name: content for name, content in _files(found, plots).items()},
         {} if json is None else {json: found.to_json()},
-        summary=lambda: print_document(found.document()),
+        summary=lambda: print_document(found.document(), "report.txt"),
         code=0 if tolerance is None or found.within(tolerance) else BEYOND_TOLERANCE,
     )
 

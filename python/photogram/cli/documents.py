@@ -165,7 +165,7 @@ class Documents:
         def summarize() -> None:
             print_sections(above, "the report")
             if tables:
-                print_document(result.document(), *tables)
+                print_document(result.document(), "the report", *tables)
             else:
                 output.print(escape(result.report().removesuffix("\n")))
 

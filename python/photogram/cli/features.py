@@ -8,7 +8,7 @@ import typer
 
 from photogram.cli.adjust import result_at
 from photogram.cli.command_classes import misuse
-from photogram.cli.console import print_sections
+from photogram.cli.console import print_document
 from photogram.cli.job import Input, Job, OutputFile, OutputFolder, with_job
 from photogram.cli.options import Threads
 from photogram.formats.read_options import ReadOptions
@@ -67,7 +67,6 @@ def features(
     from photogram.formats.adjusted import feature_files
     from photogram.io.json import to_json
     from photogram.results.features import features_document, features_section
-    from photogram.show.forms import titled_lines
     from photogram.show.judgement import judged
     from photogram.show.page import Document
 
@@ -85,6 +84,6 @@ def features(
     job.finish(
         {} if out is None else {out / name: each for name, each in feature_files(found).items()},
         {} if json is None else {json: to_json(features_document(found))},
-        summary=lambda: print_sections(titled_lines(document), "--json FILE"),
+        summary=lambda: print_document(document, "--json FILE", "features"),
         code=verdict.exit_code(strict=strict),
     )

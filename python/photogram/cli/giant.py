@@ -19,7 +19,7 @@ from photogram.cli.components import (
     UnitVarianceName,
     snooped,
 )
-from photogram.cli.console import SHOWN, errors, print_summary
+from photogram.cli.console import OF_NETWORKS, SHOWN, errors, print_document
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.job import (
     Folder,
@@ -118,7 +118,7 @@ def giant(
         asked,
         documents.data(found.result),
         documents.charts(found.result, quiet=job.quiet),
-        summary=lambda: print_summary(found.document, "report.txt"),
+        summary=lambda: print_document(found.document, "report.txt", *OF_NETWORKS),
         code=found.verdict.exit_code(strict=strict),
     )
 

@@ -74,6 +74,6 @@ def _summarize(run: Run) -> None:
     from photogram.perspective_center.document import set_document
 
     for result in run.results:
-        print_document(set_document(result), "parameters")
+        print_document(set_document(result), "listing.txt", "parameters")
     for message in run.messages:
         print_remark(message)

@@ -167,9 +167,8 @@ def _said(
 
 
 def _summarize(results: Sequence[Result | CalibratedNight], *tables: str) -> None:
-
     for result in results:
-        print_document(result.document(), *tables, remarks=result.messages)
+        print_document(result.document(), "the report", *tables, remarks=result.messages)
 
 
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:

@@ -1,20 +1,31 @@
-"""Documents as JSON, text and summary; `show.html` and `show.pdf` create pages."""
+"""Documents as JSON and text; `show.html` and `show.pdf` create pages."""
 
 from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import replace
+from photogram.show import quantity
 from photogram.show.cells import formatted, written
-from photogram.show.page import Document, Fact, Facts, Layers, Part, Remarks, Table, Text
+from photogram.show.page import (
+    Document,
+    Fact,
+    Facts,
+    Layers,
+    Part,
+    Remarks,
+    Section,
+    Table,
+    Text,
+    without_layers,
+)
 
 WIDTH = 100  # characters of a line of prose
-MAX_ROWS = 40  # maximum number of rows of a table in a summary
 
 TitledLines = tuple[str, list[str]]  # A section of text
 
@@ -45,19 +56,20 @@ def to_json(document: Document) -> bytes:
 
 def text(document: Document) -> str:
     """Return the text report: verdict, next steps, highlights, sections."""
-    parts = [
-        f"photogram {_photocore.__version__}  {document.what}  {document.title}".rstrip().translate(PLAIN)
-    ]
+    head = f"photogram {_photocore.__version__}  {document.what}  {document.title}"
+    parts = [head.rstrip().translate(PLAIN)]
     for title, lines in titled_lines(document, width=WIDTH):
         parts.append("\n".join([title, "-" * len(title), *lines]))
     return "\n\n".join(parts) + "\n"
 
 
-def titled_lines(document: Document, *keys: str, width: int = sys.maxsize) -> list[TitledLines]:
+def titled_lines(
+    document: Document, keys: Collection[str] | None = None, width: int = sys.maxsize
+) -> list[TitledLines]:
     """Return titles and lines: verdict, next steps, key figures, sections.
 
-    Without keys, all sections are returned; with keys, sections are without introduction. `width` is the
-    maximum number of characters of a line of the verdict.
+    With `keys`, only the sections and tables with these keys are returned, without introduction. `width` is
+    the maximum number of characters of a line of the verdict.
     """
     sentences: list[tuple[str, Sequence[object]]] = [
         (f"{document.first}, {one.on}".removesuffix(", "), [one.headline, *one.lines])
@@ -65,19 +77,35 @@ def titled_lines(document: Document, *keys: str, width: int = sys.maxsize) -> li
     ]
     titled: list[TitledLines] = []
     for title, lines in [*sentences, ("What to do next", document.advice)]:
-        ended = (f"{line[:1].upper()}{line[1:]}".removesuffix(".") + "." for line in map(str, lines))
-        titled.append((title, [textwrap.fill(line, width) for line in ended]))
+        titled.append((title, [textwrap.fill(_ended(str(line)), width) for line in lines]))
     titled.append(("Key figures", fact_lines([*document.head, *document.highlights])))
-    every = [each for each in (*document.sections, *document.details) if each.key in keys or not keys]
-    for section in formatted(replace(document, sections=every, details=())).sections:
+    sections = [*document.sections, *document.details]
+    if keys is not None:
+        sections = [replace(each, intro="", parts=_chosen(each, keys)) for each in sections]
+    for section in formatted(replace(document, sections=sections, details=())).sections:
         parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
-        intro = textwrap.wrap("" if keys else section.intro, WIDTH)
+        intro = textwrap.wrap(section.intro, WIDTH)
         titled.append((section.title, _spaced([intro, *parts]) if parts else []))
     return [
         (title.translate(PLAIN), "\n".join(lines).translate(PLAIN).split("\n"))
         for title, lines in titled
         if lines
     ]
+
+
+def _ended(sentence: str) -> str:
+    """Return a sentence with a capital letter, unless a name of a file is first, and with a full stop."""
+    first = sentence.partition(" ")[0]
+    begun = f"{first[:1].upper()}{first[1:]}" if first.isalpha() else first
+    return f"{begun}{sentence[len(first) :]}".removesuffix(".") + "."
+
+
+def _chosen(section: Section, keys: Collection[str]) -> Sequence[Part]:
+    """Return the parts of a section in a summary: all, or the tables with these keys."""
+    if section.key in keys:
+        return section.parts
+    parts = without_layers(section.parts)
+    return [part for part in parts if isinstance(part, quantity.Table) and part.key in keys]
 
 
 def _spaced(parts: Iterable[list[str]]) -> list[str]:
@@ -100,19 +128,6 @@ def part_lines(part: Part, title: str = "") -> list[str]:
         case Remarks(sentences=sentences):
             return [textwrap.fill(sentence, WIDTH, subsequent_indent="  ") for sentence in sentences]
     return []
-
-
-def summary(document: Document, *keys: str) -> list[str]:
-    """Return summary lines: verdict, next steps, tables with keys, highlights."""
-    lines = [f"verdict: {each.headline}" for each in document.judgements]
-    lines += [f"next: {sentence}" for sentence in document.advice]
-    for table in document.tables(layers=True):
-        if table.key in keys and table.visible:
-            head, *rows = table_text(written(table))
-            lines += [*([table.note] if table.note else []), head, *rows[:MAX_ROWS]]
-            lines += [f"and {len(rows) - MAX_ROWS} more rows"] if len(rows) > MAX_ROWS else []
-    lines += [line.translate(PLAIN) for line in fact_lines(document.highlights)]
-    return [f"{document.what}: {document.title}".removesuffix(": "), *(f"  {line}" for line in lines)]
 
 
 def table_text(table: Table) -> list[str]:

@@ -176,13 +176,16 @@ class Document:
     def parts(self, *, layers: bool = False) -> list[Part]:
         """Return parts of sections and details; on request parts of layers."""
         parts = [part for section in (*self.sections, *self.details) for part in section.parts]
-        if layers:
-            parts = [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]
-        return parts
+        return without_layers(parts) if layers else parts
 
     def table(self, key: str) -> quantity.Table:
         """Return the table with a key, the first of several layers."""
         return next(table for table in self.tables(layers=True) if table.key == key)
+
+
+def without_layers(parts: Sequence[Part]) -> list[Part]:
+    """Return parts with the parts of layers instead of these."""
+    return [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]
 
 
 def about(code: str, **fields: Any) -> str:
