@@ -31,6 +31,7 @@ from photogram.show.page import (
     layered,
 )
 from photogram.show.quantity import Axis, Quantity, records
+from photogram.words import words_of
 
 AXES = (Axis.of("x", "m"), Axis.of("y", "m"))
 VALUES = np.array([[1.25, -2.5], [3.0, 4.0]])
@@ -142,7 +143,9 @@ def test_a_pdf_document_is_tagged_and_contains_its_fonts():
     pytest.importorskip("typst")
     from photogram.show.pdf import FONTS, page_pdf
 
-    whole = layered("Surveys", "both", [document("A"), document("B", 2 * VALUES, "bad")], language="de")
+    whole = layered(
+        "Surveys", "both", [document("A"), document("B", 2 * VALUES, "bad")], words=words_of("de")
+    )
     content = page_pdf(whole, author="Survey Office")
     assert content == page_pdf(whole, author="Survey Office")
     entries = (r"/Lang\s?\(de\)", r"/Title\s?\(both\)", r"/Author\s?\(Survey Office\)", "/StructTreeRoot")

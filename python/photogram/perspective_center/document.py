@@ -16,7 +16,7 @@ from photogram.perspective_center.solution import INTERIOR, PerspectiveCenter
 from photogram.show.forms import record
 from photogram.show.judgement import judged, remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered, significant
-from photogram.show.quantity import Axis, Quantity, Table, attribute, component, members
+from photogram.show.quantity import Axis, Quantity, Table, column, component, members
 
 PLACE = tuple(map(Axis, "XYZ"))
 ANGLES = tuple(Axis.of(name, "arcmin") for name in ("omega", "phi", "kappa"))
@@ -127,13 +127,20 @@ def _points(result: PerspectiveCenter) -> Table:
     grid, plan, beyond = result.grid, PLACE[:2], np.abs(result.studentized) > result.limit
     columns = [
         Quantity(np.array(grid.ids, dtype=object), (), "name", "id", "id", head="Point"),
-        attribute(grid, "readings", head="Readings"),
+        column("readings", grid.readings, "Readings"),
         Quantity(grid.model[:, :2], plan, "value", "mean", "mean"),
-        attribute(result, "residual", plan, "deviation", head="Residual {}", decimals=4),
-        attribute(result, "radial_distortion", OUTWARD, "deviation", head="Radial distortion", decimals=1),
-        attribute(result, "redundancy", plan, head="Redundancy {}", decimals=3),
-        attribute(result, "standardized", plan),
-        attribute(result, "studentized", plan, head="t {}", decimals=2, marked=beyond),
+        column("residual", result.residual, "Residual {}", axes=plan, kind="deviation", decimals=4),
+        column(
+            "radial_distortion",
+            result.radial_distortion,
+            "Radial distortion",
+            axes=OUTWARD,
+            kind="deviation",
+            decimals=1,
+        ),
+        column("redundancy", result.redundancy, "Redundancy {}", axes=plan, decimals=3),
+        column("standardized", result.standardized, axes=plan),
+        column("studentized", result.studentized, "t {}", axes=plan, decimals=2, marked=beyond),
     ]
     note = f"Beyond {result.limit:.2f} the test rejects." if math.isfinite(result.limit) else ""
     about = (

@@ -27,7 +27,7 @@ from photogram.results.network_tables import (
 )
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
 from photogram.show.cells import unit_written
-from photogram.show.quantity import Axis, Link, Quantity, attribute, column, component, joined, long
+from photogram.show.quantity import Axis, Link, Quantity, column, component, joined, long
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.findings import Tested
 from photogram.statistics.reliability import TESTABLE, minimal_detectable_error
@@ -252,7 +252,7 @@ def check_points(result: Result) -> list[Quantity]:
     statistic, p = checks.statistics
     return [
         *_compared(result, checks.rows, checks.differences, checks.given_sd),
-        attribute(checks, "assumed", about="whether standard deviations of control are assumed"),
+        column("assumed", checks.assumed, about="whether standard deviations of control are assumed"),
         column("statistic", statistic, about="T, or F if the unit weight is estimated"),
         Quantity(p, name="probability", member="p", about="of a larger statistic without errors"),
     ]

@@ -14,6 +14,7 @@ from photogram.show import page, quantity
 from photogram.show.angles import degrees_written
 from photogram.show.page import Cell, Column, Document, Drawing, Facts, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, chosen, long
+from photogram.words import Words, words_of
 
 _SIGNS = {
     "arc seconds": "″",
@@ -39,49 +40,58 @@ def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Docum
     """Return the visible parts of a document with formatted tables and drawn plots."""
 
     def visible(sections: Sequence[Section]) -> list[Section]:
-        whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in sections]
+        whole = [replace(each, parts=_written(each.parts, document.words, draw)) for each in sections]
         return [section for section in whole if section.parts]
 
     return replace(document, sections=visible(document.sections), details=visible(document.details))
 
 
-def _written(parts: Sequence[Part], numeral: Callable[[str], str], draw: Draw) -> list[Any]:
+def _written(parts: Sequence[Part], words: Words, draw: Draw) -> list[Any]:
     found: list[Any] = []
     for part in parts:
         match part:
             case page.Layers():
-                layers = _written(part.parts, numeral, draw)
+                layers = _written(part.parts, words, draw)
                 found += layers if len(layers) < 2 else [replace(part, parts=layers)]
             case Drawing():
                 found += [drawing] if (drawing := draw(part)) else []
             case quantity.Table(visible=False) | Facts(facts=[]) | Remarks(sentences=[]) | Text(text=""):
                 continue
             case _:
-                found.append(written(part, numeral))
+                made = written(part)
+                foreign = made is not part and words is not words_of("en")
+                found.append(_with_numerals(made, words) if foreign else made)
     return found
 
 
-def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
+def _with_numerals(table: page.Table, words: Words) -> page.Table:
+    """Return a table with the numbers of a language."""
+    spoken = [
+        [cell if cell.number is None else cell._replace(text=words.numeral(cell.text)) for cell in row]
+        for row in table.rows
+    ]
+    return replace(table, rows=spoken)
+
+
+def written(part: Any) -> Any:
     """Return a part of a document; a declared table becomes a table of cells.
 
     Columns without a head are omitted. The standard deviations of a table define the decimals of its
-    components: two digits of the median. `numeral` formats numbers in another language.
+    components: two digits of the median.
     """
     if not isinstance(part, quantity.Table):
         return part
     columns = part.columns
     if part.shown is not None:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
-    pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations, numeral)]
+    pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations)]
     rows = [*zip(*(cells for _, cells in pairs), strict=True)]
     return page.Table(part.title, [column for column, _ in pairs], rows, part.note)
 
 
-def _columns(
-    each: Quantity, by: Floats | None, numeral: Callable[[str], str]
-) -> Iterator[tuple[Column, Iterable[Cell]]]:
+def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, Iterable[Cell]]]:
     if each.kind == "name":
-        yield Column(each.head, text=True), _with_marks(_names(each), each.marked, numeral)
+        yield Column(each.head, text=True), _with_marks(_names(each), each.marked)
         return
     axes, of = each.axes or (Axis(""),), each.of
     mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
@@ -97,7 +107,7 @@ def _columns(
         head = each.head.format(axis.label or axis.name) if of is None else each.head
         unit = "° ′ ″" if each.kind == "value" and axis.angle == "dms" else unit_written(each.unit(axis))
         own = None if marked is None else marked[:, k]
-        yield Column(head, "" if mixed else unit), _with_marks(cells, own, numeral)
+        yield Column(head, "" if mixed else unit), _with_marks(cells, own)
 
 
 def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:
@@ -145,10 +155,7 @@ def _cell(each: Quantity, value: Any, axis: Axis, decimals: int | None) -> Cell:
     return Cell(page.number_text(value, decimals, each.figures), None if isinstance(value, str) else value)
 
 
-def _with_marks(cells: list[Cell], marked: Bools | None, numeral: Callable[[str], str]) -> Iterable[Cell]:
-    """Return cells with their marks, and numbers in another language."""
-    if numeral is not str:
-        cells = [cell if cell.number is None else cell._replace(text=numeral(cell.text)) for cell in cells]
+def _with_marks(cells: list[Cell], marked: Bools | None) -> Iterable[Cell]:
     if marked is None:
         return cells
     return [cell._replace(tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]

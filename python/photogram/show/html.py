@@ -13,6 +13,7 @@ from photogram import _photocore
 from photogram.show import page as parts
 from photogram.show.cells import formatted
 from photogram.show.page import Cell, Column, Document, Drawing, Fact, Judgement, Section, Table
+from photogram.words import Words
 
 LONG = 16  # Characters; longer words may be broken
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # Numbers that the script of a page can read
@@ -25,10 +26,10 @@ def page_html(page: Document) -> bytes:
     known = {cell.id for table in tables for row in table.rows for cell in row if cell.id}
     links = [("verdict", page.first), *((each.key, each.title) for each in page.sections if each.title)]
     text = _file("report.html").format(
-        language=page.language,
+        language=page.words.language,
         version=_photocore.__version__,
         style=_file("style.css"),
-        contents=escape(page.contents),
+        contents=escape(page.words("page.contents")),
         links=_list("ol", (_element("a", escape(title), href=f"#{key}") for key, title in links)),
         title=escape(page.title or page.what),
         what=_element("p", escape(page.what), class_="what") if page.title else "",
@@ -36,7 +37,7 @@ def page_html(page: Document) -> bytes:
         judgements="".join(map(_judgement, page.judgements)),
         advice=_advice(page),
         highlights=_facts("highlights", page.highlights, "b"),
-        sections="\n".join(_section(each, known, page.more) for each in page.sections),
+        sections="\n".join(_section(each, known, page.words) for each in page.sections),
         script=_file("script.js"),
     )
     return text.encode("utf-8", errors="replace")
@@ -89,14 +90,14 @@ def _advice(page: Document) -> str:
     return _element("div", _element("h3", "What to do next") + steps, class_="advice") if steps else ""
 
 
-def _section(section: Section, known: Set[str], more: str) -> str:
+def _section(section: Section, known: Set[str], words: Words) -> str:
     title = _element("h2", escape(section.title)) if section.title else ""
     intro = _element("p", escape(section.intro), class_="intro") if section.intro else ""
-    content = [title, intro, *(_part(part, section.title, known, more) for part in section.parts)]
+    content = [title, intro, *(_part(part, section.title, known, words) for part in section.parts)]
     return _element("section", "\n".join(content), id=section.key, class_="annex" * section.annex)
 
 
-def _part(part: parts.Part, within: str, known: Set[str], more: str) -> str:
+def _part(part: parts.Part, within: str, known: Set[str], words: Words) -> str:
     """Return a part; `again` marks the title of its section."""
     match part:
         case Table():
@@ -110,7 +111,7 @@ def _part(part: parts.Part, within: str, known: Set[str], more: str) -> str:
             return _element("figure", f"\n{part.markup}\n{caption}", id=part.name)
         case parts.Layers():
             layers = (
-                f'<div class="layer" data-title="{escape(one.title)}">{_part(one, "", known, more)}</div>'
+                f'<div class="layer" data-title="{escape(one.title)}">{_part(one, "", known, words)}</div>'
                 for one in part.parts
             )
             return _element("div", "\n".join(layers), class_="layers", id=part.name)
@@ -119,7 +120,7 @@ def _part(part: parts.Part, within: str, known: Set[str], more: str) -> str:
         case parts.Remarks():
             shown, hidden = part.sentences[: part.most], part.sentences[part.most :]
             first, others = (_list("ul", map(escape, each), class_="remarks") for each in (shown, hidden))
-            summary = _element("summary", escape(more.format(len(hidden))))
+            summary = _element("summary", escape(words("page.more", count=len(hidden))))
             return first + (_element("details", summary + others) if hidden else "")
     raise TypeError(f"a page does not show {type(part).__name__}")
 

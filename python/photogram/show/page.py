@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.show import quantity
-from photogram.words import Phrase, words_of
+from photogram.words import Phrase, Words, words_of
 
 if TYPE_CHECKING:
     from photogram.show.sketch.plot import Plot
@@ -154,14 +155,8 @@ class Document:
     details: Sequence[Section] = ()  # Sections that pages omit
     phases: Mapping[str, float] = field(default_factory=dict)  # Seconds in phases of the engine
     head: Sequence[Fact] = ()  # Client, author
-    # Language; names of the link to the top and of the list of sections; text for `{}` hidden sentences; page
-    # numbers
-    language: str = "en"
-    first: str = "Verdict"
-    contents: str = "Sections"
-    more: str = "{} more"
-    numbers: str = "Page {number} of {total}"
-    numeral: Callable[[str], str] = str  # Formats numbers of tables in the language
+    first: str = "Verdict"  # Name of the link to the top
+    words: Words = field(default_factory=partial(words_of, "en"))  # The language
 
     def with_sections(self, *more: Section) -> Document:
         return replace(self, sections=[*self.sections, *more])

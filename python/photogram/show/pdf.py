@@ -24,7 +24,7 @@ from photogram.words import Phrase
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts included in the library; for other letters it uses fonts of the machine."""
 
-OMITTED = ("members", "phases", "numeral", "sketch")  # Fields that pages do not show
+OMITTED = ("members", "phases", "words", "sketch")  # Fields that pages do not show
 LONGEST = 30  # Longest word that is not broken, characters
 
 
@@ -35,7 +35,9 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
     """
     titled = formatted(replace(page, title=page.title or page.what, details=()), inlined)
     footer = f"{page.what} – {page.title}" if page.title else page.what
+    numbers = page.words("page.numbers", number="{number}", total="{total}")
     record = _record(titled) | {"author": author or [], "footer": footer, "fonts": FONTS, "longest": LONGEST}
+    record |= {"language": page.words.language, "numbers": numbers}
     data = json.dumps(record, default=_record, ensure_ascii=False)
     data = data.encode(errors="replace").decode()  # Names of files may contain bytes that are not UTF-8.
     template = files("photogram.show").joinpath("templates", "page.typ").read_bytes()

@@ -168,13 +168,6 @@ def of_each(
     return Quantity(values, axes, kind, **{"member": more.get("name") or attribute, **more})
 
 
-def attribute(
-    thing: object, name: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
-) -> Quantity:
-    """Return an attribute, an array with n rows, as a quantity of that name."""
-    return Quantity(attrgetter(name)(thing), axes, kind, **{"name": name, "member": name, **more})
-
-
 def column(name: str, values: Any, head: str = "", **more: Any) -> Quantity:
     """Return a quantity with the same name in files and in JSON documents."""
     return Quantity(values, **{"name": name, "member": name, "head": head, **more})

@@ -7,7 +7,6 @@ The colours of categories are the ones of Okabe and Ito (2008, "Color Universal 
 from __future__ import annotations
 
 import math
-from contextlib import AbstractContextManager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -51,15 +50,6 @@ def need(package: str, user: str, extra: str) -> None:
             raise
         message = f"{user} need {package}: pip install 'photogram[{extra}]'"
         raise ModuleNotFoundError(message, name=package) from None
-
-
-def styled() -> AbstractContextManager[None]:
-    """Return a context with the style of axes, letters and legends."""
-    need(*MATPLOTLIB)
-    from matplotlib import rc_context
-
-    settings: Any = SETTINGS
-    return rc_context(settings)
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -133,6 +133,7 @@ class Words:
     """
 
     def __init__(self, language: str = "en", own: Mapping[str, str] | None = None) -> None:
+        self.language = language
         self._table = {**table_of("en"), **table_of(language), **(own or {})}
         self._own = own or {}
 

@@ -292,12 +292,8 @@ def statement_document(statement: Statement) -> Document:
             *annexes(statement),
         ],
         head=head,
-        language=texts.language,
         first=texts("page.first"),
-        contents=texts("page.contents"),
-        more=texts("page.more", count="{}"),
-        numbers=texts("page.numbers", number="{number}", total="{total}"),
-        numeral=texts.numeral,
+        words=texts,
     )
 
 

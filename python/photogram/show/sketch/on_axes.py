@@ -10,7 +10,7 @@ from photogram.errors import InputError
 from photogram.show.sketch import marks
 from photogram.show.sketch.layout import NAME, NOTE, NUMBER, free_names
 from photogram.show.sketch.marks import Panel, Sketch
-from photogram.show.style import FAINT, INK, styled
+from photogram.show.style import FAINT, INK, SETTINGS
 from photogram.words import phrase
 
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
@@ -25,9 +25,10 @@ ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 def on_axes(sketch: Sketch, ax: Any) -> None:
     """Draw a plot on one axes object per panel, or in a figure or subfigure."""
-    with styled():
-        from matplotlib.figure import FigureBase
+    from matplotlib import rc_context
+    from matplotlib.figure import FigureBase
 
+    with rc_context(SETTINGS):
         panels = list(sketch.panels)
         if isinstance(ax, FigureBase):
             shared: Any = "col" if sketch.shared else False

@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.sketch.marks import Panel, Sketch
 from photogram.show.sketch.svg import svg_of
-from photogram.show.style import new_figure, styled
+from photogram.show.style import SETTINGS, new_figure
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -80,7 +80,9 @@ class Plot(Sketch):
         drawn, content = self.figure(), io.BytesIO()
         if ending not in drawn.canvas.get_supported_filetypes():
             raise InputError(phrase("plot.format", ending=ending))
-        with styled():
+        from matplotlib import rc_context
+
+        with rc_context(SETTINGS):
             drawn.savefig(content, format=ending, metadata=TIMELESS.get(ending))
         return content.getvalue()
 
