@@ -30,9 +30,9 @@ from photogram.show.page import (
     layered_tables,
     significant,
 )
-from photogram.show.quantity import Axis, Quantity, Table, chosen, component, members, of_each, records
+from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
-from photogram.show.sketch.plot import Plot
+from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality
 from photogram.words import Phrase, phrase
@@ -52,8 +52,8 @@ REMEDIES = {
 SHARE = (Axis("", "", small="percent", factor=100.0),)
 IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
 MOTION_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
-_PANEL_INCHES = 6.0  # Longer side of a panel
-_MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
+PANEL = 6.5  # Side of a panel, inches
+MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,31 @@ class Plan(Documented):
 
     def document(self) -> Document:
         """Return the document of the plan."""
-        return plan_document(self.patterns)
+        patterns, title = self.patterns, "Expected standard deviation in height"
+        new = [pattern.new_points.any() for pattern in patterns]
+        drawing = Drawing("picture-plan", title, about("plan.caption"), self.plot)
+        layers = partial(_layers, patterns)
+        headline = _judgement(patterns) if all(new) else phrase("plan.compared.none")
+        return Document(
+            what="Prediction of a network before it is flown",
+            title=patterns[0].block.title,
+            judgements=[Judgement("Prediction", str(headline))],
+            advice=advice(patterns),
+            highlights=_highlights(patterns),
+            sections=[
+                Section("network", "Plan of the network", [drawing] if any(new) else []),
+                Section("comparison", "Side by side", [_comparison(patterns)] if all(new) else []),
+                Section("size", "How much", [_size(patterns)]),
+                layers("points", "New points", points_table, about("plan.points")),
+                layers("photos", "Photos", _photos),
+                layers("motion", "Motion", _motion),
+                layers("control", "Control", _control, about("plan.control")),
+                layers("undetected", "Undetected errors", _undetected, about("plan.undetected")),
+                remarks_section(_remarks(patterns)),
+            ],
+            details=[layers("multiples", "New points, in standard deviations of an image", _multiples)],
+            members=_members(patterns),
+        )
 
     def plot(self) -> Plot:
         """Plot patterns in plan, with expected height deviations as colours.
@@ -93,7 +117,23 @@ class Plan(Documented):
         PhotogramError
             If the plan lacks new points.
         """
-        return plan_sketch(self.patterns)
+        patterns = self.patterns
+        heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
+        if heights.size == 0:
+            raise PhotogramError(phrase("plan.new-points"))
+        places = [pattern.point_plan[pattern.result.used_points] for pattern in patterns]
+        limits = around(np.vstack([*places, *(pattern.photo_plan for pattern in patterns)]), 0.05)
+        label = f"expected standard deviation in height, {patterns[0].block.linear_unit}"
+        shades = Shades(float(heights.min()), float(heights.max()), label)
+        panels = [_panel(pattern, limits, shades) for pattern in patterns]
+        # The legend beside the last panel names the control of all panels.
+        labelled = {mark.label: mark for panel in panels for mark in panel.labelled}
+        known = {mark.label for mark in panels[-1].labelled}
+        more = [replace(mark, places=NOWHERE) for label, mark in labelled.items() if label not in known]
+        panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside", shades=shades)
+        width, height = np.ptp(limits, axis=0).tolist()
+        across = 1 if width > MAX_SIDE_BY_SIDE * height else len(panels)
+        return side_by_side(panels, across, PANEL)
 
 
 def plan(
@@ -140,36 +180,6 @@ def plan(
     return Plan(tuple(made))
 
 
-def plan_document(patterns: Sequence[Pattern]) -> Document:
-    """Return the document of a plan."""
-    title = "Expected standard deviation in height"
-    drawing = Drawing("picture-plan", title, about("plan.caption"), partial(plan_sketch, patterns))
-    new = [pattern.new_points.any() for pattern in patterns]
-    headline = _judgement(patterns) if all(new) else phrase("plan.compared.none")
-    return Document(
-        what="Prediction of a network before it is flown",
-        title=patterns[0].block.title,
-        judgements=[Judgement("Prediction", str(headline))],
-        advice=advice(patterns),
-        highlights=_highlights(patterns),
-        sections=[
-            Section("network", "Plan of the network", [drawing] if any(new) else []),
-            Section("comparison", "Side by side", [_comparison(patterns)] if all(new) else []),
-            Section("size", "How much", [_size(patterns)]),
-            _layers("points", "New points", patterns, _points, about("plan.points")),
-            _layers("photos", "Photos", patterns, _photos),
-            _layers("motion", "Motion", patterns, _motion),
-            _layers("control", "Control", patterns, _control, about("plan.control")),
-            _layers("undetected", "Undetected errors", patterns, _undetected, about("plan.undetected")),
-            remarks_section(_remarks(patterns)),
-        ],
-        details=[
-            _layers("multiples", "New points, in standard deviations of an image", patterns, _multiples)
-        ],
-        members=_members(patterns),
-    )
-
-
 def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
     linear = patterns[0].block.linear_unit
     units = {
@@ -193,7 +203,7 @@ def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
                 "messages": [*map(str, pattern.result.messages)],
                 "photo_count": len(pattern.block.photo_ids),
                 "image_count": int(pattern.result.used_images.sum()),
-                "points": records(_points(pattern).columns),
+                "points": [vars(group) for group in pattern.points if group.points],
                 "photos": [*map(vars, pattern.photos)],
                 "control": records(_control(pattern).columns),
                 "undetected": records(_undetected(pattern).columns),
@@ -206,7 +216,7 @@ def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
 
 
 def points_table(pattern: Pattern) -> Table:
-    """Return the quality of new points, one row per group, also empty groups."""
+    """Return the quality of new points, one row per group; reports omit empty groups."""
     axes = tuple(Axis.of(axis, pattern.block.linear_unit) for axis in pattern.axes)
     groups = partial(of_each, pattern.points)
     columns = [
@@ -220,21 +230,17 @@ def points_table(pattern: Pattern) -> Table:
         groups("detectable", IMAGE, "deviation", name="detectable", head="Detectable", decimals=1),
         groups("effect", name="effect", head="Effect in sd", decimals=1),
     ]
-    return Table("", pattern.name, columns)
-
-
-def _points(pattern: Pattern) -> Table:
-    table, groups = points_table(pattern), np.flatnonzero([group.points for group in pattern.points])
-    return replace(table, columns=chosen(table.columns, groups))
+    return Table("", pattern.name, columns, shown=np.flatnonzero([group.points for group in pattern.points]))
 
 
 def _multiples(pattern: Pattern) -> Table:
-    axes, (_, group, _, rms, largest, *_) = tuple(map(Axis, pattern.axes)), _points(pattern).columns
+    table, axes = points_table(pattern), tuple(map(Axis, pattern.axes))
+    _, group, _, *deviations = table.columns[:5]
     columns = [
         replace(quantity, values=quantity.values / pattern.unit, axes=axes, kind="number", decimals=2)
-        for quantity in (rms, largest)
+        for quantity in deviations
     ]
-    return Table("", pattern.name, [group, *columns])
+    return replace(table, columns=[group, *columns])
 
 
 def _photos(pattern: Pattern) -> Table:
@@ -298,7 +304,7 @@ def _undetected(pattern: Pattern) -> Table:
 
 
 def _layers(
-    key: str, title: str, patterns: Sequence[Pattern], table: Callable[[Pattern], Table], intro: str = ""
+    patterns: Sequence[Pattern], key: str, title: str, table: Callable[[Pattern], Table], intro: str = ""
 ) -> Section:
     tables = [made for pattern in patterns if (made := table(pattern)).visible]
     return Section(key, title, layered_tables(key, tables), intro)
@@ -400,31 +406,6 @@ def _remarks(patterns: Sequence[Pattern]) -> list[str]:
         text if len(concerned) == len(patterns) else f"{'; '.join(concerned)}: {text}"
         for text, concerned in names.items()
     ]
-
-
-def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
-    """Return a plot with one panel per pattern and common scales."""
-    heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
-    if heights.size == 0:
-        raise PhotogramError(phrase("plan.new-points"))
-    plan = np.vstack([pattern.point_plan[pattern.result.used_points] for pattern in patterns])
-    photos = np.vstack([pattern.photo_plan for pattern in patterns])
-    limits = around(np.vstack([plan, photos]), 0.05)
-    label = f"expected standard deviation in height, {patterns[0].block.linear_unit}"
-    shades = Shades(float(heights.min()), float(heights.max()), label)
-    panels = [_panel(pattern, limits, shades) for pattern in patterns]
-    # The legend beside the last panel names the control of all panels.
-    known = {mark.label for mark in panels[-1].labelled}
-    labelled = {mark.label: mark for panel in panels for mark in panel.marks if isinstance(mark, Markers)}
-    more = [replace(mark, places=NOWHERE) for label, mark in labelled.items() if label not in {"", *known}]
-    panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside", shades=shades)
-    width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()
-    stacked = width > _MAX_SIDE_BY_SIDE * height
-    rows, columns = (len(panels), 1) if stacked else (1, len(panels))
-    across = max(2 * _PANEL_INCHES if stacked else min(_PANEL_INCHES, _PANEL_INCHES * width / height), 3.5)
-    up = min(across * height / width, _PANEL_INCHES)
-    size = columns * (across + 0.5) + 3.0, rows * (up + 1.0) + 0.4
-    return Plot(*size, panels, columns)
 
 
 def _panel(pattern: Pattern, limits: Floats, shades: Shades) -> Panel:
