@@ -32,7 +32,7 @@ from photogram.show.page import (
 )
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
-from photogram.show.sketch.plot import Plot, side_by_side
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality
 from photogram.words import Phrase, phrase
@@ -52,7 +52,7 @@ REMEDIES = {
 SHARE = (Axis("", "", small="percent", factor=100.0),)
 IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
 MOTION_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
-PANEL = 6.5  # Side of a panel, inches
+PANEL = 6.0  # Longer side of a panel, inches
 MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
 
 
@@ -132,8 +132,10 @@ class Plan(Documented):
         more = [replace(mark, places=NOWHERE) for label, mark in labelled.items() if label not in known]
         panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside", shades=shades)
         width, height = np.ptp(limits, axis=0).tolist()
-        across = 1 if width > MAX_SIDE_BY_SIDE * height else len(panels)
-        return side_by_side(panels, across, PANEL)
+        columns = 1 if width > MAX_SIDE_BY_SIDE * height else len(panels)
+        longer = PANEL if columns > 1 else 2 * PANEL
+        across, up = longer * np.array([width, height]) / max(width, height) + [0.5, 1.0]
+        return Plot(columns * max(across, 4.0) + 3.0, len(panels) // columns * up + 0.4, panels, columns)
 
 
 def plan(
