@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.results.network_tables import iteration_table
-from photogram.show.quantity import Axis, Quantity, Table, attribute, chosen
+from photogram.show.quantity import Axis, Quantity, Table, chosen, column
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
@@ -33,9 +33,9 @@ def control(result: Orientation) -> Table:
             figures=4,
         ),
         Quantity(result.model_residuals, _axes("xyz", model[0].unit), "deviation", member="residual_model"),
-        attribute(result, "redundancy", numbers, head="Redundancy", decimals=3),
-        attribute(result, "standardized", numbers, head="w", decimals=2, seen=seen, marked=of_w),
-        attribute(result, "studentized", numbers, head="t", decimals=2, seen=seen, marked=of_t),
+        column("redundancy", result.redundancy, "Redundancy", axes=numbers, decimals=3),
+        column("standardized", result.standardized, "w", axes=numbers, decimals=2, seen=seen, marked=of_w),
+        column("studentized", result.studentized, "t", axes=numbers, decimals=2, seen=seen, marked=of_t),
         Quantity(result.adjusted_control, ground, "value", member="adjusted"),
         Quantity(result.control_covariances, member="covariance"),
     ]

@@ -124,20 +124,14 @@ def _parameters(result: PerspectiveCenter, errors: Floats) -> Table:
 
 
 def _points(result: PerspectiveCenter) -> Table:
-    grid, plan, beyond = result.grid, PLACE[:2], np.abs(result.studentized) > result.limit
+    grid, plan, radial = result.grid, PLACE[:2], result.radial_distortion
+    beyond = np.abs(result.studentized) > result.limit
     columns = [
         Quantity(np.array(grid.ids, dtype=object), (), "name", "id", "id", head="Point"),
         column("readings", grid.readings, "Readings"),
         Quantity(grid.model[:, :2], plan, "value", "mean", "mean"),
         column("residual", result.residual, "Residual {}", axes=plan, kind="deviation", decimals=4),
-        column(
-            "radial_distortion",
-            result.radial_distortion,
-            "Radial distortion",
-            axes=OUTWARD,
-            kind="deviation",
-            decimals=1,
-        ),
+        column("radial_distortion", radial, "Radial distortion", axes=OUTWARD, kind="deviation", decimals=1),
         column("redundancy", result.redundancy, "Redundancy {}", axes=plan, decimals=3),
         column("standardized", result.standardized, axes=plan),
         column("studentized", result.studentized, "t {}", axes=plan, decimals=2, marked=beyond),

@@ -25,9 +25,9 @@ from photogram.show.page import (
     Drawing,
     Fact,
     Judgement,
+    Layers,
     Section,
     about,
-    layered_tables,
     significant,
 )
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
@@ -309,7 +309,7 @@ def _layers(
     patterns: Sequence[Pattern], key: str, title: str, table: Callable[[Pattern], Table], intro: str = ""
 ) -> Section:
     tables = [made for pattern in patterns if (made := table(pattern)).visible]
-    return Section(key, title, layered_tables(key, tables), intro)
+    return Section(key, title, [Layers(f"{key}-layers", tables)], intro)
 
 
 def _judgement(patterns: Sequence[Pattern]) -> Phrase:

@@ -26,7 +26,7 @@ from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
 from photogram.results.parts import AdjustedCamera
-from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
+from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section, about
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
 if TYPE_CHECKING:
@@ -248,13 +248,13 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
     tables = [parameters_table(each, law) for each in shown]
     groups = [group for each in shown for group in each.groups]
-    parts: list[Part] = [*layered_tables("camera", tables), _terms_together(groups)]
+    parts: list[Part] = [Layers("camera-layers", tables), _terms_together(groups)]
     curves = [
         _curve_table(each.camera.name, curve, str(each.camera.camera.unit))
         for each in shown
         if (curve := distortion_curve(result, each.camera)) is not None
     ]
-    parts += [*drawings, *layered_tables("curve", curves)]
+    parts += [*drawings, Layers("curve-layers", curves)]
     remarks = [
         f"{each.camera.name}: {sentence}"
         for each in shown

@@ -14,7 +14,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
-from photogram.show.page import Layers, Part, Section, Text, about, layered_tables
+from photogram.show.page import Layers, Part, Section, Text, about
 from photogram.show.quantity import Quantity, Table, named
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def stations_section(result: AdjustedNetwork) -> Section:
         tables.append(component_table(key, title, columns, there[:, of], own.standardized[:, of], sd[:, of]))
     *others, last = [caption.lower() for caption in layers]
     intro = f"{', '.join(others).capitalize()} and {last} that were given with standard deviations."
-    return Section("stations", "Observed photos", layered_tables("stations", tables), intro)
+    return Section("stations", "Observed photos", [Layers("stations-layers", tables)], intro)
 
 
 def beside_section(result: Result) -> Section:
@@ -197,9 +197,8 @@ def beside_section(result: Result) -> Section:
             key, title = f"observations-{kind}", kind[:1].upper() + kind[1:]
             there, columns = np.isfinite(observed.residuals), observations(observed)
             tables.append(component_table(key, title, columns, there, observed.standardized))
-    return Section(
-        "observations", "Other observations", layered_tables("beside", tables), about("observations")
-    )
+    parts = [Layers("beside-layers", tables)]
+    return Section("observations", "Other observations", parts, about("observations"))
 
 
 def images_section(result: AdjustedNetwork) -> Section:

@@ -51,14 +51,12 @@ def verdict_table(verdict: Verdict, words: Words | None = None) -> Table:
 
 
 def tests_section(verdict: Verdict) -> Section:
-    """Return the section of verdict tests; hidden without tests."""
-    return Section("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [])
+    return Section.of(verdict_table(verdict))
 
 
 def remarks_section(sentences: Iterable[object]) -> Section:
-    """Return the section of warnings; empty, and so hidden, without warnings."""
-    told = [str(each) for each in sentences]
-    return Section("remarks", "Remarks", [Remarks(told)] if told else [])
+    """Return the section of warnings."""
+    return Section("remarks", "Remarks", [Remarks([str(each) for each in sentences])])
 
 
 _STATISTICS = {"s^2": "s²", "A^2": "A²", "c'C^-1c": "cᵀC⁻¹c"}

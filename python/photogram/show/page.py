@@ -188,11 +188,6 @@ def about(code: str, **fields: Any) -> str:
     return words_of("en")(f"about.{code}", **fields)
 
 
-def layered_tables(name: str, tables: Sequence[quantity.Table]) -> Sequence[Layers | quantity.Table]:
-    """Return several tables as layers, or a single table unchanged."""
-    return [Layers(f"{name}-layers", tables)] if len(tables) > 1 else tables
-
-
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:
     """Return one document of several with the same tables as layers.
 

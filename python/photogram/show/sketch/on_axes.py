@@ -10,7 +10,7 @@ from photogram.errors import InputError
 from photogram.show.sketch import marks
 from photogram.show.sketch.layout import NAME, NOTE, NUMBER, free_names
 from photogram.show.sketch.marks import Panel, Sketch
-from photogram.show.style import FAINT, INK, SETTINGS
+from photogram.show.style import FAINT, INK, MATPLOTLIB, SETTINGS, need
 from photogram.words import phrase
 
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
@@ -25,6 +25,7 @@ ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 def on_axes(sketch: Sketch, ax: Any) -> None:
     """Draw a plot on one axes object per panel, or in a figure or subfigure."""
+    need(*MATPLOTLIB)
     from matplotlib import rc_context
     from matplotlib.figure import FigureBase
 
@@ -151,7 +152,7 @@ def lay_out(whole: Any) -> None:
 
 def draw(mark: marks.Mark, axes: Any) -> None:
     """Draw a mark on axes with final limits; `Names` after the layout."""
-    from matplotlib.collections import EllipseCollection, PolyCollection
+    from matplotlib.collections import PolyCollection
 
     given: dict[str, Any] = {"zorder": mark.layer, "label": mark.label or None}
     match mark:
@@ -178,12 +179,6 @@ def draw(mark: marks.Mark, axes: Any) -> None:
             }
             given["rasterized"] = len(known) > MAX_VECTOR_MARKS / 5
             axes.add_collection(PolyCollection(known, **given), autolim=False)
-        case marks.Ellipses():
-            edge = "none" if mark.fill else mark.colour
-            given |= {"facecolors": (mark.colour, mark.fill), "edgecolors": edge, "linewidths": mark.width}
-            given |= {"units": "xy", "offsets": mark.places, "offset_transform": axes.transData}
-            wide, high = 2 * mark.semi_axes.T
-            axes.add_collection(EllipseCollection(wide, high, mark.angles, **given), autolim=False)
         case marks.Mesh():
             given |= _colours(mark.shades)
             axes.pcolorfast(*mark.corners.T, np.ma.masked_invalid(mark.values), **given)
