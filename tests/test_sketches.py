@@ -15,6 +15,7 @@ from photogram.giant import read_project
 from photogram.show.sketch.layout import laid_out
 from photogram.show.sketch.letters import ticks, width, wrapped
 from photogram.show.sketch.marks import (
+    Ellipses,
     Markers,
     Mesh,
     Names,
@@ -22,7 +23,6 @@ from photogram.show.sketch.marks import (
     Shades,
     Sketch,
     contours,
-    ellipse_outlines,
     horizontal_line,
     rgb,
 )
@@ -134,12 +134,13 @@ def test_the_smallest_value_lies_on_top_in_its_colour():
 def test_an_ellipse_has_its_axes_and_turn():
     placed = placed_on([[0.0, 0.0], [10.0, 5.0]], equal=True)
     scale = (placed.box[2] - placed.box[0]) / 10.0
-    outlines = ellipse_outlines(np.array([[5.0, 2.5]]), np.array([[2.0, 1.0]]), np.array([30.0]))
-    ((start, *_, end),) = at = placed.at(outlines)
-    np.testing.assert_allclose(start, end, atol=1e-9)
-    lengths = np.hypot(*(at[0] - placed.at(np.array([5.0, 2.5]))).T)
-    assert (lengths.max(), lengths.min()) == pytest.approx((2.0 * scale, scale))
-    np.testing.assert_allclose(start, placed.at(np.array([5.0 + 2.0 * np.cos(np.pi / 6), 3.5])))
+    mark = Ellipses(np.array([[5.0, 2.5]]), np.array([[2.0, 1.0]]), np.array([30.0]), "#000000", 1.0)
+    numbers = [float(each) for each in re.findall(r"-?\d+\.?\d*", svg(mark, placed).partition("stroke")[0])]
+    start, (a, b, turn) = numbers[:2], numbers[2:5]
+    assert (a, b) == pytest.approx((2.0 * scale, scale), abs=0.01)
+    assert turn == pytest.approx(-30.0)
+    end = placed.at(np.array([5.0 + 2.0 * np.cos(np.pi / 6), 3.5]))
+    assert start == pytest.approx(end.tolist(), abs=0.01)
 
 
 @pytest.mark.parametrize("up", [1.0, -1.0])

@@ -26,7 +26,7 @@ from photogram.comparator.joint import Weights, adjust_jointly
 from photogram.comparator.listing.parameters import correction_table, table_nodes
 from photogram.comparator.tables import LINEAR
 from photogram.comparator.variance import AxisSigma, _f_max_tail, compare_case_variances, difference
-from photogram.show.sketch.marks import Line
+from photogram.show.sketch.marks import Ellipses
 from photogram.words import phrase
 
 
@@ -117,9 +117,7 @@ def test_feature_18_every_case_has_its_table_and_pictures_where_they_are_wanted(
 
 def _widths(panel):
     """Return the major semi-axes of each of the groups of ellipses on a panel."""
-    groups = [mark.places for mark in panel.marks if isinstance(mark, Line)]
-    centres = [each[:, :-1].mean(axis=1, keepdims=True) for each in groups]
-    return [np.linalg.norm(a - b, axis=2).max(axis=1) for a, b in zip(groups, centres, strict=True)]
+    return [mark.semi_axes[:, 0] for mark in panel.marks if isinstance(mark, Ellipses)]
 
 
 def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):

@@ -220,8 +220,7 @@ def _ellipses(drawn: Pictured, view: View, notes: list[str]) -> tuple[list[Mark]
     places, worst = view.points[rows[shown]], int(np.argmax(axes_of[:, 0]))
     largest = f"{axes_of[worst, 0]:.3g}{view.unit}, point {view.plan.point_ids[rows[worst]]}"
     notes.append(f"largest semi-axis of an ellipse: {largest}")
-    outlines = shapes.ellipse_outlines(places, scale * axes_of[shown], angles[shown])
-    marks: list[Mark] = [shapes.Line(outlines, BLUE, 0.8, layer=4.0)]
+    marks: list[Mark] = [shapes.Ellipses(places, scale * axes_of[shown], angles[shown], BLUE, 0.8, layer=4.0)]
     return marks, [view.bar(scale, BLUE, f"semi-axes of error ellipses, {CONFIDENCE:.0%}")]
 
 

@@ -24,7 +24,7 @@ from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
 from photogram.results.tables import Tests
-from photogram.show.sketch.marks import Arrows, Panel, Polygons, around, ellipse_axes, ellipse_outlines
+from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length
 from photogram.statistics.findings import Tested
@@ -273,7 +273,7 @@ def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
     ends = field.positions + field.vectors / scale
     semi_axes, angles = ellipse_axes(field.covariances / scale**2)
     marks = [
-        Polygons(ellipse_outlines(ends, semi_axes, angles), BLUE, 0.4),
+        Ellipses(ends, semi_axes, angles, BLUE, 0.0, 0.4, layer=1.0),
         Arrows(field.positions, field.vectors / scale, INK, 0.003),
     ]
     reach = float(semi_axes.max(initial=0.0))

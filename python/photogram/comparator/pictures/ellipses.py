@@ -18,7 +18,7 @@ from photogram.comparator.pictures.vectors import (
     spacing,
 )
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
-from photogram.show.sketch.marks import Line, Mark, Markers, Panel, around, ellipse_outlines
+from photogram.show.sketch.marks import Ellipses, Mark, Markers, Panel, around
 from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import FAINT, round_length
 
@@ -129,6 +129,6 @@ def _ellipses(places: Floats, ellipses: Sequence[Ellipse], scales: Mapping[int, 
     marks: list[Mark] = [Markers(places, "+", 4.0, FAINT)]
     for percent, scale in scales.items():
         colour, width = (MAIN, 1.0) if percent == STANDARD_PERCENT else (FAINT, 0.7)
-        marks.append(Line(ellipse_outlines(places, scale * semi_axes, turns), colour, width))
+        marks.append(Ellipses(places, scale * semi_axes, turns, colour, width))
     none = places[semi_axes[:, 0] == 0.0]
     return [*marks, Markers(none, "*", 5.0, ACCENT)] if len(none) else marks

@@ -11,7 +11,7 @@ import numpy as np
 from photogram.comparator.case import exchanged
 from photogram.comparator.pointing import Ellipse
 from photogram.errors import InputError
-from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names, Panel, around, ellipse_outlines
+from photogram.show.sketch.marks import Arrows, Ellipses, Mark, Markers, Names, Panel, around
 from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import BLUE, FAINT, SOFT, VERMILION, round_length
 from photogram.words import phrase
@@ -117,7 +117,7 @@ def joint_grid(calibration: Calibration, plate: int) -> Plot:
     turns = np.degrees([each.angle_rad for each in ellipses])
     marks = [
         *arrows(places, own.corrections_um, scale, ACCENT),
-        Line(ellipse_outlines(ends, semi_axes, turns), FAINT, 0.9, layer=1.5),
+        Ellipses(ends, semi_axes, turns, FAINT, 0.9, layer=1.5),
         Names(places / MM, [str(point) for point in own.points.tolist()], [SOFT] * len(places), ends),
     ]
     reach = scale * largest

@@ -388,9 +388,8 @@ def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
             largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
             scale, length = REACH * max(float(extent.max()), 1e-9) / largest, round_length(largest)
             semi_axes, angles = shapes.ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
-            semi_axes *= NINETY_FIVE * scale
             marks += [
-                shapes.Line(shapes.ellipse_outlines(plan[both], semi_axes, angles), BLUE, 0.6),
+                shapes.Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
                 shapes.Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
             ]
             sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))

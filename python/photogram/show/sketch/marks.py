@@ -103,6 +103,21 @@ class Polygons(Mark):
 
 
 @dataclass(frozen=True, eq=False)
+class Ellipses(Mark):
+    """Ellipses about (n, 2) points: semi-axes and degrees from horizontal.
+
+    With `fill`, an opacity, ellipses are filled and without outline.
+    """
+
+    places: Floats
+    semi_axes: Floats
+    angles: Floats
+    colour: str
+    width: float
+    fill: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Mesh(Mark):
     """Equal cells between corners, coloured by values; NaN: empty."""
 
@@ -166,14 +181,6 @@ def ellipse_axes(covariances: Floats) -> tuple[Floats, Floats]:
     middle, half = 0.5 * (across + up), np.hypot(0.5 * (across - up), between)
     angles = np.degrees(0.5 * np.arctan2(between, 0.5 * (across - up)))
     return np.sqrt(np.maximum(np.column_stack([middle + half, middle - half]), 0.0)), angles
-
-
-def ellipse_outlines(places: Floats, semi_axes: Floats, angles: Floats) -> Floats:
-    """Return (n, 37, 2) points of ellipses about (n, 2) points, `angles` in degrees from horizontal."""
-    turn, around = np.radians(angles)[:, np.newaxis], np.radians(np.arange(0.0, 361.0, 10.0))
-    major, minor = semi_axes.T[:, :, np.newaxis] * np.stack([np.cos(around), np.sin(around)])[:, np.newaxis]
-    x, y = major * np.cos(turn) - minor * np.sin(turn), major * np.sin(turn) + minor * np.cos(turn)
-    return places[:, np.newaxis] + np.stack([x, y], axis=2)
 
 
 def error_bars(places: Floats, low: Floats, high: Floats) -> Floats:

@@ -152,7 +152,7 @@ def lay_out(whole: Any) -> None:
 
 def draw(mark: marks.Mark, axes: Any) -> None:
     """Draw a mark on axes with final limits; `Names` after the layout."""
-    from matplotlib.collections import PolyCollection
+    from matplotlib.collections import EllipseCollection, PolyCollection
 
     given: dict[str, Any] = {"zorder": mark.layer, "label": mark.label or None}
     match mark:
@@ -179,6 +179,12 @@ def draw(mark: marks.Mark, axes: Any) -> None:
             }
             given["rasterized"] = len(known) > MAX_VECTOR_MARKS / 5
             axes.add_collection(PolyCollection(known, **given), autolim=False)
+        case marks.Ellipses():
+            edge = "none" if mark.fill else mark.colour
+            given |= {"facecolors": (mark.colour, mark.fill), "edgecolors": edge, "linewidths": mark.width}
+            given |= {"units": "xy", "offsets": mark.places, "offset_transform": axes.transData}
+            wide, high = 2 * mark.semi_axes.T
+            axes.add_collection(EllipseCollection(wide, high, mark.angles, **given), autolim=False)
         case marks.Mesh():
             given |= _colours(mark.shades)
             axes.pcolorfast(*mark.corners.T, np.ma.masked_invalid(mark.values), **given)

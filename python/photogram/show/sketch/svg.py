@@ -23,7 +23,7 @@ from photogram.show.style import SETTINGS
 Attributes: TypeAlias = dict[str, str | float]
 LETTERS = ", ".join([*SETTINGS["font.sans-serif"], "sans-serif"])
 COLOURS_OF_MAP = 48
-MAX_EXACT_PLACES = 300  # Longer lines have coordinates in tenths of a point, others in hundredths
+MAX_EXACT_PLACES = 300  # Coordinates of more places are in tenths of a point, of others in hundredths
 MAX_COORDINATE = 1e4  # Points
 DASHES = {"": (), "--": (3.7, 1.6), ":": (1.0, 1.65)}  # Dashes and gaps in line widths
 _POINTS = np.pi / 5 * np.arange(10)
@@ -89,7 +89,7 @@ def _joined(lines: Sequence[Floats] | Floats, placed: Placed = POINTS, end: str 
     places = placed.at(np.concatenate([NOWHERE, *lines]))
     known = ~np.isnan(places).any(axis=1)
     counts = np.bincount(line[known], minlength=len(lines))
-    scale = np.where(counts > MAX_EXACT_PLACES, 10.0, 100.0)[line[known], np.newaxis]
+    scale = 10.0 if known.sum() > MAX_EXACT_PLACES else 100.0
     rounded = np.rint(scale * np.clip(places[known], -MAX_COORDINATE, MAX_COORDINATE))
     steps = (np.diff(rounded, axis=0, prepend=0.0) / scale + 0.0).tolist()  # Without negative zeros
     firsts = np.cumsum(counts) - counts
@@ -123,6 +123,8 @@ def svg(mark: marks.Mark, placed: Placed) -> str:
             edge: Attributes = {"stroke": mark.edge, "stroke_opacity": mark.edge_opacity}
             # Separate outlines, so that overlapping areas are darker.
             return element("g", "".join(map(_path, outlines)), **inside, **edge, stroke_width=mark.width)
+        case marks.Ellipses():
+            return _ellipses(mark, placed)
         case marks.Mesh():
             return _mesh(mark, placed)
         case marks.Texts():
@@ -183,6 +185,24 @@ def _arrows(mark: marks.Arrows, placed: Placed) -> str:
         heads = "".join(_joined(outlines[own], end="z"))
         found += [_path(shafts, stroke=colour, stroke_width=thick), _path(heads, fill=colour)]
     return "".join(found)
+
+
+def _ellipses(mark: marks.Ellipses, placed: Placed) -> str:
+    turn, middle = np.radians(mark.angles)[:, np.newaxis], placed.at(mark.places)
+    along, across = (
+        placed.at(mark.places + semi[:, np.newaxis] * np.hstack([np.cos(angle), np.sin(angle)])) - middle
+        for semi, angle in zip(mark.semi_axes.T, (turn, turn + np.pi / 2), strict=True)
+    )
+    turned = np.degrees(np.arctan2(along[:, 1], along[:, 0]))
+    rows = np.column_stack([middle + along, np.hypot(*along.T), np.hypot(*across.T), turned, -2 * along])
+    data = "".join(
+        f"M{x:.2f} {y:.2f}a{a:.2f} {b:.2f} {angle:.1f} 1 0 {u:.2f} {v:.2f}"
+        f"a{a:.2f} {b:.2f} {angle:.1f} 1 0 {-u:.2f} {-v:.2f}z"
+        for x, y, a, b, angle, u, v in rows.tolist()
+    )
+    if mark.fill:
+        return _path(data, fill=mark.colour, opacity=mark.fill)
+    return _path(data, stroke=mark.colour, stroke_width=mark.width)
 
 
 def _mesh(mark: marks.Mesh, placed: Placed) -> str:
