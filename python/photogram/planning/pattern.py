@@ -204,7 +204,8 @@ class Pattern:
         if on_shared(self.block).any():
             # A strip of a scanner is as long as its trajectory.
             flown = {id(each): each for each in self.block.all_trajectories}
-            stations += [self._cartesian_plan(each.table.positions) for each in flown.values()]
+            axes = geometry.Cartesian(self.block.spheroid)
+            stations += [self._plan(axes.from_cartesian(each.table.positions)) for each in flown.values()]
         return locations(self.point_plan, np.concatenate(stations))
 
     @cached_property
@@ -325,17 +326,13 @@ class Pattern:
         return np.asarray(depths / self.block.camera_scales()[photos])
 
     def _plan(self, positions: Floats) -> Floats:
-        return self._cartesian_plan(geometry.Cartesian(self.block.spheroid).positions(positions))
-
-    def _cartesian_plan(self, xyz: Floats) -> Floats:
-        """Return the plan of positions in X, Y, Z, geocentric if the space is geographic."""
         if not self.block.geographic:
-            return xyz[:, :2]
+            return positions[:, :2]
         axes = geometry.Cartesian(self.block.spheroid)
         # Geocentric coordinates avoid the antimeridian.
         centre = axes.positions(self.result.photo_positions).mean(axis=0)
         frame = geometry.local_frames(axes.from_cartesian(centre[np.newaxis]))[0]
-        return np.asarray((xyz - centre) @ frame[:2].T)
+        return np.asarray((axes.positions(positions) - centre) @ frame[:2].T)
 
 
 def with_known_readout(block: Block) -> Block | None:
