@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from photogram import _photocore
-from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import judged, remarks_section
 from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Remarks, Section, about
-from photogram.show.quantity import Quantity, Table, column, members, of_each, records
+from photogram.show.quantity import Quantity, Table, column, members, of_each
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
@@ -111,24 +110,22 @@ class VarianceComponents(Judged, Documented, Brief):
 
     def document(self) -> Document:
         """Return the document: verdict, first actions, components."""
-        sections = [components_section(self)]
-        return Document("Variance components", "", [judged(self.verdict)], self.verdict.next, [], sections)
-
-    def to_json(self) -> bytes:
-        """Return the components as a JSON document (UTF-8)."""
         estimate, equality = self.estimate, self.estimate.equality
         of_equality = ("likelihood_ratio", "degrees_of_freedom", "probability")
         of_step = ("factors", "squares", "redundancy")
-        return json.to_json(
-            {
-                "program": f"photogram {_photocore.__version__}",
+        return Document(
+            what="Variance components",
+            title="",
+            judgements=[judged(self.verdict)],
+            advice=self.verdict.next,
+            sections=[components_section(self)],
+            members={
                 "verdict": self.verdict.document(),
                 **members(estimate, "converged", "level", helmert_matrix="matrix"),
                 "messages": [str(message) for message in estimate.messages],
-                "components": records(components_table(self).columns),
                 "all_equal": equality and dict(zip(of_equality, equality, strict=True)),
                 "steps": [dict(zip(of_step, step, strict=True)) for step in estimate.steps],
-            }
+            },
         )
 
 

@@ -25,7 +25,7 @@ SOFT = "#5c5c5c"  # Colour of secondary text: contrast 6.7 to 1 on white; FAINT,
 DPI = 120  # Dots per inch of PNG files
 MATPLOTLIB = "matplotlib", "plots in formats other than SVG", "plots"  # Package, its use, and its extra
 
-SETTINGS: dict[str, Any] = {
+SETTINGS: Any = {
     "font.size": 9.0,
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
