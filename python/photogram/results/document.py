@@ -21,7 +21,7 @@ from photogram.results.film_report import film_table, films_section, mark_table,
 from photogram.results.network_tables import control, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
-from photogram.show.page import Document, Fact, Section, about, significant
+from photogram.show.page import Document, Fact, Section, about, fixed, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def _size_section(result: Result) -> Section:
     groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
     groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
     groups["total"] = sums.total
-    good += [Fact(f"Weighted sum of squares, {name}", f"{square:.6f}") for name, square in groups.items()]
+    good += [Fact(f"Weighted sum of squares, {name}", fixed(square, 6)) for name, square in groups.items()]
     tables = {
         "control points": control,
         "unheld components": declared.unheld,
