@@ -12,8 +12,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from example_scripts import EXAMPLES, load
-from photogram import InputError, adjust, collection, simulate
+from photogram import InputError, Spheroid, adjust, collection, simulate
 from photogram.giant import read_project
+from photogram.network.rays import local_axes
 from photogram.plots import Plot
 from photogram.plots.accessor import PLOTS
 from photogram.plots.selection import cells, first_panels
@@ -222,6 +223,15 @@ def test_svg_needs_no_matplotlib_and_other_formats_name_the_extra(galveston, mon
     for draw in (lambda: plot.render("png"), lambda: plot.on(None)):
         with pytest.raises(ModuleNotFoundError, match=r"pip install 'photogram\[plots\]'"):
             draw()
+
+
+def test_a_network_on_both_sides_of_the_antimeridian_has_the_same_plan():
+    here, there = (
+        simulate(spheroid=Spheroid.wgs84(), origin=(longitude, 0.848, 140.0), seed=1).truth
+        for longitude in (0.1, np.pi)
+    )
+    positions = (local_axes(block).positions(block.photo_positions) for block in (here, there))
+    np.testing.assert_allclose(*positions, atol=1e-3)
 
 
 def test_an_adjustment_loads_no_matplotlib():

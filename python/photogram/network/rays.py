@@ -51,7 +51,10 @@ class LocalAxes:
 
 def local_axes(block: Block) -> LocalAxes:
     """Return the metric axes of a block."""
-    middle = np.median(_stations(block), axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
+    stations = _stations(block)
+    if block.spheroid is not None and np.ptp(stations[:, 0]) > np.pi:  # Both sides of the antimeridian
+        stations = np.column_stack([stations[:, 0] % (2 * np.pi), stations[:, 1:]])
+    middle = np.median(stations, axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
     frame = np.eye(3) if block.spheroid is None else local_frames(middle)[0]
     return LocalAxes(block, Cartesian(block.spheroid).positions(middle)[0], frame)
 
