@@ -22,6 +22,7 @@ from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.hull import hull
 from photogram.network.motion import on_shared, timed_images
+from photogram.network.rays import local_axes
 from photogram.network.trajectories import Readout
 from photogram.results.hypotheses import Hypotheses
 from photogram.results.network_trial import block_facts
@@ -326,13 +327,8 @@ class Pattern:
         return np.asarray(depths / self.block.camera_scales()[photos])
 
     def _plan(self, positions: Floats) -> Floats:
-        if not self.block.geographic:
-            return positions[:, :2]
-        axes = geometry.Cartesian(self.block.spheroid)
-        # Geocentric coordinates avoid the antimeridian.
-        centre = axes.positions(self.result.photo_positions).mean(axis=0)
-        frame = geometry.local_frames(axes.from_cartesian(centre[np.newaxis]))[0]
-        return np.asarray((axes.positions(positions) - centre) @ frame[:2].T)
+        local = local_axes(self.block).positions if self.block.geographic else np.asarray
+        return local(positions)[:, :2]
 
 
 def with_known_readout(block: Block) -> Block | None:
