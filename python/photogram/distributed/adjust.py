@@ -48,7 +48,6 @@ from photogram.network.datum import (
     DatumRow,
 )
 from photogram.network.films import Scan
-from photogram.results.block_files import STANDS
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -204,7 +203,7 @@ def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None)
         values = getattr(block, name)
         if isinstance(values, np.ndarray):
             digest.update(np.ascontiguousarray(values).tobytes())
-    settings = Encoder(STANDS).fields(block, ["title", *IN_TABLES])
+    settings = Encoder().fields(block, ["title", *IN_TABLES])
     digest.update(orjson.dumps(settings))
     return digest.hexdigest()
 

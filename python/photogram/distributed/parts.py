@@ -20,7 +20,7 @@ from photogram.network.block import Block
 from photogram.network.films import Scan
 from photogram.network.subset import IMAGES, PHOTOS
 from photogram.network.unknowns import Unknown
-from photogram.results.block_files import STANDS, saved_classes
+from photogram.results.block_files import saved_classes
 from photogram.words import phrase
 
 TABLES: dict[str, tuple[str, ...]] = {
@@ -215,7 +215,7 @@ def write_part(folder: Path, part: Part) -> str:
             if values is not None:
                 columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
         write_file(folder / f"{table}.parquet", seals.through(table, parquet_content(columns, {})))
-    encoder = Encoder(STANDS)
+    encoder = Encoder()
     document = {
         "node": part.node,
         "tables": seals.known,

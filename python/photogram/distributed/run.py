@@ -36,7 +36,6 @@ from photogram.network.observations import Observation
 from photogram.network.observations.photos import with_epochs
 from photogram.network.trajectories import Spline, Trajectory
 from photogram.network.unknowns import Unknown
-from photogram.results.block_files import KeptTrajectory
 from photogram.results.parts import Iteration
 from photogram.words import phrase
 
@@ -280,7 +279,8 @@ def _unsmoothed(trajectory: Trajectory) -> Trajectory:
         for name in ("position", "rotation")
         if isinstance(basis := getattr(trajectory, name), Spline) and basis.smoothed
     }
-    return replace(KeptTrajectory.of(trajectory), **changes).original() if changes else trajectory
+    changed = replace(trajectory, **changes)
+    return changed._with_coefficients(trajectory.coefficients) if changes else trajectory
 
 
 @dataclass

@@ -8,10 +8,9 @@ and tables of names are marked: `{"array": ...}`, `{"tuple": ...}`, `{"map": ...
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,25 +18,17 @@ import numpy as np
 
 from photogram.arguments.fields import check_members
 from photogram.errors import InputError, message_of
+from photogram.lazy_dataclasses import fields
 from photogram.words import phrase
 
 SMALL = 36  # Largest size of an array that is written as readable numbers
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
-class Stand(ABC):
-    """A substitute, in a document, for an object with computed fields."""
-
-    @abstractmethod
-    def original(self) -> object:
-        """Return the represented object."""
-
-
 class Encoder:
     """Converter to plain values of one document."""
 
-    def __init__(self, stands: Mapping[type, Callable[[Any], Stand]] | None = None) -> None:
-        self._stands = stands or {}
+    def __init__(self) -> None:
         self._written: dict[int, int] = {}
         self._kept: list[object] = []
 
@@ -65,19 +56,21 @@ class Encoder:
         raise TypeError(f"a document cannot contain {type(given).__name__}")
 
     def fields(self, given: Any, omitted: Iterable[str] = ()) -> dict[str, Any]:
-        """Return the init fields of a dataclass object by name, except omitted ones."""
+        """Return the stored fields of a dataclass object by name, except omitted ones.
+
+        The metadata `stored` of a computed field is the method that returns the object with its value.
+        """
         left = set(omitted)
         return {
             each.name: self.value(getattr(given, each.name))
             for each in fields(given)
-            if each.init and each.name not in left
+            if (each.init or "stored" in each.metadata) and each.name not in left
         }
 
     def _object(self, given: Any) -> dict[str, Any]:
         if id(given) in self._written:
             return {"same": self._written[id(given)]}
-        shown = self._stands[type(given)](given) if type(given) in self._stands else given
-        own = {"is": type(shown).__name__, **self.fields(shown)}
+        own = {"is": type(given).__name__, **self.fields(given)}
         self._written[id(given)] = len(self._kept)
         self._kept.append(given)  # No other object has its id during its lifetime
         return own
@@ -142,10 +135,16 @@ class Decoder:
         if name not in self._classes:
             raise self._error("document.class", name=str(name))
         own = self.fields({member: each for member, each in given.items() if member != "is"})
+        kind = self._classes[name]
         try:
-            check_members(self._classes[name], own)
-            made = self._classes[name](**own)
-            made = made.original() if isinstance(made, Stand) else made
+            check_members(kind, own)
+            stored = {
+                each.metadata["stored"]: each.name for each in fields(kind) if "stored" in each.metadata
+            }
+            computed = {method: own.pop(name) for method, name in stored.items()}
+            made = kind(**own)
+            for method, value in computed.items():
+                made = getattr(made, method)(value)
         except InputError as error:
             raise InputError(message_of(error), file=self._path) from None
         self._made.append(made)

@@ -21,8 +21,10 @@ from photogram.arguments.arrays import argument_error, number, numbers, object_n
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.unknowns import ROTATION, Numbers, Unknown, are_rotations
+from photogram.words import phrase
 
 __all__ = [
     "Clock",
@@ -407,7 +409,9 @@ class Trajectory:
     body: tuple[ArrayLike, ArrayLike] | None = None
     position_axes: PositionAxes = "table"
     angles: Angles = "vector"
-    coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]] = field(init=False, repr=False)
+    coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]] = field(
+        init=False, repr=False, metadata={"stored": "_with_coefficients"}
+    )
 
     def __post_init__(self) -> None:
         vars(self)["name"] = object_name("name of a trajectory", self.name)
@@ -434,6 +438,17 @@ class Trajectory:
         value = _of_each(f"value of the {what} of {self.name}", basis.value, basis.count)
         sd = _of_each(f"sd of the {what} of {self.name}", basis.sd, basis.count)
         return tuple(kind(f"{self.name} {what} {k}", value=value[k], sd=sd[k]) for k in range(basis.count))
+
+    def _with_coefficients(self, coefficients: tuple[tuple[Coefficient, ...], ...]) -> Trajectory:
+        """Return the trajectory with coefficients that others share; they must match its bases."""
+        own, shared = (
+            [[each.title for each in part] for part in both] for both in (self.coefficients, coefficients)
+        )
+        if own != shared:
+            raise InputError(phrase("adjusted.coefficients", name=self.name))
+        made = replace(self)
+        vars(made)["coefficients"] = coefficients
+        return made
 
     @property
     def origin(self) -> float:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated
-from photogram.io.structure import Stand
 from photogram.io.writing import Content
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, Undetermined
 from photogram.network import (
     cameras,
@@ -44,7 +39,7 @@ from photogram.results.result_files import (
 )
 from photogram.results.tables import TABLES
 from photogram.statistics.findings import Removed
-from photogram.words import Phrase, phrase
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -110,7 +105,7 @@ def block_files(result: Result) -> dict[str, Content]:
         units = ("1", "1") if scanned.all() else (f"{block.image_unit}; 1 of scanners",) * 2
         description = "measured {}; of scanners sample (x) and line (y)"
         images[0] = replace(images[0], units=units, description=description)
-    return written(result, KIND, "block", declared, leading, tables, block.frame, summary, STANDS)
+    return written(result, KIND, "block", declared, leading, tables, block.frame, summary)
 
 
 def parts_of_block(
@@ -156,46 +151,11 @@ def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
     return Column(kind, Repeated(names, rows), "", f"name of the {kind}")
 
 
-@dataclass(frozen=True, eq=False)
-class KeptTrajectory(Stand):
-    """A stored trajectory: its definition and its coefficients, which others share."""
-
-    name: str
-    table: motion.Table
-    position: motion.Basis | None
-    rotation: motion.Basis | None
-    body: tuple[Floats, Floats] | None
-    position_axes: motion.PositionAxes
-    angles: motion.Angles
-    coefficients: tuple[tuple[motion.Coefficient, ...], tuple[motion.Coefficient, ...]]
-
-    @classmethod
-    def of(cls, given: Any) -> KeptTrajectory:
-        own = (given.name, given.table, given.position, given.rotation, given.body)
-        return cls(*own, given.position_axes, given.angles, given.coefficients)
-
-    def original(self) -> motion.Trajectory:
-        """Return the trajectory; the stored coefficients must match its table and bases."""
-        own_parts = (self.table, self.position, self.rotation, self.body)
-        made = motion.Trajectory(self.name, *own_parts, self.position_axes, self.angles)
-        own, kept = (
-            [[each.title for each in part] for part in both]
-            for both in (made.coefficients, self.coefficients)
-        )
-        if own != kept:
-            raise InputError(phrase("adjusted.coefficients", name=self.name))
-        object.__setattr__(made, "coefficients", self.coefficients)
-        return made
-
-
-STANDS: dict[type, Callable[[Any], Stand]] = {motion.Trajectory: KeptTrajectory.of}
-
-
 MODULES = (
     *(cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
     *(refraction, rigs, datum, features, parts),
 )
-CLASSES = (KeptTrajectory, Message, Phrase, Removed, Undetermined)
+CLASSES = (Message, Phrase, Removed, Undetermined)
 
 
 def saved_classes() -> list[type]:

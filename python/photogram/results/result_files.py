@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -21,7 +21,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.parquet import Column, Repeated, Sheet, packed, parquet_content, read_sheet, unpacked
 from photogram.io.seals import SEAL, Seals, check_seal, check_sealed, seal
-from photogram.io.structure import Decoder, Encoder, Stand
+from photogram.io.structure import Decoder, Encoder
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.frame import Frame
@@ -217,13 +217,12 @@ def written(
     tables: Mapping[str, Sequence[Column]],
     frame: Frame,
     summary: Mapping[str, Any],
-    stands: Mapping[type, Callable[[Any], Stand]] | None = None,
 ) -> dict[str, Content]:
     """Return the files of a result.
 
     `kind` identifies the reader, `given` is the field of the adjusted network. `parts` belong to the tables
-    of photos, points and images, after the `leading` names. `tables` are additional ones for users, `summary`
-    is the first data for a reader, and `stands` are substitutes for objects of some classes.
+    of photos, points and images, after the `leading` names. `tables` are additional ones for users, and
+    `summary` is the first data for a reader.
     """
     unknowns, *state = result.state.__getnewargs__()
     place = {"kind": frame.kind, "crs": frame.crs, "origin": frame.origin}
@@ -241,7 +240,7 @@ def written(
     core = Column("unknown", np.array(unknowns), "", "adjusted unknowns in the order of the core")
     sheets |= {**tables, _STATE: [core]}
     names = {part.field for own in parts.values() for part in own if part.form != "derived"}
-    encoder = Encoder(stands)
+    encoder = Encoder()
     inner = [name.removeprefix(f"{given}.") for name in names if name.startswith(f"{given}.")]
     kept = {
         given: encoder.fields(getattr(result, given), [*inner, *_ROWS]),
