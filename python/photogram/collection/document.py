@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.collection.parameters import POSE
 from photogram.results.network_document import drawings, network_document, network_members, size_section
 from photogram.results.network_sections import control_section, stations_section
 from photogram.results.network_tables import image_axes
-from photogram.results.parts import Determined, Terms
+from photogram.results.parts import Terms
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity
 
@@ -110,28 +109,4 @@ def collection_terms(result: AdjustedCollection) -> Terms:
                 decimals=0,
             ),
         ),
-    )
-
-
-@np.errstate(invalid="ignore")
-def determined(result: AdjustedCollection) -> Determined:
-    """Convert w and t of P = R(w) X + t to the station and a rotation about the photo axes.
-
-    With w and t, a photo far from the origin would seem badly determined.
-    """
-    pose = len(POSE)
-    translations, cofactors = result.photo_parameters[:, 3:pose], result.photo_cofactors[:, :pose, :pose]
-    vectors = np.ascontiguousarray(result.photo_parameters[:, :3])
-    matrices, turns = _photocore.attitudes_from_numbers("rotation_vector_to_photo", vectors, np.eye(3))
-    # The station is -A t; A changes to A (I + [rho]).
-    partials = np.zeros((len(vectors), pose, pose))
-    partials[:, :3, :3] = matrices @ np.cross(translations[:, np.newaxis, :], turns, axisb=1, axisc=1)
-    partials[:, :3, 3:] = -matrices
-    partials[:, 3:, :3] = turns
-    return Determined(
-        stations=-np.einsum("pij,pj->pi", matrices, translations),
-        points=result.point_positions,
-        poses=partials @ cofactors @ partials.transpose(0, 2, 1),
-        ranks=(np.diagonal(cofactors, axis1=1, axis2=2) > 0).sum(axis=1),
-        point_cofactors=result.point_cofactors,
     )

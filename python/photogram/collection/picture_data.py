@@ -52,6 +52,22 @@ class PicturedCollection(PicturedNetwork):
             differences=-result.point_residuals,
         )
 
+    @property
+    def poses(self) -> Floats:
+        """Cofactors of stations and rotations about the photo axes, from w and t of P = R(w) X + t.
+
+        With w and t, a photo far from the origin would seem badly determined.
+        """
+        parameters, cofactors = self.result.photo_parameters, super().poses
+        vectors = np.ascontiguousarray(parameters[:, :3])
+        matrices, turns = _photocore.attitudes_from_numbers("rotation_vector_to_photo", vectors, np.eye(3))
+        # The station is -A t; A changes to A (I + [rho]).
+        partials = np.zeros(cofactors.shape)
+        partials[:, :3, :3] = matrices @ np.cross(parameters[:, np.newaxis, 3:6], turns, axisb=1, axisc=1)
+        partials[:, :3, 3:] = -matrices
+        partials[:, 3:, :3] = turns
+        return np.asarray(partials @ cofactors @ partials.transpose(0, 2, 1))
+
     def covariances(self, points: Indices) -> Floats:
         """Return (k, 3, 3) covariances of points along the axes of the plan."""
         return np.asarray(self.result.point_covariances[points])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
     from photogram.results.network_trial import NetworkTrial
-    from photogram.results.parts import Determined, Terms
+    from photogram.results.parts import Terms
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -154,11 +154,6 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.document import collection_terms
 
         return collection_terms(self)
-
-    def _determined(self) -> Determined:
-        from photogram.collection.document import determined
-
-        return determined(self)
 
     def _plot_data(self) -> Pictured:
         from photogram.collection.picture_data import PicturedCollection

@@ -133,6 +133,12 @@ class Pictured(Protocol):
         self, points: Indices
     ) -> Floats: ...  # (k, 3, 3) along the axes of the plan; NaN if missing
 
+    def lengths(self, points: Indices) -> Floats: ...  # (k, 3) lengths of the units of their coordinates
+    @property
+    def poses(self) -> Floats: ...  # (P, 6, 6) cofactors of positions and rotations
+    @property
+    def scanned(self) -> Bools: ...  # (P,) photos of scanners, with a station for each line
+
     # (P, v, 3) closed outlines of photos on level ground, in the axes of the plan. NaN for photos without
     # ground; (0, v, 3) if no axis of the plan is vertical.
     @property

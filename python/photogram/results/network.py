@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from photogram.plots.picture_data import Pictured
     from photogram.results.hypotheses import Hypotheses
     from photogram.results.network_trial import Facts, NetworkTrial
-    from photogram.results.parts import Determined, Terms
+    from photogram.results.parts import Terms
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.statistics.findings import Removed
@@ -232,9 +232,6 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     @property
     @abstractmethod
     def _terms(self) -> Terms: ...
-
-    @abstractmethod
-    def _determined(self) -> Determined: ...
 
     @abstractmethod
     def _plot_data(self) -> Pictured: ...

@@ -27,20 +27,20 @@ NEAR = 1e-3  # Distance of points listed first from a station, relative to the m
 @np.errstate(all="ignore")
 def weakest_points(result: AdjustedNetwork) -> Table:
     """Return points with the largest sd ratios (1 with a fixed component), and those near a station."""
-    network = result._determined()
-    cofactors = network.point_cofactors
+    network = result._plot_data()
+    stations, points = network.plan.photos, network.plan.points
+    lengths = network.lengths(np.arange(len(points)))
+    cofactors = result.point_cofactors * lengths[:, :, np.newaxis] * lengths[:, np.newaxis]
     known = np.isfinite(cofactors).all(axis=(1, 2)) & result.used_points
     ratio = np.full(len(known), np.nan)
     free = known & np.isinf(result.point_given_sd).all(axis=1)
     ratio[known] = 1.0
     ratio[free] = np.sqrt(_condition(cofactors[free], 3))
     # Distances of points from the nearest station, over their median.
-    used = result.used_images
-    if network.moving is not None:
-        used = used & ~network.moving[result.given.image_photos]
+    used = result.used_images & ~network.scanned[result.given.image_photos]
     own = result.image_points[used]
-    of_images = network.points[own] - network.stations[result.given.image_photos[used]]
-    nearest = np.full(len(network.points), np.inf)
+    of_images = points[own] - stations[result.given.image_photos[used]]
+    nearest = np.full(len(points), np.inf)
     np.minimum.at(nearest, own, np.linalg.norm(of_images, axis=1))
     seen = np.isfinite(nearest)
     distance = np.where(seen, nearest / np.median(nearest[seen]) if seen.any() else np.nan, np.nan)
@@ -61,13 +61,14 @@ def weakest_points(result: AdjustedNetwork) -> Table:
 @np.errstate(all="ignore")
 def weakest_photos(result: AdjustedNetwork) -> Table:
     """Return photos with the largest condition numbers of their free unknowns, the worst first."""
-    network, count = result._determined(), len(result.given.photo_ids)
+    all_poses, count = result._plot_data().poses, len(result.given.photo_ids)
     images = np.bincount(result.given.image_photos[result.used_images], minlength=count)
-    known = (images > 0) & np.isfinite(network.poses).all(axis=(1, 2)) & (network.ranks > 0)
-    poses = network.poses[known]
+    ranks = (np.diagonal(result.photo_cofactors, axis1=1, axis2=2)[:, :6] > 0).sum(axis=1)
+    known = (images > 0) & np.isfinite(all_poses).all(axis=(1, 2)) & (ranks > 0)
+    poses = all_poses[known]
     variances = np.diagonal(poses, axis1=1, axis2=2)
     sd = np.sqrt(np.where(variances > 0, variances, 1.0))
-    condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), network.ranks[known])
+    condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), ranks[known])
     order = np.argsort(-condition, kind="stable")[:WORST]
     rows = np.flatnonzero(known)[order]
     columns = [

@@ -11,10 +11,9 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
-from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
-from photogram.network.motion import scanners
+from photogram.network.geometry import lengths_of_units
 from photogram.results.network import AdjustedNetwork
-from photogram.results.parts import Determined, Iteration, Terms
+from photogram.results.parts import Iteration, Terms
 from photogram.show.quantity import Axis, Link, Quantity, column
 
 if TYPE_CHECKING:
@@ -65,21 +64,6 @@ def block_terms(result: Result) -> Terms:
         linear_unit=block.linear_unit,
         split=True,
     )
-
-
-def determined(result: Result) -> Determined:
-    """Return positions and poses of a block with cofactors, geocentric if geographic."""
-    block, points, stations = result.block, result.point_positions, result.photo_positions
-    cofactors = result.point_cofactors
-    if block.spheroid is not None:
-        units = lengths_of_units(points, block.spheroid)
-        cofactors = cofactors * units[:, :, np.newaxis] * units[:, np.newaxis, :]
-        points, stations = (
-            geographic_to_geocentric(np.array(each), block.spheroid) for each in (points, stations)
-        )
-    poses = result.photo_cofactors[:, :6, :6]
-    ranks = (np.diagonal(poses, axis1=1, axis2=2) > 0).sum(axis=1)
-    return Determined(stations, points, poses, ranks, cofactors, scanners(block))
 
 
 _FREE = {np.inf: "free", 0.0: "fixed"}

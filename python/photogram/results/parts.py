@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.arrays import freeze_fields, standard_deviations
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
@@ -190,19 +190,6 @@ class Terms:
     def identity(self) -> str:
         """The member of JSON documents for the name or number of an item."""
         return "number" if self.points.dtype.kind == "i" else "id"
-
-
-@dataclass(frozen=True, eq=False)
-class Determined:
-    """Positions of the points and photos of an adjusted network, with cofactors."""
-
-    stations: Floats  # (P, 3), (n, 3) positions in axes of equal units
-    points: Floats
-    poses: Floats  # (P, 6, 6) cofactors of position and attitude
-    ranks: Indices  # (P,) numbers of pose unknowns that are not fixed
-    point_cofactors: Floats  # (n, 3, 3) with axes of equal units
-    # (P,) photos of scanners, which have a separate station for each line; None without any
-    moving: Bools | None = None
 
 
 # Types with components of `position` for values, and types whose values are the first of `position`.

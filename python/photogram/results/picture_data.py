@@ -67,6 +67,11 @@ class PicturedNetwork(plots.Pictured):
         """(P,) photos that are scanner strips: image coordinates are samples and lines."""
         return np.zeros(len(self.result.given.photo_ids), dtype=bool)
 
+    @property
+    def poses(self) -> Floats:
+        """(P, 6, 6) cofactors of positions and rotations of photos."""
+        return self.result.photo_cofactors[:, :6, :6]
+
     @cached_property
     def _tests(self) -> Tests:
         return Tests(self.result)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
     from photogram.results.network_trial import NetworkTrial
-    from photogram.results.parts import Determined, Terms
+    from photogram.results.parts import Terms
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -210,11 +210,6 @@ class Result(OnFilm, AdjustedNetwork):
         from photogram.results.network_tables import block_terms
 
         return block_terms(self)
-
-    def _determined(self) -> Determined:
-        from photogram.results.network_tables import determined
-
-        return determined(self)
 
     def _plot_data(self) -> Pictured:
         from photogram.results.picture_data import PicturedBlock
