@@ -280,9 +280,9 @@ def test_section_10_residuals_of_a_point_on_many_frames():
 @pytest.mark.giant("10", "triangulated points residuals")
 @pytest.mark.giant("7", "degrees of freedom not positive: reported, undefined, scale 1")
 def test_section_10_without_degrees_of_freedom_the_estimates_are_undefined():
-    from photogram.results.parts import SumsOfSquares
+    from photogram.results.parts import SumsByKind
 
-    lines = statistics(SumsOfSquares(0.0, 0.0, 0.0), 0, None)
+    lines = statistics(SumsByKind(0.0, 0.0, 0.0), 0, None)
     assert [line.split()[-1] for line in lines[-2:]] == ["UNDEFINED", "UNDEFINED"]
 
 

@@ -27,7 +27,7 @@ from photogram.giant.printout.results import (
     propagated_point_pages,
     station_pages,
 )
-from photogram.results.parts import SumsOfSquares
+from photogram.results.parts import SumsByKind
 
 DATA = Path(__file__).parents[1] / "data" / "giant"
 SCAN = DATA / "scanned_pages.txt"
@@ -190,7 +190,7 @@ def test_section_10_residuals():
     listed = [row for row in rows("plate_residuals.csv") if row["point"] == "SH954201"]
     micrometres = np.array([[float(row["vx_um"]), float(row["vy_um"])] for row in listed])
     point = PointResiduals("SH954201", [row["frame"] for row in listed], micrometres / 1000)
-    closing = statistics(SumsOfSquares(0.0, 0.8, 273.6), 298, SUMMARY["unit_variance"]["value"])
+    closing = statistics(SumsByKind(0.0, 0.8, 273.6), 298, SUMMARY["unit_variance"]["value"])
     pages = residual_pages([point], 0.010, closing)
     assert contains(
         pages, "SH954201 SH9953 SH9954", "14 -14", "-3 3", "WEIGHTED SUM OF SQUARES (CAMERA) = 0.000"

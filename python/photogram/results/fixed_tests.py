@@ -264,27 +264,19 @@ class Scores:
 
     def fall(self, first: int = 0) -> float:
         """Return T = c' C^-1 c of scores from `first` on, without absorbed parts."""
+        return self.fall_and_absorbed(first)[0]
+
+    def fall_and_absorbed(self, first: int = 0) -> tuple[float, bool]:
+        """Return this T, and whether unknowns absorb a part, or no image depends on one."""
         own = np.flatnonzero(self.sizes[first:] > 0) + first
-        values, vectors = np.linalg.eigh(
-            self.matrix[np.ix_(own, own)] / np.outer(self.sizes[own], self.sizes[own])
-        )
-        along = vectors.T @ (self.vector[own] / self.sizes[own])
+        sizes = self.sizes[own]
+        values, vectors = np.linalg.eigh(self.matrix[np.ix_(own, own)] / np.outer(sizes, sizes))
         kept = values > TAKEN_UP
-        return float((along[kept] ** 2 / values[kept]).sum())
+        along = vectors[:, kept].T @ (self.vector[own] / sizes)
+        return float((along**2 / values[kept]).sum()), int(kept.sum()) < len(self.sizes) - first
 
 
 def score(factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> float | None:
     """Return T = c' C^-1 c; None if absorbed; see :meth:`Scores.of`."""
-    found = Scores.of(factor, partials, residuals)
-    if not (found.sizes > 0).all():  # No image depends on an unknown
-        return None
-    scaled = found.matrix / np.outer(found.sizes, found.sizes)
-    taken_up = not (np.linalg.eigvalsh(scaled) > TAKEN_UP).all()
-    return None if taken_up else quadratic(found.matrix, found.vector)
-
-
-def quadratic(matrix: Floats, vector: Floats) -> float:
-    """Return x' M^-1 x after scaling M to unit diagonal."""
-    scale = np.sqrt(np.diag(matrix))
-    scaled = vector / scale
-    return float(scaled @ np.linalg.solve(matrix / np.outer(scale, scale), scaled))
+    statistic, is_absorbed = Scores.of(factor, partials, residuals).fall_and_absorbed()
+    return None if is_absorbed else statistic

@@ -30,13 +30,14 @@ from photogram.messages import by_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
-from photogram.results.fixed_tests import quadratic, score
+from photogram.results.fixed_tests import score
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each
+from photogram.statistics.agreement import quadratic
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -191,7 +192,7 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
 def joint_test(result: Result, camera: AdjustedCamera, names: Sequence[str]) -> TermsTest:
     """Return the joint test of estimated terms (Wald), without their effect."""
     rows = [camera.names.index(name) for name in names]
-    statistic = quadratic(camera.cofactors[np.ix_(rows, rows)], camera.values[rows])
+    statistic, _ = quadratic(camera.values[rows], camera.cofactors[np.ix_(rows, rows)])
     freedom = result.freedom_of_scale
     scale = result.covariance_scale if math.isfinite(freedom) else 1.0
     return TermsTest(camera.name, tuple(names), statistic, freedom, scale)

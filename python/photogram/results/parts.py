@@ -48,6 +48,8 @@ class Iteration:
 
 @dataclass(frozen=True)
 class SumsByKind:
+    """Weighted sums of squares, or sums of redundancy numbers."""
+
     # Weighted positions and attitudes of the photos, and weighted parameters of cameras
     camera: float
     ground: float  # Weighted and fixed components of control
@@ -62,14 +64,6 @@ class SumsByKind:
     @property
     def total(self) -> float:
         return self.camera + self.ground + self.plates + self.observations
-
-
-class SumsOfSquares(SumsByKind):
-    """Weighted sums of squares."""
-
-
-class Redundancies(SumsByKind):
-    """Sums of redundancy numbers."""
 
 
 @dataclass(frozen=True, eq=False)

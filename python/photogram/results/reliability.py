@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from photogram.results.parts import Terms
 
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
-SEARCHED = 100  # Number of examined observations: those of the largest norm
 
 
 @dataclass(frozen=True)
@@ -62,17 +62,6 @@ class Inseparable:
 
     def __str__(self) -> str:
         return f"either {self.first} or {self.second} (correlation {self.correlation:.3f})"
-
-
-@dataclass(frozen=True)
-class Moved:
-    """The unknown with the largest effect of an undetected error."""
-
-    observation: str  # the observation with the minimal detectable error
-    component: str
-    unknown: tuple[str, int, int]  # Kind, number and component of the unknown
-    effect: float  # The effect in its unit
-    in_sd: float  # The effect in its standard deviations (a priori unit weight)
 
 
 class Reliability:
@@ -126,10 +115,6 @@ class Reliability:
             found[self.tests.rank == rank] = self.lambda0(rank)
         return found
 
-    def block(self, group: int) -> Floats:
-        """Return R of a group: (m, m), of unit weight; zero for unused rows."""
-        return self.trial.own_block(group)
-
     @property
     def detectable(self) -> Floats:
         """(M,) minimal detectable error of each single row; infinite without redundancy."""
@@ -164,21 +149,21 @@ class Reliability:
     @property
     def own_point_effect(self) -> Floats:
         """(M, 3) effect of a detectable error on the own point; NaN without one."""
-        effects = self.trial.core.effects(list(range(len(self.suspects))))[:, :3]
-        return np.asarray(effects * (self.detectable / self.sd)[:, np.newaxis])
+        return self._own_effects(list(range(len(self.suspects))), np.arange(len(self.sd)))
+
+    def _own_effects(self, groups: list[int], rows: Indices) -> Floats:
+        errors = minimal_detectable_error(1.0, _shown(self.redundancy[rows]), self._delta)
+        return np.asarray(self.trial.core.effects(groups)[:, :3] * errors[:, np.newaxis])
 
     def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
         """Return effects of detectable errors of the worst group rows on their points.
 
         In the unit of the object space; only `heights` if plan coordinates are angles. NaN without a point.
         """
-        effects = self.trial.core.effects(groups)[:, :3]
-        found, first = [], 0
-        for group in groups:
-            rows = self.suspects.rows(group)
-            errors = minimal_detectable_error(1.0, _shown(self.redundancy[rows]), self._delta)
-            own = effects[first : first + len(rows)] * errors[:, np.newaxis]
-            first += len(rows)
+        rows, found = [self.suspects.rows(group) for group in groups], list[float]()
+        effects = self._own_effects(groups, np.concatenate([*rows, np.zeros(0, dtype=np.int64)]))
+        for first, last in pairwise(np.cumsum([0, *map(len, rows)]).tolist()):
+            own = effects[first:last]
             moved = np.abs(own[:, 2]) if heights else np.sqrt((own**2).sum(axis=1))
             moved = moved[np.isfinite(moved)]
             found.append(float(moved.max()) if moved.size else math.nan)
@@ -215,37 +200,11 @@ class Reliability:
         _, found = self._covariances().influences(unknowns, function)
         return np.asarray(found * (self.detectable / self.sd))
 
-    def most_moved(self, count: int = SEARCHED) -> list[Moved]:
-        """Return the unknowns with the largest effects of undetected errors.
-
-        The upper bound of the effect on any unknown is `external`. At most `count` rows are examined in
-        descending order of this bound, until no other row can have a larger effect.
-        """
-        tested = (self.redundancy > TESTABLE) & np.isfinite(self.external)
-        norm = np.where(tested, self.external, -math.inf)
-        group_of, best = self.row_groups(), 0.0
-        found: list[Moved] = []
-        for row in np.argsort(-norm, kind="stable")[:count].tolist():
-            if not norm[row] > best:
-                break
-            group = int(group_of[row])
-            own = self.trial.core.most_moved([group])[row - int(self.suspects.row_starts[group])]
-            kind, index, component, effect, in_sd = own
-            size = float(self.detectable[row] / self.sd[row])
-            best = max(best, size * in_sd)
-            name, row_name = str(self.suspects.name(group)), self.suspects.row_name(row)
-            found.append(Moved(name, row_name, (kind, index, component), size * effect, size * in_sd))
-        return sorted(found, key=lambda moved: -moved.in_sd)
-
     def inseparable(self, limit: float = 0.9) -> list[Inseparable]:
         """Return pairs of inseparable observations on one point: images, and its control."""
         points = np.unique(self.suspects.points[self.suspects.points >= 0]).tolist()
-        pairs = (each.tolist() for each in self.pairs_on(points, limit))
+        pairs = (each.tolist() for each in self.trial.core.inseparable(points, limit))
         return [self.named(*pair) for pair in zip(*pairs, strict=True)]
-
-    def pairs_on(self, points: list[int], limit: float) -> tuple[Indices, Indices, Floats]:
-        """Return both groups of inseparable pairs on points, and their correlation: thousands."""
-        return self.trial.core.inseparable(points, limit)
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:
         """Return other groups with correlated tests, the largest correlation first.

@@ -132,7 +132,7 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
     suspects, tests = found.suspects, found.tests
     two, points = _points(suspects, tests)
     checked = tests.least > TESTABLE
-    pairs = found.pairs_on(points, LIMIT)
+    pairs = found.trial.core.inseparable(points, LIMIT)
     first, second, rho = (each[checked[pairs[0]] & checked[pairs[1]]] for each in pairs)
     # Rounding does not define an order: equal values remain in the order of their numbers.
     order = np.lexsort((second, first, -np.round(rho, 9)))[:PAIRS]

@@ -106,8 +106,8 @@ class Result(OnFilm, AdjustedNetwork):
     """
 
     block: Block
-    sums_of_squares: parts.SumsOfSquares
-    redundancies: parts.Redundancies | None
+    sums_of_squares: parts.SumsByKind
+    redundancies: parts.SumsByKind | None
     unit_variance: str
     photo_corrections: Floats
     photo_positions: Floats
@@ -147,10 +147,8 @@ class Result(OnFilm, AdjustedNetwork):
             loss=options.loss,
             options=options,
             datum=datum,
-            sums_of_squares=parts.SumsOfSquares(*solution.sums_of_squares),
-            redundancies=None
-            if solution.redundancies is None
-            else parts.Redundancies(*solution.redundancies),
+            sums_of_squares=parts.SumsByKind(*solution.sums_of_squares),
+            redundancies=solution.redundancies and parts.SumsByKind(*solution.redundancies),
             degrees_of_freedom=freedom,
             unit_variance=options.unit_variance,
             kinds=parts.observed_kinds(block, solution),

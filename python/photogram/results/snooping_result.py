@@ -83,11 +83,6 @@ class Snooped(Brief, Documented):
         """Messages on removed groups and their alternatives."""
         return [entry.sentence for entry in self.removed if entry.in_dispute]
 
-    def share_removed(self, kind: str) -> float:
-        """Return the share of the removed groups of a type, with dependent groups."""
-        own = np.array(self.suspects.kind_names)[self.suspects.kinds] == kind
-        return float(self.suspects.with_any(self.outcome.out.rows)[own].mean()) if own.any() else 0.0
-
     def table(self) -> pd.DataFrame:
         """Return the log as a data frame, a row for each removed component, with its unit."""
         import pandas as pd

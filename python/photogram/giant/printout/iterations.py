@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from photogram.arguments.types import Floats
 from photogram.giant.printout.forms import Page, Space, Values, fixed, headed, paginate
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.parts import Iteration, SumsOfSquares
+from photogram.results.parts import Iteration, SumsByKind
 
 TITLE = "CAMERA STATIONS CORRECTIONS"
 
@@ -100,7 +100,7 @@ def _entries(point: PointResiduals) -> list[list[str]]:
     return entries
 
 
-def statistics(sums: SumsOfSquares, degrees_of_freedom: float, variance: float | None) -> list[str]:
+def statistics(sums: SumsByKind, degrees_of_freedom: float, variance: float | None) -> list[str]:
     """Return weighted sums of squares and estimates of unit weight."""
     parts = {"CAMERA": sums.camera, "GROUND": sums.ground, "PLATES": sums.plates, "TOTAL": sums.total}
     lines = [
