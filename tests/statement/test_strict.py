@@ -80,9 +80,8 @@ def test_lengths_alone_take_the_green_mark_away(result):
     points = replace(found.of_all.points, p=np.ones(30), p_others=np.ones(30))
     agreed = replace(found.of_all, points=points)
     found = replace(found, of_all=agreed, of_vegetated=None, layout=None)
-    enough = replace(found.standards.lengths.test, lines=7, least=5, longest=1.0, off_diagonal=0.0)
-    for test, tone in ((enough, "look"), (replace(enough, together=None), "good")):
-        lengths = replace(found.standards.lengths, test=test)
+    enough = replace(found.standards.lengths, names="1234567" * 5, longest=1.0, off_diagonal=0.0)
+    for lengths, tone in ((enough, "look"), (replace(enough, together=None), "good")):
         changed = replace(found, standards=replace(found.standards, lengths=lengths))
         assert changed.judged.tone == tone
 

@@ -245,35 +245,39 @@ def _survey(
     return np.where(known, own, np.nan)
 
 
-def _control_positions(block: Block) -> dict[str, Floats]:
-    """Return (3,) given coordinates of control by name, also jointly observed."""
-    held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
-    found = {block.point_ids[row]: block.point_positions[row] for row in held.tolist()}
-    observed = block.observations.of_type(Control)
-    return found | {each.point: np.asarray(each.position, dtype=float) for each in observed}
+def given_control(block: Block) -> tuple[Floats, Floats]:
+    """Return (n, 3) given positions and standard deviations, also of jointly observed control."""
+    positions, sd = block.point_positions.copy(), block.point_sd.copy()
+    rows = {name: row for row, name in enumerate(block.point_ids)}
+    for each in block.observations.of_type(Control):
+        row = rows[each.point]
+        positions[row], sd[row] = each.position, np.sqrt(np.diag(each.precision))
+    return positions, sd
 
 
 def control_places(block: Block) -> Floats:
     """Return (k, 3) given positions of control points with both plan coordinates."""
-    found = list(_control_positions(block).values())
-    places = plan_positions(block, np.array(found).reshape(-1, 3))
+    positions, sd = given_control(block)
+    places = plan_positions(block, positions[np.isfinite(sd).any(axis=1)])
     return places[np.isfinite(places[:, :2]).all(axis=1)]
 
 
 def _check_apart(block: Block, rows: Indices) -> None:
     """Refuse check points that are control points with other names."""
     apart = SAME_PLACE / METRES.get(block.linear_unit, 1.0)
-    control = _control_positions(block)
-    if not control or not len(rows):
-        return
-    others = list(control)
-    held = plan_positions(block, np.array([control[name] for name in others]))
+    positions, sd = given_control(block)
+    control = np.flatnonzero(np.isfinite(sd).any(axis=1))
+    held = plan_positions(block, positions[control])
     checks = plan_positions(block, block.point_positions[rows])
     for place, row in zip(checks, rows.tolist(), strict=True):
         near = np.linalg.norm(held - place, axis=1) < apart  # missing coordinates are not near any point
         if near.any():
             raise InputError(
-                phrase("request.same-place", point=block.point_ids[row], control=others[near.argmax()])
+                phrase(
+                    "request.same-place",
+                    point=block.point_ids[row],
+                    control=block.point_ids[control[near.argmax()]],
+                )
             )
 
 
@@ -293,10 +297,7 @@ class Survey:
     positions: Floats
     sd: Floats
     checks: Floats  # (k, 3) positions of the check points of the statement in the system
-    system: System | None  # None without points
-
-
-NOTHING = Survey((), (), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), None)
+    system: System
 
 
 def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
@@ -307,13 +308,8 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
         factors = np.array([np.degrees(1.0) if axis.angle else 1.0 for axis in axes])
         x, y, z = ((axis.name, "deg" if axis.angle else axis.unit) for axis in axes)
         system = System("", (x, y, z), lambda positions: positions * factors)
-    kinds = result.point_kinds.copy()
-    positions, sd = block.point_positions.copy(), block.point_sd.copy()
+    kinds, (positions, sd) = result.point_kinds, given_control(block)
     places = {name: row for row, name in enumerate(block.point_ids)}
-    for each in block.observations.of_type(Control):
-        row = places[each.point]
-        kinds[row], positions[row] = "control", np.asarray(each.position, dtype=float)
-        sd[row] = np.sqrt(np.diag(each.precision))
     sd[[places[name] for name in found.names]] = found.survey_sd
     rows = in_order(block, np.flatnonzero(kinds != "pass"))
     return Survey(

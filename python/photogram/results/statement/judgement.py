@@ -13,7 +13,8 @@ from photogram.network.refraction import Refraction
 from photogram.results.statement.budget import budget_fields
 from photogram.results.statement.comparison import LEVEL, LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Prediction, Surface, root_mean
-from photogram.results.statement.standards import Asprs, Lengths, wording
+from photogram.results.statement.lengths import LengthTest
+from photogram.results.statement.standards import Asprs, wording
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.show.quantity import members
@@ -96,8 +97,7 @@ RULES = (
 
 def judged(found: Statement) -> Judged:
     """Return the verdict of all findings."""
-    texts, asprs, lengths = found.texts, found.standards.asprs, found.standards.lengths
-    test = None if lengths is None else lengths.test
+    texts, asprs, test = found.texts, found.standards.asprs, found.standards.lengths
     whole = None if test is None else test.together
     side = _side(found.of_all)
     holds = {
@@ -189,19 +189,17 @@ def _lengths(of: Statement) -> Iterator[Sentence]:
     texts, found = of.texts, of.standards.lengths
     if found is None:
         return
-    test = found.test
-    own = {"n": len(test.errors), **members(test, "lines", "largest", "rms")}
-    if found.limit is None or test.within is None:
+    own = {"n": len(found.errors), **members(found, "lines", "largest", "rms")}
+    if found.limit is None or found.within is None:
         yield "lengths.found", own
     else:
         constant, slope, most = found.limit
         limit = f"{texts.length(constant)} + {texts.significant(slope, 2)} L"
         if math.isfinite(most):
             limit += f" ≤ {texts.length(most)}"
-        beyond = int((~test.within).sum())
+        beyond = int((~found.within).sum())
         yield f"lengths.{'missed' if beyond else 'met'}", {**own, "limit": limit, "beyond": beyond}
-    if test.together is not None:
-        whole = test.together
+    if (whole := found.together) is not None:
         side = "high" if whole.rejected_high else "low" if whole.rejected_low else "agree"
         yield f"lengths.{side}", _factor(whole.factor, whole.interval)
 
@@ -282,8 +280,7 @@ def _remarks(found: Statement) -> Iterator[Sentence]:
             yield "bias.heights", {"mean": shift.mean, "sd": heights.sd}
 
 
-def _lengths_remarks(texts: Texts, found: Lengths) -> Iterator[Sentence]:
-    test = found.test
+def _lengths_remarks(texts: Texts, test: LengthTest) -> Iterator[Sentence]:
     if not test.enough:
         yield "lengths.few", members(test, "lines", "least")
     if not math.isfinite(test.longest):
@@ -292,7 +289,7 @@ def _lengths_remarks(texts: Texts, found: Lengths) -> Iterator[Sentence]:
         yield "lengths.short", {"share": test.longest}
     if not test.along_diagonal:
         yield "lengths.direction", {"angle": texts.number(math.degrees(test.off_diagonal), 0)}
-    if found.expansion is None:
+    if test.expansion is None:
         yield "lengths.warm", {}
 
 

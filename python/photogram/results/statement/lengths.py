@@ -29,19 +29,40 @@ REFERENCE = 20.0  # Temperature of calibrated lengths, degrees Celsius
 class LengthTest:
     """m measured lengths against calibrated ones."""
 
+    names: Sequence[str]  # (m,) of their lines
+    calibrated: Floats  # (m,)
     errors: Floats  # (m,) measured minus calibrated
     sd: Floats  # (m,) their standard deviations, with those of the calibration
-    normalised: Floats  # (m,) errors / sd; NaN if the standard deviation is zero
-    limits: Floats | None  # (m,) limits of the errors
+    limit: tuple[float, float, float] | None  # A, K and B of the limits of errors; B may be infinite
     # Test of all errors with their joint covariance; None without rank
     together: GlobalTest | None
-    # Number of lines, and of lengths on the line with the fewest
-    lines: int
-    least: int
     # The longest calibrated length over the diagonal of the volume; NaN if unknown
     longest: float
     # Smallest angle between a length and a diagonal of the volume, radians; NaN if unknown
     off_diagonal: float
+    ends: Sequence[tuple[str, str]] = ()  # (m,) names of both points
+    expansion: float | None = None  # Of the reduction to 20 degrees; None without
+
+    @property
+    def normalised(self) -> Floats:
+        """(m,) errors / sd; NaN if the standard deviation is zero."""
+        out = np.full(self.errors.shape, math.nan)
+        return np.divide(self.errors, self.sd, out=out, where=self.sd > 0)
+
+    @property
+    def limits(self) -> Floats | None:
+        """(m,) limits of the errors."""
+        constant, slope, most = self.limit or (0.0, 0.0, 0.0)
+        return None if self.limit is None else np.minimum(constant + slope * self.calibrated, most)
+
+    @property
+    def lines(self) -> int:
+        return len(set(self.names))
+
+    @property
+    def least(self) -> int:
+        """Number of lengths on the line with the fewest."""
+        return min(Counter(self.names).values())
 
     @property
     def largest(self) -> float:
@@ -127,11 +148,7 @@ def length_test(
     volume: its diagonal, and the smallest angle between a length and it; NaN if unknown. `freedom` are
     degrees of freedom of the estimated unit weight of the covariance.
     """
-    errors, (constant, slope, most) = measured - calibrated, limit or (0.0, 0.0, math.inf)
+    errors = measured - calibrated
     found = agreement(errors[:, np.newaxis], covariance, sd[:, np.newaxis, np.newaxis] ** 2, second=freedom)
-    spread = found.sd[:, 0]
-    normalised = np.divide(errors, spread, out=np.full(errors.shape, math.nan), where=spread > 0)
-    limits = None if limit is None else np.minimum(constant + slope * calibrated, most)
-    counts = Counter(lines).values()
-    parts = errors, spread, normalised, limits, found.together, len(counts), min(counts)
+    parts = lines, calibrated, errors, found.sd[:, 0], limit, found.together
     return LengthTest(*parts, float(calibrated.max()) / diagonal, off_diagonal)

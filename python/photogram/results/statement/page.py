@@ -22,7 +22,7 @@ from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.judgement import fixed_values
-from photogram.results.statement.standards import Lengths
+from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.texts import Texts
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
@@ -195,8 +195,6 @@ def _markers(statement: Statement) -> Table:
 
 def _survey(statement: Statement) -> list[Table]:
     texts, columns, own = statement.texts, declared.Columns(statement.texts), statement.survey
-    if own.system is None:
-        return []
     decimals = max(3, declared.decimals_for(own.sd))
     coordinates = [
         columns.number(
@@ -406,10 +404,10 @@ def _in_plan(limits: Floats, texts: Texts) -> shapes.Panel:
     return shapes.Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
 
 
-def drawn_lengths(found: Lengths, texts: Texts) -> Plot:
+def drawn_lengths(test: LengthTest, texts: Texts) -> Plot:
     """Draw errors of calibrated lengths by length, with sd and limits."""
-    test, order = found.test, np.argsort(found.calibrated, kind="stable")
-    places = np.column_stack([found.calibrated, test.errors])
+    order = np.argsort(test.calibrated, kind="stable")
+    places = np.column_stack([test.calibrated, test.errors])
     ends = [test.errors - test.sd, test.errors + test.sd]
     marks: list[shapes.Mark] = [
         shapes.Line(shapes.error_bars(places, *ends), BLUE, 0.7),
@@ -419,9 +417,9 @@ def drawn_lengths(found: Lengths, texts: Texts) -> Plot:
     if test.limits is not None:
         for limit in (test.limits, -test.limits):
             ends.append(limit)
-            line = np.column_stack([found.calibrated, limit])[order]
+            line = np.column_stack([test.calibrated, limit])[order]
             marks.append(shapes.Line(line, VERMILION, 0.9, "--"))
-    limits = np.column_stack([shapes.spread(found.calibrated), shapes.spread(0.0, *ends)])
+    limits = np.column_stack([shapes.spread(test.calibrated), shapes.spread(0.0, *ends)])
     across, up = (f"{texts(f'column.{name}')}, {texts.unit}" for name in ("length", "error"))
     return Plot(WIDTH, 3.0, [shapes.Panel(limits, marks, "", across, up, decimal=texts("number.decimal"))])
 

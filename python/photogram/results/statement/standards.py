@@ -19,13 +19,14 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
 from photogram.results.result import Result
 from photogram.results.statement import comparison, layout, lengths
 from photogram.results.statement.figures import Figures, root_mean
+from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
@@ -48,9 +49,6 @@ class Accuracy:
     rmse: float  # The figure: the root of the sum of both squares
     # Its upper limit, from the interval of the found RMSE, with the survey's; NaN if missing
     upper: float
-    # Estimate for the product only, the root of the difference of both squares; None if differences are
-    # smaller than the survey's standard deviations
-    product: float | None
 
 
 @dataclass(frozen=True)
@@ -78,9 +76,8 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
     `found` and `survey` are RMSE_1 of the differences with effective degrees of freedom, and RMSE_2 of the
     check survey; linear unit.
     """
-    rest, upper = (found - survey) * (found + survey), rmse_interval(found, freedom)[1]
-    product = math.sqrt(rest) if rest >= 0 else None
-    return Accuracy(count, found, survey, math.hypot(found, survey), math.hypot(upper, survey), product)
+    upper = rmse_interval(found, freedom)[1]
+    return Accuracy(count, found, survey, math.hypot(found, survey), math.hypot(upper, survey))
 
 
 def verdict(figure: Accuracy | None, limit: float) -> str:
@@ -218,22 +215,12 @@ class Nssda:
 
 
 @dataclass(frozen=True, eq=False)
-class Lengths:
-    lines: Sequence[str]
-    ends: Sequence[tuple[str, str]]
-    calibrated: Floats
-    limit: tuple[float, float, float] | None  # A, K and B; B may be infinite
-    test: lengths.LengthTest
-    expansion: float | None
-
-
-@dataclass(frozen=True, eq=False)
 class Standards:
     """Results by standards; None if not requested or not applicable."""
 
     asprs: Asprs | None = None
     nssda: Nssda | None = None
-    lengths: Lengths | None = None
+    lengths: LengthTest | None = None
     iso_19157: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -301,16 +288,12 @@ def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[st
 
 
 def _control_rmse(result: Result) -> tuple[float, float]:
-    block, found = result.block, []
-    turns = comparison.turned_to_east(block, block.point_positions)
-    for row in np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & result.used_points).tolist():
-        known = np.isfinite(block.point_sd[row])
-        own = np.abs(turns[row]) @ np.where(known, block.point_sd[row], 0.0)
-        found.append(np.where(known, own, np.nan))
-    found += [np.sqrt(np.diag(each.precision)) for each in block.observations.of_type(Control)]
-    if not found:
-        return math.nan, math.nan
-    squares = np.array(found) ** 2
+    block = result.block
+    known = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
+    turns = np.abs(comparison.turned_to_east(block, block.point_positions))
+    own = np.where(known, np.einsum("nij,nj->ni", turns, np.where(known, block.point_sd, 0.0)), np.nan)
+    observed = [np.sqrt(np.diag(each.precision)) for each in block.observations.of_type(Control)]
+    squares = np.vstack([own, *observed]) ** 2
     return root_mean(squares[:, :2].sum(axis=1)), root_mean(squares[:, 2])
 
 
@@ -327,7 +310,7 @@ def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
     return Nssda(count, ratio, mean if ratio >= LEAST_RATIO else None, equal, ce95, vertical)
 
 
-def tested_lengths(result: Result, asked: Asked) -> Lengths:
+def tested_lengths(result: Result, asked: Asked) -> LengthTest:
     """Return calibrated lengths with their test; refuse unknown points."""
     block = result.block
     names = list(dict.fromkeys(end for each in asked.lengths for end in (each["from"], each["to"])))
@@ -344,25 +327,23 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
         measured = lengths.at_reference(measured, temperatures, asked.expansion)
     extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
     ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
-    lines = [str(each["line"]) for each in asked.lengths]
-    calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
     test = lengths.length_test(
         measured,
-        calibrated,
+        np.array([each["length"] for each in asked.lengths], dtype=float),
         covariance=covariance,
         sd=np.array([each["sd"] for each in asked.lengths], dtype=float),
-        lines=lines,
+        lines=[str(each["line"]) for each in asked.lengths],
         limit=asked.limit,
         diagonal=float(np.linalg.norm(extent)),
         off_diagonal=lengths.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
-    return Lengths(lines, ends, calibrated, asked.limit, test, asked.expansion if turned else None)
+    return replace(test, ends=ends, expansion=asked.expansion if turned else None)
 
 
 def iso_measures(
-    result: Result, asked: Asked, of_all: Figures | None, lengths: Lengths | None
+    result: Result, asked: Asked, of_all: Figures | None, lengths: LengthTest | None
 ) -> list[dict[str, Any]]:
     """Return the figures as measures of ISO 19157."""
     figures: list[tuple[str, str, object, str]] = []  # Keys, elements, values and scopes
@@ -378,7 +359,7 @@ def iso_measures(
         scope = counted(of_all.n, "check point")
         figures += [(key, ABSOLUTE, value, scope) for key, value in values.items()]
     if lengths is not None:
-        figures.append(("rmse", RELATIVE, lengths.test.rms, counted(len(lengths.lines), "length")))
+        figures.append(("rmse", RELATIVE, lengths.rms, counted(len(lengths.errors), "length")))
     return [
         {
             "element": element,

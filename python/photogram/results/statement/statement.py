@@ -93,7 +93,7 @@ class Statement(Brief):
     standards: by_standard.Standards
     layout: Layout | None
     removed: tuple[RemovedObservation, ...]
-    survey: comparison.Survey = comparison.NOTHING
+    survey: comparison.Survey
     inputs: tuple[InputFile, ...] = ()
     command: str = ""
     assumed: Sequence[Phrase | str] = ()

@@ -16,8 +16,8 @@ from photogram.results.group_sums import grouped, observables, sums_of
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Sized, point_tests
+from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import lengths_in
-from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Part, Section, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, column, frame, members, members_of_each
@@ -135,17 +135,17 @@ def removed_observations(statement: Statement) -> Table:
     return Table("removed", texts("table.removed"), quantities, note, shown=rows)
 
 
-def test_lengths(texts: Texts, own: Lengths) -> Table:
-    columns, test, decimals = Columns(texts), own.test, decimals_for(own.test.sd)
+def test_lengths(texts: Texts, test: LengthTest) -> Table:
+    columns, decimals = Columns(texts), decimals_for(test.sd)
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
-    limits = np.full(len(own.lines), math.nan) if test.limits is None else test.limits
-    labels = [f"{line}: {' – '.join(ends)}" for line, ends in zip(own.lines, own.ends, strict=True)]
+    limits = np.full(len(test.names), math.nan) if test.limits is None else test.limits
+    labels = [f"{line}: {' – '.join(ends)}" for line, ends in zip(test.names, test.ends, strict=True)]
     quantities = [
         columns.text("line", labels),
-        Quantity([*own.lines], kind="name", member="line"),
-        Quantity([first for first, _ in own.ends], kind="name", member="from"),
-        Quantity([last for _, last in own.ends], kind="name", member="to"),
-        number("length", own.calibrated, member="calibrated"),
+        Quantity([*test.names], kind="name", member="line"),
+        Quantity([first for first, _ in test.ends], kind="name", member="from"),
+        Quantity([last for _, last in test.ends], kind="name", member="to"),
+        number("length", test.calibrated, member="calibrated"),
         number("error", test.errors, member="error"),
         number("sd", test.sd, member="sd"),
         columns.number("normalised", test.normalised, 2, member="normalised"),
@@ -354,14 +354,14 @@ def budget_member(found: Budget) -> dict[str, Any]:
     }
 
 
-def _lengths(texts: Texts, found: Lengths) -> dict[str, Any]:
-    test, together = found.test, found.test.together
+def _lengths(texts: Texts, test: LengthTest) -> dict[str, Any]:
+    together = test.together
     return {
-        "lengths": test_lengths(texts, found).record(),
+        "lengths": test_lengths(texts, test).record(),
         **members(test, "largest", rmse="rms", met="met", lines="lines"),
         "arrangement": test.enough and test.long_enough and test.along_diagonal,
         "angle_to_diagonal": test.off_diagonal,
-        "at_reference_temperature": found.expansion is not None,
+        "at_reference_temperature": test.expansion is not None,
         "T": together and together.weighted_sum_of_squares,
         "rank": together and together.degrees_of_freedom,
         "p_high": together and together.probability_above,
