@@ -105,6 +105,17 @@ def _largest_radius(xy: Floats, camera: Camera) -> float:
     return camera.scale * float(np.max(ideal[np.isfinite(ideal)], initial=0.0))
 
 
+def compared_places(camera: Camera, xy: Floats) -> Callable[[Camera], Floats]:
+    """Return the function that computes the coordinates that a camera compares, of (n, 2) image positions.
+
+    They are images of the rays of `camera` if forward, and corrected measurements if backward.
+    """
+    if _is_backward(camera):
+        return lambda changed: _photocore.camera_correct(changed.model, changed.values, xy)
+    rays = camera.rays(xy)
+    return lambda changed: changed.project(rays)
+
+
 def partials_of(
     evaluate: Callable[[Camera], Floats], camera: Camera, names: Sequence[str], reach: float
 ) -> Floats:
@@ -254,13 +265,7 @@ def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
     sides = [np.linspace(low, high, GRID) for low, high in zip(xy.min(axis=0), xy.max(axis=0), strict=True)]
     positions = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
     own = camera.camera
-    rays = None if _is_backward(own) else own.rays(positions)
-
-    def images(changed: Camera) -> Floats:
-        if rays is None:
-            return _photocore.camera_correct(changed.model, changed.values, positions)
-        return changed.project(rays)
-
+    images = compared_places(own, positions)
     rows = [camera.names.index(name) for name in names]
     reach = float(np.abs(positions).max())
     partials, covariance = partials_of(images, own, names, reach), camera.covariance[np.ix_(rows, rows)]

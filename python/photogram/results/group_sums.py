@@ -40,6 +40,8 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram import Result
+
 TESTABLE = 0.5  # Smallest redundancy of a tested group
 LEVEL = 0.05
 SMALL = 1000  # Largest number of observations with exact sums
@@ -209,6 +211,30 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
     ones["observations"] *= components
     counts = np.round(grouping.summed(ones)).astype(np.int64)
     return counts, grouping.summed(squares), grouping.summed(redundancy)
+
+
+def sums_by_kind(result: Result) -> dict[str, tuple[int, float, float]]:
+    """Return number, redundancy and sum of squares of each type of observation, with weighted parameters."""
+    grouping = grouped(observables(result), "kind")
+    counts, squares, redundancy = sums_of(result, grouping)
+    columns = counts.tolist(), redundancy.tolist(), squares.tolist()
+    found = dict(zip(grouping.groups.names, zip(*columns, strict=True), strict=True))
+    more = []
+    for unknown in result.unknowns:
+        sd, w = unknown.given.deviations, unknown.standardized  # w = v / (sd sqrt(r))
+        squares = w**2 * unknown.redundancy
+        more.append((unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, squares))
+    for camera in result.cameras:
+        with np.errstate(all="ignore"):
+            squares = ((camera.given.values - camera.values) / camera.given.deviations) ** 2
+        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
+        more.append(("camera", weighted, camera.redundancy, squares))
+    for kind, weighted, redundancy, squares in more:
+        if weighted.any():
+            count, r, q = found.get(kind, (0, 0.0, 0.0))
+            r, q = r + float(redundancy[weighted].sum()), q + float(np.nansum(squares[weighted]))
+            found[kind] = count + int(weighted.sum()), r, q
+    return found
 
 
 def observables(network: object) -> Observables:

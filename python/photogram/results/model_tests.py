@@ -27,9 +27,8 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import by_name
-from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
-from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
+from photogram.results.distortion import INTERIOR, compared_places, partials_of, rows_of_images
 from photogram.results.fixed_tests import score
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
@@ -328,21 +327,12 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
     columns = np.zeros((len(rows), len(result.block.image_xy), 2))
     plain = camera.camera.replace(sd=0.0, covariance=None)
     measured, residuals = focal_images(result.block)[own], result.residuals[own]
-    rays = None if plain.direction == "backward" else plain.rays(measured - residuals)
-
-    def compared(changed: Camera) -> Floats:
-        return -_corrected(changed, measured) if rays is None else changed.project(rays)
-
-    columns[:, own] = partials_of(compared, plain, names, float(np.abs(measured).max(initial=1.0)))
-    if rays is None and "c" in names:
-        columns[names.index("c"), own] += (_corrected(plain, measured) - residuals) / plain.parameters["c"]
+    backward, reach = plain.direction == "backward", float(np.abs(measured).max(initial=1.0))
+    compared = compared_places(plain, measured if backward else measured - residuals)
+    columns[:, own] = (-1.0 if backward else 1.0) * partials_of(compared, plain, names, reach)
+    if backward and "c" in names:
+        columns[names.index("c"), own] += (compared(plain) - residuals) / plain.parameters["c"]
     return np.nan_to_num(columns)
-
-
-def _corrected(camera: Camera, measured: Floats) -> Floats:
-    """Return measured positions corrected by a backward camera: c (u1, u2) / u3."""
-    u = camera.rays(measured)
-    return np.asarray(camera.parameters["c"] * u[:, :2] / u[:, 2:])
 
 
 def _camera(result: Result, name: str | None, terms: Sequence[str]) -> tuple[AdjustedCamera, list[int]]:

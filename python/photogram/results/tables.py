@@ -14,7 +14,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results import network_tables, parts
 from photogram.results.features import Features, deviation_quantities, quantity_columns
-from photogram.results.group_sums import grouped, observables, sums_of
+from photogram.results.group_sums import sums_by_kind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import (
     component_axis,
@@ -317,24 +317,16 @@ _NOTHING = parts.ObservedKind(
 
 def redundancy_by_kind(result: Result) -> list[Quantity]:
     """Return number, redundancy, sum of squares and sd factor of every type, if known."""
-    names, numbers = list[str](), np.zeros((0, 3))
+    rows: dict[str, tuple[float, float, float]] = {}
     if result.redundancies is not None and result.loss is None:
-        grouping = grouped(observables(result), "kind")
-        counts, squares, redundancy = sums_of(result, grouping)
-        names, numbers = list(grouping.groups.names), np.column_stack([counts, redundancy, squares])
-        others = result.redundancies.total - float(redundancy.sum())
-        if abs(others) > TESTABLE:
-            names.append("cameras and common unknowns")
-            numbers = np.vstack([numbers, [np.nan, others, np.nan]])
-        names.append("all")
-        total = [np.nan, result.redundancies.total, result.sums_of_squares.total]
-        numbers = np.vstack([numbers, total])
-    count, redundancy, squares = numbers.T
+        rows |= sums_by_kind(result)
+        rows["all"] = math.nan, result.redundancies.total, result.sums_of_squares.total
+    count, redundancy, squares = np.array([*rows.values()]).reshape(-1, 3).T
     own = redundancy > TESTABLE
     own[-1:] = False
     factor = np.sqrt(np.divide(squares, redundancy, out=np.full(len(own), np.nan), where=own))
     return [
-        Quantity(names, kind="name", head="Kind of observation"),
+        Quantity([*rows], kind="name", head="Kind of observation"),
         Quantity(count, head="Number", decimals=0),
         Quantity(redundancy, head="Redundancy", decimals=2),
         Quantity(squares, head="Weighted sum of squares", decimals=2),

@@ -161,16 +161,13 @@ class Statement(Brief):
         AdjustmentError, OutOfMemoryError, KeyboardInterrupt
             As in :meth:`photogram.Result.covariances`.
         """
-        for each in self.taken_apart:
-            if each.quantity == quantity:
-                return tables.budget_member(each)
-        made = budgets(
+        found = [each for each in self.taken_apart if each.quantity == quantity] or budgets(
             self.result,
             [wanted(self.result, quantity)],
             self.result.covariances(),
             coverage=self.asked.coverage,
         )
-        return tables.budget_member(made[0])
+        return tables.budget_member(found[0])
 
     def __getitem__(self, name: str) -> dict[str, Any]:
         """Return a budget of the page by the name of its quantity."""

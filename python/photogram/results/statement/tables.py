@@ -12,7 +12,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
-from photogram.results.group_sums import grouped, observables, sums_of
+from photogram.results.group_sums import sums_by_kind
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Sized, point_tests
@@ -240,29 +240,7 @@ _HEAD = ("client", "firm", "project", "surveyor", "date")
 
 
 def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
-    """Return number, redundancy and sum of squares of every type and cameras."""
-    grouping = grouped(observables(result), "kind")
-    counts, squares, redundancy = sums_of(result, grouping)
-    found = {
-        kind_of(name): (int(counts[k]), float(redundancy[k]), float(squares[k]))
-        for k, name in enumerate(grouping.groups.names)
-    }
-    more = []
-    for unknown in result.unknowns:
-        sd, w = unknown.given.deviations, unknown.standardized  # w = v / (sd sqrt(r))
-        squares = w**2 * unknown.redundancy
-        more.append((unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, squares))
-    for camera in result.cameras:
-        with np.errstate(all="ignore"):
-            squares = ((camera.given.values - camera.values) / camera.given.deviations) ** 2
-        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
-        more.append(("camera", weighted, camera.redundancy, squares))
-    for kind, weighted, redundancy, squares in more:
-        if weighted.any():
-            count, r, q = found.get(kind, (0, 0.0, 0.0))
-            r, q = r + float(redundancy[weighted].sum()), q + float(np.nansum(squares[weighted]))
-            found[kind] = count + int(weighted.sum()), r, q
-    return found
+    return {kind_of(name): sums for name, sums in sums_by_kind(result).items()}
 
 
 def _adjustment(result: Result) -> dict[str, Any]:
