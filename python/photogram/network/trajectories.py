@@ -78,6 +78,8 @@ class GyroBias(Numbers):
 
 
 class _Scalar(Unknown):
+    _VALUES = slice(3)
+
     def _position(self) -> Floats:
         return np.array([number(f"value of {self.title}", getattr(self, "value")), 0.0, 0.0])  # noqa: B009
 

@@ -92,6 +92,8 @@ class Unknown:
     GIVEN: ClassVar[tuple[str, ...]] = ()
     """Fields of the initial values; all of them may be None if they are unknown."""
     _PLACE: ClassVar[str] = "through"  # Field of the position
+    _VALUES: ClassVar[slice] = slice(0)
+    """Elements of the position that are the values of the first components; the others are changes."""
 
     position: Floats = field(init=False, repr=False)
     attitude: Floats = field(init=False, repr=False)
@@ -169,6 +171,8 @@ class Numbers(Unknown):
     value, sd
         Values and standard deviations of the components, or one for all.
     """
+
+    _VALUES = slice(3)
 
     value: ArrayLike = 0.0
     sd: ArrayLike = np.inf
@@ -284,6 +288,7 @@ class Instrument(Unknown):
     """
 
     KIND = "instrument"
+    _VALUES = slice(3)
 
     scale: float = 1.0
     constant: float = 0.0
@@ -310,6 +315,7 @@ class Level(Unknown):
     """
 
     KIND = "level"
+    _VALUES = slice(2, 3)
     GIVEN = ("height",)
 
     height: float | None = None
@@ -419,6 +425,7 @@ class Sensor(Unknown):
     """
 
     KIND = "sensor"
+    _VALUES = slice(3)
     GIVEN = ("value", "matrix")
     _PLACE = "value"
 

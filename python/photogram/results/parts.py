@@ -186,22 +186,6 @@ class Terms:
         return "number" if self.points.dtype.kind == "i" else "id"
 
 
-# Types with components of `position` for values, and types whose values are the first of `position`.
-_PLACED = {"lever arm", "shift", "drift", "instrument", "level", "sensor", "position coefficient", "clock"}
-_PLACED |= {"rotation coefficient", "gyro bias", "readout", "bend", "knot"}
-_NUMBERS = {"film placement", "film size", "film bend", "roll"}
-_NUMBERS |= {"fiducial", "pattern", "scanner", "scanner curve"}
-_PLACES = {
-    "x": 0,
-    "y": 1,
-    "z": 2,
-    "scale": 0,
-    "constant": 1,
-    "height": 2,
-    "offset": 0,
-    "time": 0,
-    "factor": 0,
-}
 _ARRAYS = ("change", "position", "attitude", "cofactors", "covariance", "with_former", "redundancy")
 
 
@@ -254,12 +238,8 @@ class AdjustedUnknown:
     @property
     def values(self) -> Floats:
         """(k,) its components of `position`, or else `change`."""
-        if self.kind in _NUMBERS:
-            return self.position[: len(self.components)]
-        if self.kind not in _PLACED:
-            return self.change
-        pairs = zip(self.components, self.change, strict=True)
-        return np.array([self.position[_PLACES[name]] if name in _PLACES else own for name, own in pairs])
+        values = self.position[self.given._VALUES][: len(self.change)]
+        return np.append(values, self.change[len(values) :])
 
     @property
     def standardized(self) -> Floats:
