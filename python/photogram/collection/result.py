@@ -17,8 +17,6 @@ from photogram.results.network import AdjustedNetwork
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
-
     from photogram import _photocore
     from photogram.collection import Collection
     from photogram.io.writing import Content
@@ -64,15 +62,6 @@ class AdjustedCollection(AdjustedNetwork):
     datum: list[tuple[int, str]]
 
     KNOWN: ClassVar[bool] = False
-
-    def _table(self, what: str) -> pd.DataFrame:
-        """Return a table as a data frame; pandas is imported here because it is slow."""
-        import pandas as pd
-
-        from photogram.results.tables import NETWORK_TABLES
-        from photogram.show.quantity import frame
-
-        return pd.DataFrame(frame(NETWORK_TABLES[what](self)))
 
     def _findings(self) -> Findings:
         from photogram.collection.findings import collection_findings

@@ -7,8 +7,8 @@ and selected inverse at the adjusted values.
 from __future__ import annotations
 
 import math
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from photogram.results.reliability import Downweighted, Inseparable, Reliability
 from photogram.show.page import Part, Remarks, about
 from photogram.show.quantity import Quantities, Quantity, Table, column, members, records
 from photogram.statistics.reliability import TESTABLE
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 LISTED = 5  # Listed observations of each type
 PAIRS = 10  # Listed inseparable pairs
@@ -55,9 +52,8 @@ class ReliabilitySummary:
         """(G,) groups with a direction of sufficient redundancy."""
         return self.tests.testable(self.suspects.row_starts)
 
-    @cached_property
-    def kinds(self) -> Quantities:
-        """Number, redundancy and checks of groups by type of observation."""
+    def kinds_table(self) -> Table:
+        """Return the declared table of number, redundancy and checks of groups by type of observation."""
         suspects, active, redundancy = self.suspects, self.tests.active, self.tests.redundancy
         sizes = np.diff(suspects.row_starts)
         of_rows, known = np.repeat(suspects.kinds, sizes), ~np.isnan(redundancy)
@@ -70,7 +66,7 @@ class ReliabilitySummary:
             count(suspects.kinds[own])[there] for own in (active, untestable, invisible)
         )
         names = [suspects.kind_names[k] for k in there.tolist()]
-        return [
+        columns = [
             Quantity(names, kind="name", member="kind", head="Kind"),
             Quantity(groups, member="groups", head="Groups", decimals=0),
             Quantity(components, member="components", head="Components", decimals=0),
@@ -79,10 +75,8 @@ class ReliabilitySummary:
             Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
             Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
         ]
-
-    def kinds_table(self) -> Table:
         note = about("reliability-kinds")
-        return Table("reliability-kinds", "Redundancy of groups of observations", self.kinds, note)
+        return Table("reliability-kinds", "Redundancy of groups of observations", columns, note)
 
     def weakest_table(self, unit: str = "") -> Table:
         """Return the declared table of weakest observations in object `unit`."""
@@ -91,10 +85,6 @@ class ReliabilitySummary:
         weight = "known" if self.known else "estimated"
         note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
         return Table("reliability-weakest", "Largest undetected errors", columns, note)
-
-    def table(self) -> pd.DataFrame:
-        """Return the weakest observations as a data frame."""
-        return self.weakest_table().frame()
 
     def parts(self, unit: str) -> list[Part]:
         """Return the parts of a section; `unit` is the unit of the object space."""

@@ -309,12 +309,7 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        import pandas as pd
-
-        from photogram.results.tables import TABLES
-        from photogram.show.quantity import frame
-
-        table = pd.DataFrame(frame(TABLES[what](self)))
+        table = super()._table(what)
         table.attrs["datum"] = str(self.datum)
         return table
 

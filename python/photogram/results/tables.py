@@ -236,13 +236,6 @@ def _component_tests(
     )
 
 
-NETWORK_TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
-    **network_tables.TABLES,
-    "test": lambda result: Tests(result).columns(),
-}
-"""The tables of every network by the type of the items in their rows."""
-
-
 _EITHER = "standard deviation that was given, or is assumed: {}"
 
 
@@ -390,8 +383,9 @@ def _each(every: Sequence[Any], what: str) -> Any:
     return np.repeat(np.array([*map(attrgetter(what), every)], dtype=object), counts)
 
 
-TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
-    **NETWORK_TABLES,
+TABLES: dict[str, Callable[[Any], list[Quantity]]] = {
+    **network_tables.TABLES,
+    "test": lambda result: Tests(result).columns(),
     "check": check_points,
     "observation": observed_components,
     "camera": lambda result: camera_parameters(result.cameras),
