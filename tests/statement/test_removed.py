@@ -74,7 +74,7 @@ def test_every_removed_observation_has_its_row(snooped, monkeypatch):
     aside = tuple(f"image of point C{k:02} on photo 301" for k in range(1, 17))
     stated = replace(snooped.result, set_aside=aside).statement(budgets=(), removed=["control point G01"])
     assert len(stated.removed) == len(listed(stated)) == 18
-    assert [each.reason for each in stated.removed] == ["snooping", *["first values"] * 16, "earlier"]
+    assert [reason for _, reason in stated.removed] == ["snooping", *["first values"] * 16, "earlier"]
     said = next(each["text"] for each in stated.assumptions if each["key"] == "assume.removed")
     assert said.startswith("18 ")
     monkeypatch.setattr(tables, "MAX_REMOVED_OBSERVATIONS", 5)

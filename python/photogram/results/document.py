@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +98,7 @@ def _size_section(result: Result) -> Section:
     groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
     groups["total"] = sums.total
     good += [Fact(f"Weighted sum of squares, {name}", fixed(square, 6)) for name, square in groups.items()]
-    tables = {
+    tables: dict[str, Callable[[Result], list[Quantity]]] = {
         "control points": control,
         "unheld components": declared.unheld,
         "check points": declared.check_points,

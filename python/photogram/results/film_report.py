@@ -13,7 +13,8 @@ from photogram.network.films import Film, FilmPlacement, FilmSize, Readings, Sca
 from photogram.network.observations import FILM, Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
-from photogram.results.network_trial import OBSERVATION, observations_of_core
+from photogram.results.network_trial import OBSERVATION, type_name
+from photogram.results.tables import Tests
 from photogram.show.page import Drawing, Part, Section, about
 from photogram.show.quantity import Axis, Kind, Quantity, Table, members_of_each, of_each
 
@@ -47,14 +48,10 @@ def mark_residuals(result: Result) -> MarkResiduals:
         place = marks[each.mark.name].position[np.newaxis, :2]
         _, partials = _photocore.film_readings(each.film.numbers(), numbers, place)
         xy[k] = np.linalg.solve(partials[0, :, :2], kind.residuals[k])
-    tests, summary = np.full(len(read), np.nan), result.reliability_summary
-    if summary is not None and read:
-        places = {id(each): k for k, each in enumerate(read)}
-        core, testable = observations_of_core(result.block), summary.testable
-        for group in np.flatnonzero(summary.suspects.kinds == OBSERVATION).tolist():
-            own = places.get(id(core[summary.suspects.subjects[group]]))
-            if own is not None and testable[group]:
-                tests[own] = summary.tests.statistic[group]
+    tests = np.full(len(read), np.nan)
+    for own in Tests(result).groups if read else []:
+        if own.kind == type_name(OBSERVATION, Fiducial.KIND):
+            tests[own.rows] = own.values
     return MarkResiduals(
         np.array([photos[each.photo] for each in read], dtype=np.int64),
         tuple(each.mark.name for each in read),

@@ -110,31 +110,27 @@ def held_remark(found: Sequence[Tested], largest: float) -> list[Phrase]:
 def _suspected(result: Result, of_images: Floats) -> list[Held]:
     """Return the fixed items with the worst images, the worst first."""
     block, used = result.block, result.used_images
-    given = result.photo_given_sd
-    photos, points = len(block.photo_ids), len(block.point_ids)
-    counts = np.bincount(block.image_photos[used], minlength=photos)
-    of_photos = np.bincount(block.image_photos, of_images, photos) / np.maximum(counts, 1)
-    of_points = np.bincount(block.image_points, of_images, points)
+    given, photos = result.photo_given_sd, (block.image_photos, block.photo_ids, LEAST_IMAGES)
+    points = block.image_points, block.point_ids, 1
     mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
     rows: list[tuple[float, Held]] = []
-    for what, sd, shift in zip(("position", "attitude"), (given[:, :3], given[:, 3:]), (0, 3), strict=True):
+    for what, of, (owners, names, least), sd, shift in (
+        ("position", "photo", photos, given[:, :3], 0),
+        ("attitude", "photo", photos, given[:, 3:], 3),
+        ("control", "point", points, block.point_sd, 0),
+    ):
         held = np.asarray(sd == 0)
-        if shift or block.geographic:  # Partials have other axes than the components.
+        if what != "position" or block.geographic:  # Partials have other axes than the components.
             held = held & held.all(axis=1, keepdims=True)
-        own = np.flatnonzero(held.any(axis=1) & (counts >= LEAST_IMAGES))
-        for photo in own[np.argsort(-of_photos[own], kind="stable")][:SUSPECTED].tolist():
-            name = block.photo_ids[photo]
-            if name not in mounted:
-                images = np.flatnonzero(used & (block.image_photos == photo))
-                own_partials = shift + np.flatnonzero(held[photo])
-                each = Held(Phrase(f"named.{what}", {"photo": name}), images, own_partials)
-                rows.append((float(of_photos[photo]), each))
-    fixed = (block.point_sd == 0).all(axis=1) & (np.bincount(block.image_points[used], minlength=points) > 0)
-    own = np.flatnonzero(fixed)
-    for point in own[np.argsort(-of_points[own], kind="stable")][:SUSPECTED].tolist():
-        images = np.flatnonzero(used & (block.image_points == point))
-        each = Held(Phrase("named.control", {"point": block.point_ids[point]}), images, np.arange(3))
-        rows.append((float(of_points[point] / len(images)), each))
+        counts = np.bincount(owners[used], minlength=len(names))
+        means = np.bincount(owners, of_images, len(names)) / np.maximum(counts, 1)
+        order = -means * (counts if of == "point" else 1)
+        own = np.flatnonzero(held.any(axis=1) & (counts >= least))
+        for row in own[np.argsort(order[own], kind="stable")][:SUSPECTED].tolist():
+            if of == "point" or names[row] not in mounted:
+                images = np.flatnonzero(used & (owners == row))
+                named = Phrase(f"named.{what}", {of: names[row]})
+                rows.append((float(means[row]), Held(named, images, shift + np.flatnonzero(held[row]))))
     rows.sort(key=lambda row: -row[0])
     return [each for _, each in rows[:SUSPECTED]]
 

@@ -137,16 +137,6 @@ def plan_deviations(terms: Terms, sd: Floats) -> list[Quantity]:
     return [Quantity(sd[:, :2] * terms.lengths[:2], axes, "deviation", head="sd {}", decimals=4)]
 
 
-def control(result: AdjustedNetwork) -> list[Quantity]:
-    """Return points as observations of their own coordinates."""
-    return _observed(result, "point")
-
-
-def stations(result: AdjustedNetwork) -> list[Quantity]:
-    """Return photos as observations of their own unknowns."""
-    return _observed(result, "photo")
-
-
 def _observed(result: AdjustedNetwork, kind: str) -> list[Quantity]:
     """Return prior, posterior, difference and test of observed components."""
     terms, own = result._terms, result.control if kind == "point" else result.stations
@@ -174,6 +164,10 @@ def _observed(result: AdjustedNetwork, kind: str) -> list[Quantity]:
         test_value(own.tests, axes),
     ]
 
+
+control = partial(_observed, kind="point")
+stations = partial(_observed, kind="photo")
+"""Points and photos as observations of their own coordinates and unknowns."""
 
 # Columns of values and axes: adjusted minus given, standard deviations, redundancy numbers, w.
 _MINUS = "adjusted minus given: {}"

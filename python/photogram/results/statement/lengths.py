@@ -47,7 +47,7 @@ class LengthTest:
     def normalised(self) -> Floats:
         """(m,) errors / sd; NaN if the standard deviation is zero."""
         out = np.full(self.errors.shape, math.nan)
-        return np.divide(self.errors, self.sd, out=out, where=self.sd > 0)
+        return np.asarray(np.divide(self.errors, self.sd, out=out, where=self.sd > 0))
 
     @property
     def limits(self) -> Floats | None:

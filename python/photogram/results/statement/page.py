@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 MAX_FINE_SOURCES = 12  # Sources of a budget in addition to the types of observations
 MAX_RADII = 11
-BLANK = " "  # Header of a column without a name
 
 
 def annexes(statement: Statement) -> list[Section]:
@@ -66,7 +65,7 @@ def _radii(texts: Texts, own: Figures) -> Table:
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
     upper = [math.nan if radius["upper"] is None else radius["upper"] for radius in radii.values()]
     quantities = [
-        columns.text(BLANK, [name.upper() for name in radii]),
+        columns.text(declared.BLANK, [name.upper() for name in radii]),
         number("sample", [radius["sample"] for radius in radii.values()]),
         number("upper", upper),
         number("moments", [own.of_moments[name] for name in radii]),
@@ -126,7 +125,7 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
     origins = [texts("from.estimated" if k in estimated else "from.given") for k in range(len(of))]
     parameters = [
         columns.text("parameter", camera.names),
-        columns.text(BLANK, of),
+        columns.text(declared.BLANK, of),
         value,
         columns.number("sd", sd, figures=2),
         columns.text("from", origins),
@@ -226,24 +225,15 @@ def _files(statement: Statement) -> list[Part]:
 
 
 def _metrology(statement: Statement) -> list[Part]:
-    texts, columns, parts = statement.texts, declared.Columns(statement.texts), list[Part]()
-    standards, features = statement.standards, statement.result.features
-    lengths, measures = standards.lengths, standards.iso_19157
+    texts, parts = statement.texts, list[Part]()
+    lengths, features = statement.standards.lengths, statement.result.features
     if features is not None and len(features):
         parts.append(_features(texts, features))
     if lengths is not None:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
         parts += [declared.test_lengths(texts, lengths), drawing]
-    values = [each["value"] if isinstance(each["value"], list) else [each["value"]] for each in measures]
-    figures = [["–" if one is None else texts.significant(one, 3) for one in each] for each in values]
-    quantities = [
-        columns.text("measure", [each["measure"] for each in measures]),
-        columns.number("id", [each["measure_id"] for each in measures]),
-        columns.text("value", [*map(" / ".join, figures)]),
-        columns.text(BLANK, [each["unit"] for each in measures]),
-    ]
-    return [*parts, Table("iso", texts("table.iso"), quantities)]
+    return [*parts, declared.quality_measures(statement)]
 
 
 def _features(texts: Texts, features: Features) -> Table:
@@ -257,7 +247,7 @@ def _features(texts: Texts, features: Features) -> Table:
         columns.text("feature", names),
         columns.text("quantity", [texts.word("measured", own.name) for _, own in every]),
         *numbers,
-        columns.text(BLANK, [own.unit for _, own in every]),
+        columns.text(declared.BLANK, [own.unit for _, own in every]),
     ]
     note = f"k = {texts.number(features.k, 2)}"
     return Table("features", texts("table.features"), quantities, note, deviations=unit_deviations(features))

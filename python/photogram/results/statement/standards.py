@@ -148,6 +148,7 @@ MEASURES = {
     "rmse_plan": (47, "root mean square error of planimetry"),
     "ellipse": (50, "uncertainty ellipse"),
 }
+Measure = tuple[str, str, Any, str]  # Key of `MEASURES`, element, value and scope
 _METRES_OF = {"h": "class_h_m", "v": "class_v_m", "3d": "class_3d_m"}
 _NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
 
@@ -221,7 +222,7 @@ class Standards:
     asprs: Asprs | None = None
     nssda: Nssda | None = None
     lengths: LengthTest | None = None
-    iso_19157: list[dict[str, Any]] = field(default_factory=list)
+    iso_19157: list[Measure] = field(default_factory=list)
 
     @property
     def nssda_member(self) -> dict[str, Any] | None:
@@ -342,11 +343,9 @@ def tested_lengths(result: Result, asked: Asked) -> LengthTest:
     return replace(test, ends=ends, expansion=asked.expansion if turned else None)
 
 
-def iso_measures(
-    result: Result, asked: Asked, of_all: Figures | None, lengths: LengthTest | None
-) -> list[dict[str, Any]]:
+def iso_measures(of_all: Figures | None, lengths: LengthTest | None) -> list[Measure]:
     """Return the figures as measures of ISO 19157."""
-    figures: list[tuple[str, str, object, str]] = []  # Keys, elements, values and scopes
+    figures: list[Measure] = []
     if of_all is not None:
         whole = of_all.parts["all"]
         values: dict[str, Any] = {
@@ -360,20 +359,7 @@ def iso_measures(
         figures += [(key, ABSOLUTE, value, scope) for key, value in values.items()]
     if lengths is not None:
         figures.append(("rmse", RELATIVE, lengths.rms, counted(len(lengths.errors), "length")))
-    return [
-        {
-            "element": element,
-            "measure": MEASURES[key][1],
-            "measure_id": MEASURES[key][0],
-            "value": value,
-            "unit": result.block.linear_unit,
-            "evaluation": "direct external",
-            "date": asked.date,
-            "scope": scope,
-        }
-        for key, element, value, scope in figures
-        if value is not None
-    ]
+    return [own for own in figures if own[2] is not None]
 
 
 def _ellipse(moments: Floats) -> list[float] | None:

@@ -32,21 +32,6 @@ from photogram.show.run import InputFile
 from photogram.words import Phrase, phrase
 
 
-@dataclass(frozen=True)
-class RemovedObservation:
-    """An observation that was not used in the adjustment."""
-
-    subject: Phrase | str  # Its name as a message, such as `image of point C04 on photo 301`
-    # `snooping`: data snooping removed it; `first values`: it does not fit the initial values; `earlier`: it
-    # was removed before
-    reason: str
-
-    @property
-    def name(self) -> str:
-        """Its name in English."""
-        return str(self.subject)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Statement(Brief):
     """An accuracy statement for a client: figures, standards, methods, assumptions.
@@ -70,7 +55,8 @@ class Statement(Brief):
     layout
         The distribution of check points; None without any.
     removed
-        Observations that were not used in the adjustment.
+        Names of observations that were not used in the adjustment, each with the reason: `snooping` (data
+        snooping removed it), `first values` (it does not fit the initial values), `earlier` (removed before).
     survey
         Control and check points as given, in the displayed coordinate system.
     inputs, command
@@ -92,7 +78,7 @@ class Statement(Brief):
     taken_apart: tuple[Budget, ...]
     standards: by_standard.Standards
     layout: Layout | None
-    removed: tuple[RemovedObservation, ...]
+    removed: tuple[tuple[Phrase | str, str], ...]
     survey: comparison.Survey
     inputs: tuple[InputFile, ...] = ()
     command: str = ""
@@ -312,12 +298,10 @@ def statement(
             if of_all is None
             else by_standard.nssda(of_all.moments, of_all.rmse["rmse_v1"], of_all.n),
             lengths=lengths,
-            iso_19157=by_standard.iso_measures(result, options, of_all, lengths)
-            if "iso-19157" in options.standards
-            else [],
+            iso_19157=by_standard.iso_measures(of_all, lengths) if "iso-19157" in options.standards else [],
         ),
         layout=layout(checks, np.concatenate([checks, control]), control) if len(checks) else None,
-        removed=tuple(RemovedObservation(name, why) for why, names in of_reason.items() for name in names),
+        removed=tuple((name, why) for why, names in of_reason.items() for name in names),
         survey=comparison.surveyed(result, found, system),
         inputs=tuple(inputs),
         command=command,

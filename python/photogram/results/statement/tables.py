@@ -18,6 +18,7 @@ from photogram.results.statement.comparison import LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Sized, point_tests
 from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import lengths_in
+from photogram.results.statement.standards import MEASURES
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Part, Section, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, column, frame, members, members_of_each
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from photogram import Result, Statement
 
 DIRECTIONS = ("e", "n", "h")
+BLANK = " "  # Header of a column without a name
 MAX_REMOVED_OBSERVATIONS = 1000  # Limit of the page; the file lists all
 decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
 
@@ -123,11 +125,12 @@ def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
 def removed_observations(statement: Statement) -> Table:
     """Return the removed observations; the page lists the first ones."""
     texts, columns, count = statement.texts, Columns(statement.texts), len(statement.removed)
-    reasons, shown = [each.reason for each in statement.removed], MAX_REMOVED_OBSERVATIONS
+    names, reasons = zip(*statement.removed, strict=True) if count else ((), ())
+    shown = MAX_REMOVED_OBSERVATIONS
     quantities = [
-        Quantity([each.name for each in statement.removed], kind="name", name="observation", member="name"),
-        column("reason", reasons, kind="name"),
-        columns.text("observation", [texts.text(each.subject) for each in statement.removed]),
+        Quantity([*map(str, names)], kind="name", name="observation", member="name"),
+        column("reason", [*reasons], kind="name"),
+        columns.text("observation", [*map(texts.text, names)]),
         columns.text("reason", [texts(f"removed.{reason}") for reason in reasons]),
     ]
     note = texts("table.removed.note", shown=shown, all=count) if count > shown else ""
@@ -152,6 +155,28 @@ def test_lengths(texts: Texts, test: LengthTest) -> Table:
         number("limit", limits, member="limit"),
     ]
     return Table("lengths", texts("table.lengths"), quantities)
+
+
+def quality_measures(statement: Statement) -> Table:
+    """Return the measures of ISO 19157."""
+    texts, columns, rows = statement.texts, Columns(statement.texts), statement.standards.iso_19157
+    keys, elements, values, scopes = zip(*rows, strict=True) if rows else ((),) * 4
+    listed = [own if isinstance(own, list) else [own] for own in values]
+    figures = [["–" if one is None else texts.significant(one, 3) for one in own] for own in listed]
+    units, days = ([own] * len(rows) for own in (statement.result.block.linear_unit, statement.asked.date))
+    quantities = [
+        column("element", [*elements], kind="name"),
+        columns.text("measure", [MEASURES[key][1] for key in keys], name="measure"),
+        columns.number("id", [MEASURES[key][0] for key in keys], member="measure_id"),
+        Quantity([*values], member="value"),
+        columns.text("value", [*map(" / ".join, figures)]),
+        columns.text(BLANK, units),
+        column("unit", units, kind="name"),
+        column("evaluation", ["direct external"] * len(rows), kind="name"),
+        column("date", days, kind="name"),
+        column("scope", [*scopes], kind="name"),
+    ]
+    return Table("iso", texts("table.iso"), quantities)
 
 
 def files_of_statement(statement: Statement) -> dict[str, bytes]:
@@ -221,7 +246,7 @@ def statement_members(found: Statement) -> dict[str, Any]:
         "asprs": None if standards.asprs is None else standards.asprs.member(asked, lengths_in(unit)),
         "nssda": standards.nssda_member if "nssda" in asked.standards else None,
         "lengths": standards.lengths and _lengths(found.texts, standards.lengths),
-        "iso_19157": standards.iso_19157 or None,
+        "iso_19157": quality_measures(found).record() or None,
         "layout": found.layout and vars(found.layout),
         "camera": [
             members(each, "name", parameters="names", value="values") | members(each, "sd", "correlations")
