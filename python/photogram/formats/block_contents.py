@@ -9,7 +9,7 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.errors import InputError
 from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.trajectories_written import shared_trajectories
+from photogram.formats.plain.trajectories import shared_trajectories
 from photogram.formats.project import Project
 from photogram.messages import counted
 from photogram.network.block import Block

@@ -8,7 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from photogram.formats.plain.schema import BENDS, PITCHES, deviation_columns
-from photogram.formats.plain.tables import Tables, made
+from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made
 from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
@@ -72,25 +72,20 @@ def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
 
 def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | None) -> dict[str, Any]:
     """Return columns of boards, deflections and camera priors."""
-    if not boards:
-        return {}
-    each = boards.values()
-    grids = [None if own.kind == "points" else own for own in each]
-    columns: dict[str, Any] = {"board": [*boards], "kind": [own.kind for own in each]}
-    for name in ("columns", "rows"):
-        columns[name] = [None if own is None else getattr(own, name) for own in grids]
-    for k, name in enumerate(PITCHES[:2]):
-        columns[name] = [None if own is None or own.tag_size else own.pitch[k] for own in grids]
-    for name in PITCHES[2:]:
-        columns[name] = [getattr(own, name) for own in each]
-    columns["shape"] = [own.shape or "" for own in each]
-    if regularise:
-        columns[REGULARISED] = [regularise] * len(boards)
     bends = {own.bend.name: own.bend for own in block.passages if isinstance(own, Figure)}
-    for names, what in ((BENDS, "position"), (deviation_columns(BENDS), "deviations")) if bends else ():
-        for k, name in enumerate(names):
-            columns[name] = [getattr(bends[board], what)[k] if board in bends else None for board in boards]
-    return columns
+    rows = []
+    for name, own in boards.items():
+        cells: dict[str, Any] = {"board": name, "kind": own.kind}
+        if own.kind != "points":
+            cells |= {"columns": own.columns, "rows": own.rows}
+            cells |= {} if own.tag_size else columns_of(PITCHES[:2], np.array(own.pitch))
+        cells |= {"tag_size": own.tag_size, "tag_spacing": own.tag_spacing, "shape": own.shape}
+        cells[REGULARISED] = regularise
+        if name in bends:
+            cells |= columns_of(BENDS, bends[name].position[:2])
+            cells |= columns_of(deviation_columns(BENDS), bends[name].deviations[:2])
+        rows.append(cells)
+    return columns_of_records(rows)
 
 
 def levels(image_sd: np.ndarray, *, assumed: bool) -> np.ndarray | None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,13 +14,13 @@ from photogram.errors import ContradictionError, InputError, message_of
 from photogram.film.distances import with_datum
 from photogram.film.validity import age_remark, changed_remark, valid_certificate
 from photogram.formats.plain.covariances import Covariances
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, columns_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.toml import day_of
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.films import Mark
-from photogram.network.observations import KnownTogether, Observation
+from photogram.network.observations import Fiducial, KnownTogether, Observation
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -232,4 +232,62 @@ def read_fiducials(
         found.places[camera][name] = xy[row]
         found.sd.setdefault(camera, {})[name] = sd[row]
     found.take(certificates)
+    return found
+
+
+@dataclass
+class Marks:
+    """The marks of a camera by name, and their joint prior or standard deviations."""
+
+    marks: dict[str, Mark] = field(default_factory=dict)
+    sd: dict[str, Floats] = field(default_factory=dict)
+    covariance: Floats | None = None
+
+    def cells(self, camera: str) -> Iterator[dict[str, Any]]:
+        """Yield the rows of the table of marks."""
+        for name, mark in self.marks.items():
+            sd = self.sd.get(name, np.full(2, np.nan))
+            place = columns_of(("x", "y"), mark.position[:2])
+            yield {"camera": camera, "fiducial": name, **place, **columns_of(("sd_x", "sd_y"), sd)}
+
+
+def marks_of(
+    readings: Iterable[Fiducial], together: Iterable[KnownTogether], camera_of: Mapping[str, str]
+) -> dict[str, Marks]:
+    """Return the marks of readings by camera name, with their priors, from the cameras of photos."""
+    cameras: dict[int, str] = {}
+    read: dict[int, Mark] = {}
+    for each in readings:
+        camera = camera_of[each.photo]
+        if cameras.setdefault(id(each.mark), camera) != camera:
+            raise InputError(phrase("plain.mark-of-cameras", name=each.mark.name))
+        read[id(each.mark)] = each.mark
+    found: dict[str, Marks] = {}
+    for known in together:
+        marks = [each for each in known.joined if isinstance(each, Mark)]
+        if not marks:
+            continue
+        of = {cameras[id(mark)] for mark in marks if id(mark) in cameras}
+        if len(of) != 1 or len(marks) < len(known.joined):
+            raise InputError(phrase("plain.known-marks", name=known.name))
+        (camera,) = of
+        own, full = found.setdefault(camera, Marks()), len(marks) > 1 or known.precision[0, 1] != 0
+        if own.covariance is not None or (full and own.marks):
+            raise InputError(phrase("plain.one-certificate", name=known.name))
+        names = [mark.name.removeprefix(f"{camera} ") for mark in marks]
+        own.marks |= zip(names, marks, strict=True)
+        if full:
+            own.covariance = known.precision
+        else:
+            own.sd[names[0]] = np.sqrt(np.diag(known.precision))
+        for mark in marks:
+            read.pop(id(mark), None)
+    # The only prior of other marks is their own standard deviation.
+    for key, mark in read.items():
+        own = found.setdefault(cameras[key], Marks())
+        sd = mark.deviations
+        if own.covariance is not None or not (np.isfinite(sd).all() and (sd > 0).all()):
+            raise InputError(phrase("plain.no-certificate", mark=mark.name, camera=cameras[key]))
+        name = mark.name.removeprefix(f"{cameras[key]} ")
+        own.marks[name], own.sd[name] = mark, sd
     return found

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.tables import DEGREE, Tables, columns_of_rows, made, signs_in_files, word_of
+from photogram.formats.plain.tables import DEGREE, Tables, columns_of_records, made, signs_in_files, word_of
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import unknown_name
@@ -178,8 +178,8 @@ def covariance_tables(
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
     for kind, name, components, matrix in more:
         rows += _pairs(kind, name, components, matrix)
-    columns = columns_of_rows(("kind", "name", "first", "second", "covariance"), rows)
-    return {"covariances": columns} if rows else {}
+    names = ("kind", "name", "first", "second", "covariance")
+    return {"covariances": columns_of_records(dict(zip(names, row, strict=True)) for row in rows)}
 
 
 def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) -> dict[str, float]:

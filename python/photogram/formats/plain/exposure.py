@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.images import from_tables, in_unit, to_tables
-from photogram.formats.plain.tables import Tables, made
+from photogram.formats.plain.tables import Tables, columns_of_records, made
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.numbers import scaled
@@ -142,47 +142,26 @@ def exposure_columns(
     image_y: str,
 ) -> dict[str, Any]:
     """Return the columns of shutters and line sensors of a camera table."""
-    lines = [each if isinstance(each, LineSensor) else None for each in exposures]
-    own = [each if isinstance(each, Shutter) else None for each in exposures]
-    for camera, line in zip(cameras, lines, strict=True):
-        if line is not None and not line.is_straight:
-            raise InputError(phrase("plain.bent-line", camera=camera.title))
-    found = _line_columns(lines) if any(lines) else {}
-    return found | _shutter_columns(cameras, own, sizes, pixel_mm, image_y) if any(own) else found
-
-
-def _line_columns(lines: Sequence[LineSensor | None]) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        column: [None if each is None else float(getattr(each, column)) for each in lines]
-        for column in OF_LINES
-    }
-    for k, column in enumerate(("pitch_x", "pitch_y")):
-        found[column] = [None if each is None else float(each.pitch[k]) for each in lines]
-    return found
-
-
-def _shutter_columns(
-    cameras: Sequence[Camera],
-    own: Sequence[Shutter | None],
-    sizes: Sequence[Size | None],
-    pixel_mm: Sequence[float | None],
-    image_y: str,
-) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    readouts = [each.readout if each and isinstance(each.readout, Readout) else None for each in own]
-    found["readout"] = [None if each is None else each.value for each in readouts]
-    found["sd_readout"] = [None if each is None else float(each.deviations[0]) for each in readouts]
-    found["readout_direction"] = ["" if each is None else each.direction for each in own]
-    edges = [
-        None if each is None else _edges_written(each, camera, size, pixel, image_y)
-        for each, camera, size, pixel in zip(own, cameras, sizes, pixel_mm, strict=True)
-    ]
-    if any(edges):
-        for k, column in enumerate(("readout_begin", "readout_end")):
-            found[column] = [None if each is None else each[k] for each in edges]
-    if any(each and each.name != camera.name for each, camera in zip(readouts, cameras, strict=True)):
-        found["shutter"] = ["" if each is None else each.name for each in readouts]
-    return found
+    rows = list[dict[str, Any]]()
+    for camera, own, size, pixel in zip(cameras, exposures, sizes, pixel_mm, strict=True):
+        cells = dict[str, Any]()
+        if isinstance(own, LineSensor):
+            if not own.is_straight:
+                raise InputError(phrase("plain.bent-line", camera=camera.title))
+            cells = {name: float(getattr(own, name)) for name in OF_LINES}
+            cells |= zip(("pitch_x", "pitch_y"), map(float, own.pitch), strict=True)
+        elif own is not None and isinstance(readout := own.readout, Readout):
+            cells = {"readout": readout.value, "sd_readout": float(readout.deviations[0])}
+            cells |= {"readout_direction": own.direction}
+            if edges := _edges_written(own, camera, size, pixel, image_y):
+                cells |= zip(("readout_begin", "readout_end"), edges, strict=True)
+            cells["shutter"] = readout.name
+        rows.append(cells)
+    if all(
+        each.get("shutter", camera.name) == camera.name for each, camera in zip(rows, cameras, strict=True)
+    ):
+        rows = [{name: cell for name, cell in each.items() if name != "shutter"} for each in rows]
+    return columns_of_records(rows)
 
 
 def _edges_written(

@@ -1,10 +1,11 @@
-"""Photos on film and plates: scanned photos, their marks, and prior information."""
+"""Photos on film and plates: scanned photos, their marks, and prior information; read and written."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +18,23 @@ from photogram.film.interior import (
     interior_orientation,
 )
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.certificates import read_fiducials
+from photogram.formats.plain.certificates import marks_of, read_fiducials
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.film_mistakes import beyond_message, mark_remarks, scale_message
 from photogram.formats.plain.film_readings import Lying, MarkReadings, ScannedPhoto, Seen
-from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
-from photogram.formats.plain.scanners import Machine, read_films, read_scanners
-from photogram.formats.plain.tables import Tables, made, signs_in_files
+from photogram.formats.plain.scanners import (
+    Machine,
+    film_cells,
+    known_words,
+    machines_of,
+    read_films,
+    read_scanners,
+    scanner_cells,
+)
+from photogram.formats.plain.schema import deviation_columns
+from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
+from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.cameras import Camera
@@ -44,6 +54,8 @@ from photogram.words import phrase
 
 LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}  # Required marks of a film
 _START = ("start_t1", "start_t2", "start_theta")
+INSIDE = "films inside"
+"""Key of a detail of a project with fixed films: the complete contents of their tables."""
 
 
 @dataclass(frozen=True)
@@ -317,3 +329,112 @@ def _positive(camera: Camera) -> Camera:
         covariance = names, np.asarray(matrix) * signs * signs[:, np.newaxis]
     parameters = {**camera.parameters, "c": -camera.parameters["c"]}
     return camera.replace(parameters=parameters, covariance=covariance)
+
+
+class WrittenFilms:
+    """The films of a project in the form of tables."""
+
+    def __init__(self, project: Project, cameras: Sequence[str]) -> None:
+        block = project.block
+        self.photos, camera_of = block.photo_ids, dict(zip(block.photo_ids, cameras, strict=True))
+        scans = [each for each in block.passages if isinstance(each, Scan)]
+        observations: Sequence[Observation] = block.observations
+        self.before = any(not each.film.placement.deviations.any() for each in scans)
+        if self.before:
+            if INSIDE not in project.details:
+                raise InputError(phrase("plain.fixed-films"))
+            scans, observations = project.details[INSIDE]
+        self.films = {each.photo: each.film for each in scans if each.photo in camera_of}
+        self.readings = [
+            each for each in observations if isinstance(each, Fiducial) and each.photo in self.films
+        ]
+        known = [each for each in observations if isinstance(each, KnownFilm)]
+        self.known = {each.photo: each for each in known if each.photo in self.films}
+        together = [each for each in observations if isinstance(each, KnownTogether)]
+        self.machines = machines_of(self.films.values(), together)
+        self.certificates = marks_of(self.readings, together, camera_of)
+        self.by_mark = {
+            id(mark): name for own in self.certificates.values() for name, mark in own.marks.items()
+        }
+        self._rolls = {
+            photo: self.known[photo].roll if film.roll is None and photo in self.known else film.roll
+            for photo, film in self.films.items()
+        }
+
+    @property
+    def pixels(self) -> bool:
+        """Whether readings are columns and rows."""
+        return any(each.readings.pitch != 1.0 for each in self.films.values())
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Return the tables of films by name."""
+        rows = {
+            "fiducials": (row for camera, own in self.certificates.items() for row in own.cells(camera)),
+            "fiducial_images": map(self._reading, self.readings),
+            "films": self._film_rows().values(),
+            "scanners": map(scanner_cells, self.machines.values()),
+        }
+        found = {name: columns_of_records(own) for name, own in rows.items()}
+        return {name: columns for name, columns in found.items() if columns}
+
+    def photo_columns(self) -> dict[str, Any]:
+        """Return the columns of photos; empty without films."""
+        return columns_of_records(map(self._photo, self.photos))
+
+    def _photo(self, photo: str) -> dict[str, Any]:
+        if (film := self.films.get(photo)) is None:
+            return {}
+        known, roll, start = self.known.get(photo), self._rolls[photo], film.placement.position
+        if known is not None and known.covariance is not None:
+            start = np.asarray(known.values, dtype=float)[:3]
+        cells = {"film": "film" if roll is None else roll.name, "scanner": film.scanner.name}
+        return {**cells, "mirrored": film.mirrored, **columns_of(_START, start)}
+
+    def covariances(self) -> list[tuple[str, str, Sequence[str], Floats]]:
+        """Return type, name, components and matrix of joint priors."""
+        found: list[tuple[str, str, Sequence[str], Floats]] = [
+            ("film", photo, FILM, each.precision)
+            for photo, each in self.known.items()
+            if each.covariance is not None
+        ]
+        for name, own in self.machines.items():
+            if own.known is not None:
+                found.append(("scanner", name, known_words(own), own.known.precision))
+        for camera, marks in self.certificates.items():
+            if marks.covariance is not None:
+                words = tuple(f"{name}.{axis}" for name in marks.marks for axis in "xy")
+                found.append(("fiducials", camera, words, marks.covariance))
+        return found
+
+    def _film_rows(self) -> dict[str, dict[str, Any]]:
+        """Return one row for all photos of a roll, by its name."""
+        rows: dict[str, dict[str, Any]] = {}
+        for photo, film in self.films.items():
+            own = {"film": "film"} | film_cells(film, self._rolls[photo], self._sizes(photo))
+            row = rows.setdefault(own["film"], own)
+            if any(None not in (row.get(key), value) and row.get(key) != value for key, value in own.items()):
+                raise InputError(phrase("plain.film-differs", film=own["film"], photo=photo))
+            row |= {key: value for key, value in own.items() if row.get(key) is None}
+        return rows
+
+    def _sizes(self, photo: str) -> Mapping[str, float | None]:
+        """Return standard deviations of m, b1, b2; None with covariances."""
+        known, sd = self.known.get(photo), self.films[photo].size.deviations
+        if known is not None and known.covariance is not None:
+            if tuple(known.known) != FILM:
+                raise InputError(phrase("plain.film-covariance", name=known.name, names=list(FILM)))
+            return {name: None if own else 0.0 for name, own in zip(FILM[3:], sd, strict=True)}
+        found = dict(zip(FILM[3:], np.where(sd == 0, 0.0, np.inf).tolist(), strict=True))
+        if known is None:
+            return found
+        if not set(known.known) <= set(found) or np.any(known.values):
+            raise InputError(phrase("plain.film-priors", name=known.name))
+        return found | dict(zip(known.known, np.sqrt(np.diag(known.precision)).tolist(), strict=True))
+
+    def _reading(self, each: Fiducial) -> dict[str, Any]:
+        names = ("column", "row") if self.pixels else ("x", "y")
+        if each.precision[0, 1]:
+            raise InputError(phrase("plain.correlated-readings"))
+        sd = columns_of(deviation_columns(names), np.sqrt(np.diag(each.precision)))
+        own = {"photo": each.photo, "fiducial": self.by_mark[id(each.mark)]}
+        return {**own, **columns_of(names, each.observed[:2]), **sd}

@@ -13,7 +13,14 @@ from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.rigs import Rigs, sensor_of
 from photogram.formats.plain.schema import RATE, TABLES, VELOCITY, deviation_columns
-from photogram.formats.plain.tables import Tables, columns_of, indices_of, made, named_of
+from photogram.formats.plain.tables import (
+    Tables,
+    columns_of,
+    columns_of_records,
+    indices_of,
+    made,
+    named_of,
+)
 from photogram.formats.plain.unknowns import read_unknowns, unknown_columns
 from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
@@ -156,32 +163,28 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
     if not block.timed:
         return {}
     timed = {each.photo: each for each in block.timed}
-    own = [timed.get(photo) for photo in block.photo_ids]
-    trajectories = [None if each is None else each.trajectory for each in own]
-    found: dict[str, Any] = {"trajectory": ["" if each is None else each.name for each in trajectories]}
-    sensors = [None if each is None else each.sensor for each in own]
-    if any(sensors):
-        places = [None if each is None else rigs.place(each) for each in sensors]
-        for k, column in enumerate(("rig", "sensor")):
-            found[column] = ["" if each is None else each[k] for each in places]
-    found["time"] = [None if each is None else each.time for each in own]
-    found |= _motion_columns(own)
-    clocks = [None if each is None or rigs.clock(each.sensor) else each.offset for each in own]
-    rates = [None if each is None else each.rate for each in own]
+    rows, clocks, rates = list[dict[str, Any]](), list[Any](), list[Any]()
+    for photo in block.photo_ids:
+        each = timed.get(photo)
+        rows.append({})
+        clocks.append(None if each is None or rigs.clock(each.sensor) else each.offset)
+        rates.append(None if each is None else each.rate)
+        if each is None:
+            continue
+        rows[-1] |= {"trajectory": "" if each.trajectory is None else each.trajectory.name}
+        if each.sensor is not None:
+            rows[-1] |= zip(("rig", "sensor"), rigs.place(each.sensor) or ("", ""), strict=True)
+        rows[-1] |= {"time": each.time}
+        if each.trajectory is None:
+            motion = np.concatenate([getattr(each, field) for field in _FIELDS])
+            rows[-1] |= columns_of((*_MOTION, *_SD), motion)
+    found = columns_of_records(rows)
     for field, unknowns in (("clock", clocks), ("rate", rates)):
-        found |= unknown_columns(block, TABLES["photos"].unknown(field), unknowns, block.photo_ids)
-    return {name: column for name, column in found.items() if any(each not in (None, "") for each in column)}
-
-
-def _motion_columns(own: Sequence[Timed | None]) -> dict[str, Any]:
-    """Return velocities and rates of photos with their own motion."""
-    values = np.full((len(own), len(_FIELDS), 3), np.nan)
-    for row, each in enumerate(own):
-        if each is not None and each.trajectory is None:
-            for k, field in enumerate(_FIELDS):
-                values[row, k] = getattr(each, field)
-    columns = values.reshape(len(own), -1).T.tolist()
-    return {} if np.isnan(values).all() else dict(zip((*_MOTION, *_SD), columns, strict=True))
+        own = unknown_columns(block, TABLES["photos"].unknown(field), unknowns, block.photo_ids)
+        found |= {
+            name: column for name, column in own.items() if any(each not in (None, "") for each in column)
+        }
+    return found
 
 
 def line_times_table(block: Block) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.schema import AXES, TABLES
-from photogram.formats.plain.tables import Tables, columns_of_rows, indices_of, made
+from photogram.formats.plain.tables import Tables, columns_of_records, indices_of, made
 from photogram.formats.plain.unknowns import read_unknowns, unknown_columns, value_columns
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.column_table import ColumnTable
@@ -22,6 +22,7 @@ from photogram.network.unknowns import Sensor
 from photogram.words import phrase
 
 FRAME = "frame itself"  # Name of the first sensor of a rig if sensors have explicit names
+_BASE = ("rig", "from", "to", "distance", "sd")
 _SENSOR = TABLES["rigs"].unknown("sensor")
 _REFERENCE = Sensor(FRAME, np.zeros(3), np.eye(3), 0.0)
 ZERO = 1e-6  # Largest difference of the first sensor's pose from zero
@@ -217,29 +218,27 @@ class Rigs:
         rows: list[tuple[str, str, Sensor | None]] = []
         for rig, sensors in self._sensors.items():
             rows += [(rig, self._references[rig], None), *((rig, *each) for each in sensors.items())]
-        frames = []
-        for frame in dict.fromkeys(each.frame for each in self._mounts):
-            rig = self._rig(frame)
-            frames.append((frame, rig, frame, self._references[rig]))
-            frames += [
-                (frame, rig, each.photo, self._name(each)) for each in self._mounts if each.frame == frame
-            ]
-        names = ("rig", "camera" if self._by_camera else "sensor")
+        frames: dict[str, list[dict[str, Any]]] = {}
+        for each in self._mounts:
+            rig = self._rig(each.frame)
+            for photo, name in ((each.frame, self._references[rig]), (each.photo, self._name(each))):
+                if photo == each.frame and photo in frames:
+                    continue
+                cells: dict[str, Any] = {"frame": each.frame, "rig": rig, "photo": photo}
+                cells |= {"sensor": "" if self._by_camera else name, "time": self._times.get(photo)}
+                frames.setdefault(each.frame, []).append(cells)
         clocks = [self.clock(sensor) for *_, sensor in rows]
-        found = {
+        bases = [(*row, float(each.length), float(each.sd)) for each, row in self._bases]
+        return {
             "rigs": {
-                **columns_of_rows(names, [row[:2] for row in rows]),
-                **value_columns(block, _SENSOR, [row[2] or _REFERENCE for row in rows]),
+                "rig": [rig for rig, *_ in rows],
+                "camera" if self._by_camera else "sensor": [name for _, name, _ in rows],
+                **value_columns(block, _SENSOR, [sensor or _REFERENCE for *_, sensor in rows]),
                 **unknown_columns(block, TABLES["rigs"].unknown("clock"), clocks, [""] * len(rows)),
             },
-            "frames": columns_of_rows(("frame", "rig", "photo", "sensor"), frames),
+            "frames": columns_of_records(cells for own in frames.values() for cells in own),
+            "bases": columns_of_records(dict(zip(_BASE, base, strict=True)) for base in bases),
         }
-        if self._by_camera:
-            found["frames"].pop("sensor", None)
-        if frames and self._times:
-            found["frames"]["time"] = [self._times.get(row[2]) for row in frames]
-        bases = [(*row, float(each.length), float(each.sd)) for each, row in self._bases]
-        return found | {"bases": columns_of_rows(("rig", "from", "to", "distance", "sd"), bases)}
 
 
 def _clocks(block: Block) -> dict[int, Clock]:

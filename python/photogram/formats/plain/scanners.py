@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID, TABLES, deviation_columns
-from photogram.formats.plain.tables import Tables, made
+from photogram.formats.plain.tables import Tables, columns_of, made
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
-from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, Scanner, ScannerCurve, Weights
+from photogram.network.films import (
+    PATTERNS,
+    Film,
+    Pattern,
+    Readings,
+    Reseau,
+    Roll,
+    Scanner,
+    ScannerCurve,
+    Weights,
+)
 from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
 BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}  # Parameters of models that are not affine
 _NUMBERS = (*DEVICE, *CURVES)  # Numbers of a scanner
+_WRITTEN = ("Sx", "Sy", "alpha_rad", *CURVES)
+_WORDS = ("Sx", "Sy", "alpha", *CURVES)  # Their names in the table of covariances
+_READINGS = ("scanner", "pitch_mm", "origin_column", "origin_row")
 UM = 1e-3  # In millimetres
 KNOWN = 1e-6  # Standard deviation of fixed components in a singular covariance (mm, a ratio, radians)
 LOCAL = "local"  # The pattern of films with a separate grid for each photo
@@ -64,7 +78,7 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
     """Read the table of scanners."""
     table = tables.rows("scanners")
     names = table.names_once("scanner")
-    counts = table.given(("pitch_mm", "origin_column", "origin_row"))
+    counts = table.given(_READINGS[1:])
     # Readings count rows downwards by default.
     down = table.flags("rows_down") if "rows_down" in table else np.ones(table.count, dtype=bool)
     found = {}
@@ -136,7 +150,7 @@ def _machine(
     table: ColumnTable, row: int, name: str, numbers: _Numbers, readings: Readings, covariances: Covariances
 ) -> Machine:
     """Return a scanner with its curves, if any, and their joint prior."""
-    words, named = ["sx", "sy", "alpha", *CURVES], covariances.names("scanner", name)
+    words, named = [word.lower() for word in _WORDS], covariances.names("scanner", name)
     # By the index of the first of their three numbers
     parts: dict[int, tuple[type[Unknown], str]] = {0: (Scanner, name)}
     if numbers.values[3:].any() or numbers.sd[3:].any() or named - set(words[:3]):
@@ -164,6 +178,39 @@ def _machine(
     scanner, *curves = unknowns.values()
     assert isinstance(scanner, Scanner)
     return Machine(scanner, tuple(each for each in curves if isinstance(each, ScannerCurve)), readings, known)
+
+
+def machines_of(films: Iterable[Film], together: Iterable[KnownTogether]) -> dict[str, Machine]:
+    """Return the scanners of films by name; `together` contains their priors."""
+    known = {id(one): each for each in together for one in each.joined}
+    found: dict[str, Machine] = {}
+    for film in films:
+        own = Machine(film.scanner, tuple(film.curves), film.readings, None)
+        priors = [known[id(each)] for each in (own.scanner, *own.curves) if id(each) in known]
+        first = found.setdefault(film.scanner.name, replace(own, known=priors[0]) if priors else own)
+        same = first.scanner is own.scanner and first.readings == own.readings
+        if not same or [*map(id, first.curves)] != [*map(id, own.curves)]:
+            raise InputError(phrase("plain.same-scanners", name=own.scanner.name))
+    return found
+
+
+def scanner_cells(machine: Machine) -> dict[str, Any]:
+    """Return the row of a scanner; components with a covariance matrix have no standard deviation."""
+    own, joined = machine.readings, {*map(id, machine.known.joined if machine.known else ())}
+    cells = dict(zip(_READINGS, (machine.scanner.name, own.pitch, *own.origin), strict=True))
+    cells |= {"rows_down": own.down, "hx": own.half_range[0], "hy": own.half_range[1]}
+    for k, each in enumerate((machine.scanner, *machine.curves)):
+        names = _WRITTEN[3 * k : 3 * k + 3]
+        sd = np.full(3, np.nan) if id(each) in joined else each.deviations[:3]
+        cells |= columns_of(names, each.position[:3]) | columns_of(deviation_columns(names), sd)
+    return cells
+
+
+def known_words(machine: Machine) -> list[str]:
+    """Return the names of the components with a joint prior in the table of covariances."""
+    parts = [machine.scanner, *machine.curves]
+    at = [next(k for k, each in enumerate(parts) if each is one) for one in machine.known.joined]  # type: ignore[union-attr]
+    return [word for k in at for word in _WORDS[3 * k : 3 * k + 3]]
 
 
 def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[str, FilmKind]:
@@ -227,3 +274,38 @@ def _needed(
         if column not in cells:
             raise table.cell_error(row, column, "plain.pattern", pattern=cells["pattern"])
     return [np.array([cells[column] for column in own]) for own in (columns, weights)]
+
+
+def film_cells(film: Film, roll: Roll | None, sd: Mapping[str, float | None]) -> dict[str, Any]:
+    """Return the row of a film on a roll, with standard deviations of its size, m, b1 and b2."""
+    held = film.size.deviations == 0
+    conformal = film.bend is None and bool(held[1:].all())
+    bend = "projective" if film.projective else "bilinear"
+    model = "conformal" if conformal else "affine" if film.bend is None else bend
+    cells: dict[str, Any] = {} if roll is None else {"film": roll.name}
+    cells |= {"model": model}
+    if roll is not None:
+        cells |= {"m": float(roll.position[0]), "sd_m": float(roll.deviations[0])}
+    cells |= {"sd_photo_m": sd["m"], "sd_b1": sd["b1"], "sd_b2": sd["b2"]}
+    if conformal:
+        cells |= {"sd_b1": None, "sd_b2": None}
+    if film.bend is not None:
+        cells |= columns_of(deviation_columns(BENDS[bend]), film.bend.deviations)
+    pattern = film.pattern
+    if pattern is None:
+        return cells | {"pattern": "none"}
+    local = isinstance(pattern, Reseau)
+    cells["pattern"] = LOCAL if local else pattern.kind
+    columns = GRID if pattern.kind == "grid" else ("half_format_mm",)
+    cells |= columns_of(columns, np.asarray(pattern.numbers, dtype=float))
+    if isinstance(pattern, Reseau):
+        weights = np.asarray(pattern.sd)
+        cells["sd_smooth"] = pattern.smooth
+    else:
+        weights = np.array([each.deviations for each in pattern.weights])
+        if any(each.position.any() for each in pattern.weights):
+            raise InputError(phrase("plain.pattern-weights", pattern=pattern.kind))
+        if pattern.kind == "grid" and (weights != weights[0]).any():
+            raise InputError(phrase("plain.grid-deviations"))
+        weights = weights[0] if pattern.kind == "grid" else weights.ravel()
+    return cells | {f"sd_w{k}": value for k, value in enumerate(weights.tolist(), 1)}

@@ -76,8 +76,10 @@ PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a 
 REQUIRED, SETTINGS = "required", "[sd]"  # Defaults of cells that may not be empty, or that the settings fill
 _TEXTS = frozenset(("text", "point", "photo", "shared", "group", "subject"))
 _GROUPS = {
-    "@parameters": {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
-    - {"f", "fx", "fy", "c", "cx", "cy", "x0", "y0", "s0"},
+    "@parameters": sorted(
+        {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
+        - {"f", "fx", "fy", "c", "cx", "cy", "x0", "y0", "s0"}
+    ),
     "@curves": CURVES,
 }
 """Names in `tables.csv` of many columns: other parameters of all cameras, and coefficients of polynomials."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -384,13 +384,21 @@ def correlations(
 
 
 def columns_of(names: Sequence[str], values: Floats) -> dict[str, Any]:
-    """Return (rows, k) numbers as columns by name."""
+    """Return (rows, k) numbers as columns, or (k,) numbers as cells, by name."""
     return dict(zip(names, values.T, strict=True))
 
 
-def columns_of_rows(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, Any]:
-    """Return rows of cells as columns by name; nothing without rows."""
-    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)) if rows else {}
+def columns_of_records(records: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return records, as of :meth:`Tables.records`, as columns by name; empty columns are omitted."""
+    rows = list(records)
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys(name for row in rows for name in row):
+        own = [row.get(name) for row in rows]
+        if all(cell is None or isinstance(cell, float) for cell in own):
+            found[name] = np.array(own, dtype=float)
+        elif any(cell not in (None, "") for cell in own):
+            found[name] = own
+    return {name: own for name, own in found.items() if isinstance(own, list) or not np.isnan(own).all()}
 
 
 def places_written(block: Block, values: Floats) -> Floats:

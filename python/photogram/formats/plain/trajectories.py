@@ -1,20 +1,33 @@
-"""Tables of trajectories: records, corrections, knots, coefficients."""
+"""Tables of trajectories: records, corrections, knots, coefficients; read and written."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.plain.schema import AXES, BASES, FACTORS, SD_AXES, VELOCITY
-from photogram.formats.plain.tables import Tables, check_complete, covariances_of, indices_of, made
+from photogram.formats.plain.schema import AXES, BASES, FACTORS, OPK, SD_AXES, VELOCITY
+from photogram.formats.plain.tables import (
+    DEGREE,
+    Tables,
+    angles_of,
+    check_complete,
+    columns_of,
+    columns_of_records,
+    correlations,
+    covariances_of,
+    indices_of,
+    made,
+)
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
-from photogram.network.observations import Observation, Smoothness
+from photogram.network.block import Block
+from photogram.network.observations import Observation, Smoothness, all_trajectories
+from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import (
     Angles,
     Basis,
@@ -31,6 +44,7 @@ _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
     "body_rotations",
 )
+Place = tuple[str, str, int]  # Trajectory, position or rotation, and number of a coefficient
 Groups = Mapping[tuple[str, ...], Indices]  # Rows of a table by subject
 
 
@@ -262,3 +276,156 @@ def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> l
             terms = own[k : k + len(given)], given, turn @ observed[row]
             found[row] = made(table, row, Smoothness, *terms, **more)
     return [found[row] for row in sorted(found)]
+
+
+def shared_trajectories(block: Block) -> list[Trajectory]:
+    """Return trajectories of a block, except trajectories of single photos."""
+    own = [each.trajectory for each in block.timed if each.trajectory is not None]
+    found = all_trajectories(own, block.observations)
+    names = [each.name for each in found]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(phrase("error.repeated", kind="trajectory", name=twice))
+    return found
+
+
+def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
+    """Return the tables of the trajectories of a block."""
+    own = shared_trajectories(block)
+    if not own:
+        return {}
+    tables = [each.table for each in own]
+    velocities = np.vstack(
+        [each.positions * np.nan if each.velocities is None else each.velocities for each in tables]
+    )
+    bodies = [(each.name, each.body[0], np.swapaxes(each.body[1], 1, 2)) for each in own if each.body]
+    bases = [
+        (each, kind, basis)
+        for each in own
+        for kind, basis in zip(BASES, (each.position, each.rotation), strict=True)
+        if basis is not None
+    ]
+    found = {
+        "trajectories": columns_of_records(map(_cells, own)),
+        "trajectory_positions": _dated([(each.name, each.table.times) for each in own])
+        | columns_of(AXES, np.vstack([each.positions for each in tables]))
+        | ({} if np.isnan(velocities).all() else columns_of(VELOCITY, velocities)),
+        "trajectory_attitudes": _turns_written(
+            [(each.name, each.table.attitude_times, each.table.attitudes) for each in own], block
+        ),
+        "body_rotations": _turns_written(bodies, block) if bodies else {},
+        "trajectory_knots": columns_of_records(
+            {"trajectory": each.name, "of": kind, "knot": float(knot)}
+            for each, kind, basis in bases
+            if isinstance(basis, Spline)
+            for knot in np.asarray(basis.knots)
+        ),
+        "trajectory_coefficients": columns_of_records(
+            {"trajectory": each.name, "of": kind, "k": k}
+            | columns_of(AXES, one.position * _unit(kind))
+            | columns_of(SD_AXES, one.deviations * _unit(kind))
+            for each, kind, _ in bases
+            if _common_sd(each, BASES.index(kind)) is None
+            for k, one in enumerate(each.coefficients[BASES.index(kind)])
+        ),
+    }
+    return {name: columns for name, columns in found.items() if columns}
+
+
+def _unit(kind: str) -> float:
+    """Return the table units per unit of coefficients."""
+    return DEGREE if kind == "rotation" else 1.0
+
+
+def _cells(own: Trajectory) -> dict[str, Any]:
+    """Return the row of a trajectory."""
+    found: dict[str, Any] = {
+        "trajectory": own.name,
+        "interpolation": own.table.interpolation,
+        "attitude_interpolation": own.table.attitude_interpolation,
+        "position_axes": "" if own.position_axes == "table" else own.position_axes,
+        "angles": "" if own.angles == "vector" else own.angles,
+    }
+    for k, (kind, basis) in enumerate(zip(BASES, (own.position, own.rotation), strict=True)):
+        words = {Polynomial: "polynomial", Spline: "spline"}
+        cells: dict[str, Any] = {"": "none" if basis is None else words[type(basis)]}
+        cells |= {f"_{name}": getattr(basis, name, None) for name in _ALL[:3]}
+        found |= {f"{kind}{name}": cell for name, cell in cells.items()}
+        for name in _ALL[4:]:
+            if (pair := getattr(basis, name, None)) is not None:
+                found |= {f"{kind}_{name}": pair[0], f"sd_{kind}_{name}": float(pair[1]) * _unit(kind)}
+        if (sd := _common_sd(own, k)) is not None:
+            found[f"sd_{kind}"] = sd * _unit(kind)
+    return found
+
+
+def _common_sd(own: Trajectory, which: int) -> float | None:
+    """Return the common standard deviation of coefficients of 0, else None."""
+    coefficients = own.coefficients[which]
+    sd = {value for each in coefficients for value in each.deviations.tolist()}
+    alike = len(sd) == 1 and not any(each.position.any() for each in coefficients)
+    return sd.pop() if alike else None
+
+
+def _dated(parts: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the columns of names and times."""
+    names = [name for name, times in parts for _ in np.asarray(times)]
+    return {"trajectory": names, "time": np.concatenate([times for _, times in parts])}
+
+
+def _turns_written(parts: Sequence[tuple[str, Any, Any]], block: Block) -> dict[str, Any]:
+    angles = angles_of(np.concatenate([matrices for *_, matrices in parts]), block)
+    return _dated([part[:2] for part in parts]) | columns_of(OPK, angles)
+
+
+def smoothness_table(block: Block) -> dict[str, Any]:
+    """Return the table of sums of neighbouring coefficients."""
+    own = [(each, place) for each, place in _beside(block) if place is not None]
+    if not own:
+        return {}
+    units = np.array([_unit(place[1]) for _, place in own])[:, np.newaxis]
+    covariances = np.array([each.precision for each, _ in own]) * units[:, :, np.newaxis] ** 2
+    sums = np.array([each.observed[:3] for each, _ in own]) * units
+    sd = np.sqrt(np.einsum("nii->ni", covariances))
+    rows = (
+        dict(zip(("trajectory", "of", "k"), place, strict=True))
+        | dict(zip(FACTORS, np.asarray(each.factors), strict=False))
+        | columns_of((*AXES, *SD_AXES), np.concatenate(numbers))
+        for (each, place), *numbers in zip(own, sums, sd, strict=True)
+    )
+    return columns_of_records(rows) | correlations(covariances, AXES)
+
+
+def lost_smoothness(block: Block) -> int:
+    """Return the number of sums that the table cannot contain."""
+    return sum(place is None for _, place in _beside(block))
+
+
+def _beside(block: Block) -> list[tuple[Smoothness, Place | None]]:
+    """Return sums not defined by splines, each with its first key."""
+    shared = shared_trajectories(block)
+    places = {
+        id(each): (trajectory.name, of, k)
+        for trajectory in shared
+        for of, own in zip(BASES, trajectory.coefficients, strict=True)
+        for k, each in enumerate(own)
+    }
+    made_by_splines = {_content(each) for trajectory in shared for each in smoothness_of(trajectory)}
+    own = [each for each in block.observations if isinstance(each, Smoothness)]
+    return [
+        (each, _first(each.coefficients, places)) for each in own if _content(each) not in made_by_splines
+    ]
+
+
+def _content(each: Observation) -> tuple[object, ...]:
+    return (*map(id, each.unknowns), each.observed.tobytes(), each.precision.tobytes())
+
+
+def _first(coefficients: Sequence[object], places: Mapping[int, Place]) -> Place | None:
+    """Return the key of the first of neighbouring coefficients; None for others."""
+    found = [places.get(id(each)) for each in coefficients]
+    first = found[0]
+    if first is None or len(found) > len(FACTORS):
+        return None
+    expected = [(*first[:2], first[2] + k) for k in range(len(found))]
+    return first if found == expected else None

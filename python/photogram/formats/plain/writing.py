@@ -15,7 +15,7 @@ from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_t
 from photogram.formats.plain.cameras import knots_table
 from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
-from photogram.formats.plain.films_written import WrittenFilms
+from photogram.formats.plain.films import WrittenFilms
 from photogram.formats.plain.keys import asked_files, key_tables
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
 from photogram.formats.plain.observations import observation_tables
@@ -24,7 +24,7 @@ from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import columns_of, correlations, places_written, signs_in_files
-from photogram.formats.plain.trajectories_written import lost_smoothness, smoothness_table, trajectory_tables
+from photogram.formats.plain.trajectories import lost_smoothness, smoothness_table, trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.io.files import read_text
