@@ -15,10 +15,9 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
 from photogram.network.moving_photos import Moment
 from photogram.results.footprints import CONFIDENCE, ellipses, fitting_scale, footprints
-from photogram.results.network_tables import point_axes
 from photogram.results.result import Result
+from photogram.results.tables import ComponentTests, Tests
 from photogram.statistics.limits import normal_limit
-from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     import geopandas
@@ -291,97 +290,48 @@ def _suspicious(found: Placed) -> _Part:
     """Return observations with large test values, the largest first."""
     import shapely
 
-    result = found.result
-    tests = [np.where(result.redundancy > TESTABLE, result.standardized, np.nan)]
-    tests += [result.control.standardized, result.stations.standardized]
-    tests += [each.standardized for each in result.kinds.values()]
-    limit = normal_limit(max(sum(int(np.isfinite(each).sum()) for each in tests), 1))
-    places = np.full((len(result.block.point_ids), 3), np.nan)
-    places[found.rows] = found.points
-    rows = [*_images(result, tests[0], places), *_observed(found, places), *_beside_images(found, places)]
-    rows.sort(key=lambda each: -abs(each[1]["test"]))
+    tests = Tests(found.result).normal
+    limit = normal_limit(max(sum(int(np.isfinite(each.values).sum()) for each in tests), 1))
+    rows = sorted(_large_tests(found, tests), key=lambda each: -abs(each[1]["test"]))
     columns = {name: [own.get(name) for _, own in rows] for name in _SUSPECT}
     columns["beyond"] = [abs(own["test"]) > limit for _, own in rows]
     columns["limit"] = [limit] * len(rows)
     return shapely.points(np.array([at for at, _ in rows])) if rows else [], columns
 
 
-_Suspect = tuple[Floats, dict[str, Any]]  # The position of an observation, and its attributes
-
-
-def _images(result: Result, tests: Floats, places: Floats) -> Iterator[_Suspect]:
-    block = result.block
-    for image, axis in _beyond(tests):
-        point = int(block.image_points[image])
-        yield (
-            places[point],
-            {
-                "what": f"image {'xy'[axis]}",
-                "photo": block.photo_ids[int(block.image_photos[image])],
-                "point": block.point_ids[point],
-                "x": float(block.image_xy[image, 0]),
-                "y": float(block.image_xy[image, 1]),
-                "residual": float(result.residuals[image, axis]),
-                "unit": block.image_unit,
-                "test": float(tests[image, axis]),
-            },
-        )
-
-
-def _observed(found: Placed, places: Floats) -> Iterator[_Suspect]:
-    """Return components of control and stations."""
-    result, block = found.result, found.result.block
-    names = (*(axis.name for axis in point_axes(result.block)), *_ANGLES)
-    units = (
-        *(("rad", "rad") if block.geographic else (block.linear_unit,) * 2),
-        block.linear_unit,
-        *("rad",) * 3,
+def _large_tests(found: Placed, types: Sequence[ComponentTests]) -> Iterator[tuple[Floats, dict[str, Any]]]:
+    """Yield position and attributes of suspicious components, at their first point or photo."""
+    block, kinds = found.result.block, found.result.kinds
+    places = np.full((len(block.point_ids), 3), np.nan)
+    places[found.rows] = found.points
+    point_rows, photo_rows = (
+        {name: row for row, name in enumerate(own)} for own in (block.point_ids, block.photo_ids)
     )
-    for what, given, kind, ids, at in (
-        ("control", result.control, "point", block.point_ids, places),
-        ("station", result.stations, "photo", block.photo_ids, found.photos),
-    ):
-        for row, k in _beyond(given.standardized):
-            index = int(given.rows[row])
-            yield (
-                at[index],
-                {
-                    "what": f"{what} {names[k]}",
-                    kind: ids[index],
-                    "residual": float(given.residuals[row, k]),
-                    "unit": units[k],
-                    "test": float(given.standardized[row, k]),
-                },
-            )
-
-
-def _beside_images(found: Placed, places: Floats) -> Iterator[_Suspect]:
-    """Return components of other observations, at their first point or photo."""
-    block = found.result.block
-    points = {name: row for row, name in enumerate(block.point_ids)}
-    photos = {name: row for row, name in enumerate(block.photo_ids)}
-    for kind in found.result.kinds.values():
-        for row, k in _beyond(kind.standardized):
-            each = block.observations[int(kind.rows[row])]
-            if not (each.points or each.photos):
-                continue
-            if each.points:
-                at = places[points[each.points[0]]]
-            elif each.moment is not None:
-                at = _flown(found, each.moment)
+    for tests in types:
+        for row, k in np.argwhere(np.abs(tests.values) > SUSPICIOUS).tolist():
+            axis, moment = tests.axes[k], None
+            own: dict[str, Any] = {"what": f"{tests.type} {axis.name}"}
+            if tests.points is not None or tests.photos is not None:
+                point = None if tests.points is None else block.point_ids[tests.points[row]]
+                photo = None if tests.photos is None else block.photo_ids[tests.photos[row]]
             else:
-                at = found.photos[photos[each.photos[0]]]
-            yield (
-                at,
-                {
-                    "what": f"{kind.kind} {kind.components[k]} of {kind.names[row]}",
-                    "photo": each.photos[0] if each.photos and each.moment is None else None,
-                    "point": each.points[0] if each.points else None,
-                    "residual": float(kind.residuals[row, k]),
-                    "unit": kind.units[k],
-                    "test": float(kind.standardized[row, k]),
-                },
-            )
+                kind = kinds[tests.type]
+                own["what"] += f" of {kind.names[row]}"
+                each = block.observations[int(kind.rows[row])]
+                if not (each.points or each.photos):
+                    continue
+                point, photo = next(iter(each.points), None), next(iter(each.photos), None)
+                moment, photo = each.moment, photo if each.moment is None else None
+            if tests.type == "image":
+                own |= zip("xy", block.image_xy[row].tolist(), strict=True)
+            own |= {"photo": photo, "point": point, "unit": axis.unit}
+            own |= {"residual": float(tests.residuals[row, k]), "test": float(tests.values[row, k])}
+            if point is not None:
+                yield places[point_rows[point]], own
+            elif moment is not None:
+                yield _flown(found, moment), own
+            else:
+                yield found.photos[photo_rows[photo]], own
 
 
 def _flown(found: Placed, moment: Moment) -> Floats:
@@ -392,11 +342,6 @@ def _flown(found: Placed, moment: Moment) -> Floats:
     if spheroid is not None:
         places = geocentric_to_geographic(places, spheroid)
     return np.asarray(found.carried(places)[0])
-
-
-def _beyond(tests: Floats) -> list[list[int]]:
-    found: list[list[int]] = np.argwhere(np.abs(tests) > SUSPICIOUS).tolist()
-    return found
 
 
 _SUSPECT = ("what", "photo", "point", "x", "y", "residual", "unit", "test")
