@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast, get_args
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
-from photogram.formats.plain.tables import Tables, columns_of, made, signs_in_files
+from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
@@ -65,12 +65,9 @@ def read_cameras(tables: Tables) -> Cameras:
     certificates = read_certificates(tables)
     found.certificates.update(certificates)
     in_mm = []
-    for row, own in enumerate(_rows(tables, table)):
-        if found.lines[row] is not None:
-            own = own.behind_a_lens(table, row)
-        if own.each not in _EACH:
-            raise table.cell_error(row, "for_each", "error.choice", names=list(_EACH), value=own.each)
-        size = _size(table, row, own)
+    for row, cells in enumerate(zip(table.names_once("camera"), tables.records("cameras"), strict=True)):
+        own = _row(table, row, *cells, behind_a_lens=found.lines[row] is not None)
+        size = _size(table, row, cells[1])
         parts = 1000.0 if tables.settings.image == "um" else 1.0
         if size is not None and found.lines[row] is None:
             parts, converted = _from_mm(tables.settings.image, table, row, own, size[0], parts)
@@ -136,8 +133,7 @@ def _of_camera(
     return certificate
 
 
-@dataclass(frozen=True)
-class _Row:
+class _Row(NamedTuple):
     """One row of the table; existing numbers by column name."""
 
     name: str
@@ -145,43 +141,38 @@ class _Row:
     model: str
     weights: str
     calibration: str
-    width: float | None
-    height: float | None
     pixel_mm: float | None
     values: dict[str, float]
     deviations: dict[str, float]
 
-    def behind_a_lens(self, table: ColumnTable, row: int) -> _Row:
-        """Return the row without the parameters of the line sensor."""
-        model = "brown" if self.model == LINE else self.model
+
+def _row(table: ColumnTable, row: int, name: str, cells: Mapping[str, Any], *, behind_a_lens: bool) -> _Row:
+    """Return a row; the columns of a line sensor `behind_a_lens` are not parameters of the lens."""
+    words = (("for_each", "all"), ("model", ""), ("weights", "corrected"))
+    each, model, weights = (cells.get(column, default).lower() for column, default in words)
+    values = {column: value for column, value in cells.items() if column in _ALL}
+    sd = {column[3:]: value for column, value in cells.items() if column.startswith("sd_")}
+    if behind_a_lens:
+        model = "brown" if model == LINE else model
         own = {name.lower() for name, _ in _MODELS[model][1]} if model in _MODELS else set()
         if both := own.intersection(OF_LINES):
             raise table.cell_error(row, min(both), "plain.line-parameter", model=model)
-        if unknown := [name for name in OF_LINES if self.deviations.get(name)]:
+        if unknown := [column for column in OF_LINES if sd.get(column)]:
             raise table.cell_error(row, f"sd_{unknown[0]}", "plain.line-sd")
-        values = {name: value for name, value in self.values.items() if name not in OF_LINES}
-        return replace(self, model=model, values=values)
+        values = {column: value for column, value in values.items() if column not in OF_LINES}
+    if each not in _EACH:
+        raise table.cell_error(row, "for_each", "error.choice", names=list(_EACH), value=each)
+    return _Row(name, each, model, weights, cells.get("calibration", ""), cells.get("pixel_mm"), values, sd)
 
 
-def _rows(tables: Tables, table: ColumnTable) -> Iterator[_Row]:
-    """Yield the rows."""
-    for name, cells in zip(table.names_once("camera"), tables.records("cameras"), strict=True):
-        words = (("for_each", "all"), ("model", ""), ("weights", "corrected"))
-        each, model, weights = (cells.get(column, default).lower() for column, default in words)
-        width, height, pixel_mm = (cells.get(column) for column in ("width", "height", "pixel_mm"))
-        values = {column: value for column, value in cells.items() if column in _ALL}
-        sd = {column[3:]: value for column, value in cells.items() if column.startswith("sd_")}
-        calibration = cells.get("calibration", "")
-        yield _Row(name, each, model, weights, calibration, width, height, pixel_mm, values, sd)
-
-
-def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:
-    if own.width is None or own.height is None:
+def _size(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Size | None:
+    if not {"width", "height"} <= cells.keys():
         return None
-    for name, value in (("width", own.width), ("height", own.height)):
-        if not (0 < value < 2**31 and value == int(value)):
-            raise table.cell_error(row, name, "error.whole-range", low=1, high=2**31 - 1, value=value)
-    return int(own.width), int(own.height)
+    for name in ("width", "height"):
+        if not (0 < cells[name] < 2**31 and cells[name] == int(cells[name])):
+            fields = {"low": 1, "high": 2**31 - 1, "value": cells[name]}
+            raise table.cell_error(row, name, "error.whole-range", **fields)
+    return int(cells["width"]), int(cells["height"])
 
 
 def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Camera:
@@ -276,31 +267,23 @@ def spread_over_photos(
             places[row, own] = len(found.cameras)
             camera = cameras.cameras[row]
             found.cameras.append(camera.replace(name=f"{camera.name}/{own}") if own else camera)
-            found.sizes.append(cameras.sizes[row])
-            found.pixel_mm.append(cameras.pixel_mm[row])
             found.for_each.append("all")
-            found.weights_given.append(cameras.weights_given[row])
-            found.shutters.append(cameras.shutters[row])
-            found.lines.append(cameras.lines[row])
+            for name in ("sizes", "pixel_mm", "weights_given", "shutters", "lines"):
+                getattr(found, name).append(getattr(cameras, name)[row])
         of_photos.append(places[row, own])
     return found, of_photos
 
 
 def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
     """Return the columns of the knots of cameras, row by row; empty without knots."""
-    own = [(each.name, *both) for each in cameras if (both := _both(each)) is not None]
-    if not own:
-        return {}
-    places = [np.indices(knots.shape[:2]).reshape(2, -1) for _, knots, _ in own]
-    values = np.concatenate([knots.reshape(-1, 2) for _, knots, _ in own])
-    sd = np.concatenate([each.reshape(-1, 2) for _, _, each in own])
-    return {
-        "camera": [name for (name, *_), place in zip(own, places, strict=True) for _ in place[0]],
-        "i": np.concatenate([place[1] for place in places]),
-        "j": np.concatenate([place[0] for place in places]),
-        **columns_of(("dx", "dy"), values),
-        **columns_of(_SD, sd),
-    }
+    return columns_of_records(
+        {"camera": each.name, "i": i, "j": j}
+        | columns_of(("dx", "dy"), both[0][j, i])
+        | columns_of(_SD, both[1][j, i])
+        for each in cameras
+        if (both := _both(each)) is not None
+        for j, i in np.ndindex(both[0].shape[:2])
+    )
 
 
 def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
