@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import (
     FilmModel,
-    Interior,
     conformal,
     interior_orientation,
 )
@@ -83,31 +81,19 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
     if scanned.any():
         if tables.settings.image == "um":
             raise InputError(phrase("plain.film-unit"), file=tables.settings.path)
-        before = tables.settings.interior == "before"
-        _Reader(tables, seen, covariances, films, before=before).read(found)
-        if before:
-            inside = Scanned(scanned)
-            silent = replace(tables, messages=[])
-            _Reader(silent, seen, covariances, films, before=False).read(inside)
-            found.inside[INSIDE] = inside.scans, inside.observations
+        reader = _Reader(tables, seen, covariances, films)
+        reader.read(found)
+        if tables.settings.interior == "before":
+            inside = {INSIDE: (found.scans, found.observations)}
+            return Scanned(scanned, reader.fitted(found.scans), inside=inside)
     return found
 
 
 class _Reader:
-    def __init__(
-        self,
-        tables: Tables,
-        seen: Seen,
-        covariances: Covariances,
-        films: Sequence[str],
-        *,
-        before: bool,
-    ) -> None:
+    def __init__(self, tables: Tables, seen: Seen, covariances: Covariances, films: Sequence[str]) -> None:
         photos, certificates = seen.photos, seen.cameras.certificates
         self.seen = seen
         self.tables, self.table, self.covariances = tables, photos.table, covariances
-        self.before = before
-        self._held: dict[int, Machine] = {}
         machines = read_scanners(tables, covariances)
         self.comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
@@ -125,23 +111,16 @@ class _Reader:
         self.marks.read(photos)
 
     def _machine(self, row: int, name: str, machines: Mapping[str, Machine]) -> Machine:
-        if not name and len(machines) == 1:
-            own = next(iter(machines.values()))
-        elif not name and not machines:
-            own = self.comparator
-        elif name not in machines:
+        if not name and len(machines) <= 1:
+            return next(iter(machines.values()), self.comparator)
+        if name not in machines:
             raise self.table.unknown_error(row, "scanner", "scanner", name, machines)
-        else:
-            own = machines[name]
-        return self._held.setdefault(id(own), own.held()) if self.before else own
+        return machines[name]
 
     def read(self, found: Scanned) -> None:
         """Add the scans and observations of all photos to the result."""
         marks = {
-            camera: {
-                name: Mark(f"{camera} {name}", place, 0.0 if self.before else np.inf)
-                for name, place in own.items()
-            }
+            camera: {name: Mark(f"{camera} {name}", place, np.inf) for name, place in own.items()}
             for camera, own in self.places.items()
         }
         starts = self._starts()
@@ -149,8 +128,6 @@ class _Reader:
         for photo, (mirrored, start) in zip(self.photos, starts, strict=True):
             film = self._film(photo, mirrored, start)
             found.scans.append(Scan(photo.name, film))
-            if self.before:
-                continue
             found.observations.extend(self._known(photo, film))
             if isinstance(film.pattern, Reseau):
                 own = film.pattern
@@ -160,14 +137,13 @@ class _Reader:
                 for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
             )
             model = self.kinds[photo.film].model
-            if len(photo.marks) < LEAST[model]:
+            if len(photo.marks) < LEAST[model] and self.tables.settings.interior != "before":
                 fields = {"photo": photo.name, "n": len(photo.marks), "least": LEAST[model], "model": model}
                 self.tables.remark("plain.few-fiducials", **fields)
-        if not self.before:
-            read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
-            found.observations.extend(self.fiducials.known(marks, read, self.covariances))
-            machines = {id(each.machine): each.machine for each in self.photos}
-            found.observations.extend(each.known for each in machines.values() if each.known is not None)
+        read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
+        found.observations.extend(self.fiducials.known(marks, read, self.covariances))
+        machines = {id(each.machine): each.machine for each in self.photos}
+        found.observations.extend(each.known for each in machines.values() if each.known is not None)
 
     def _tell_beyond(self, sides: Sequence[bool]) -> None:
         """Report images beyond the distortion table of the certificate of their camera."""
@@ -226,60 +202,62 @@ class _Reader:
 
     def _film(self, photo: ScannedPhoto, mirrored: bool, start: Floats) -> Film:
         kind, machine = self.kinds[photo.film], photo.machine
-        placement = partial(FilmPlacement, photo.name, start)
-        roll, bend, pattern = None, None, kind.pattern
-        if kind.reseau is not None and not self.before:
-            pattern = kind.reseau(photo.name)
         held = np.array(kind.sd_size) == 0
-        size = [0.0, 0.0, 0.0]
-        bend_sd = np.array(kind.sd_bend)
-        bend_at: Floats = np.zeros(2)
-        if self.before:
-            fit = self._fitted(photo, mirrored)
-            placement = partial(FilmPlacement, photo.name, fit.film[:3], 0.0)
-            size, bend_at = fit.film[3:].tolist(), fit.bend
-            held[:], bend_sd = True, np.zeros(2)
-            pattern = None if kind.reseau is None else kind.reseau(photo.name, fit.shifts)
-        elif held[0]:
-            roll = kind.roll
-        else:
-            size[0] = float(kind.roll.position[0])
+        roll, size, bend = kind.roll, [0.0, 0.0, 0.0], None
+        if not held[0]:
+            roll, size[0] = None, float(kind.roll.position[0])
         if kind.model == "conformal":
             held[1:] = True
         if kind.model in ("bilinear", "projective"):
-            bend = FilmBend(photo.name, bend_at, bend_sd)
-        own = FilmSize(photo.name, size, np.where(held, 0.0, np.inf))
+            bend = FilmBend(photo.name, np.zeros(2), np.array(kind.sd_bend))
         return Film(
-            placement(),
-            own,
+            FilmPlacement(photo.name, start),
+            FilmSize(photo.name, size, np.where(held, 0.0, np.inf)),
             machine.scanner,
             machine.readings,
             bend=bend,
             projective=kind.model == "projective",
             roll=roll,
             curves=machine.curves,
-            pattern=pattern,
+            pattern=kind.pattern if kind.reseau is None else kind.reseau(photo.name),
             mirrored=mirrored,
         )
 
-    def _fitted(self, photo: ScannedPhoto, mirrored: bool) -> Interior:
-        """Return the film of a photo fitted to its marks only."""
-        kind = self.kinds[photo.film]
-        model: FilmModel = kind.model  # type: ignore[assignment]
-        return made(
-            self.table,
-            photo.row,
-            interior_orientation,
-            self.marks.places_of(photo),
-            np.array(photo.readings).reshape(-1, 2),
-            model,
-            sd=np.array(photo.sd),
-            counted=photo.machine.readings,
-            scanner=photo.machine.scanner,
-            curves=photo.machine.curves,
-            mirrored=mirrored,
-            reseau=None if kind.reseau is None else kind.reseau(photo.name),
-        )
+    def fitted(self, scans: Sequence[Scan]) -> list[Scan]:
+        """Return fixed films, fitted to their marks only, with fixed scanners."""
+        held: dict[int, Machine] = {}
+        found = []
+        for photo, scan in zip(self.photos, scans, strict=True):
+            kind, film, machine = self.kinds[photo.film], scan.film, photo.machine
+            reseau = kind.reseau
+            model: FilmModel = kind.model  # type: ignore[assignment]
+            fit = made(
+                self.table,
+                photo.row,
+                interior_orientation,
+                self.marks.places_of(photo),
+                np.array(photo.readings).reshape(-1, 2),
+                model,
+                sd=np.array(photo.sd),
+                counted=machine.readings,
+                scanner=machine.scanner,
+                curves=machine.curves,
+                mirrored=film.mirrored,
+                reseau=None if reseau is None else reseau(photo.name),
+            )
+            fixed = held.setdefault(id(machine), machine.held())
+            film = replace(
+                film,
+                placement=FilmPlacement(photo.name, fit.film[:3], 0.0),
+                size=FilmSize(photo.name, fit.film[3:].tolist(), np.zeros(3)),
+                scanner=fixed.scanner,
+                curves=fixed.curves,
+                roll=None,
+                bend=None if film.bend is None else FilmBend(photo.name, fit.bend, np.zeros(2)),
+                pattern=None if reseau is None else reseau(photo.name, fit.shifts),
+            )
+            found.append(Scan(photo.name, film))
+        return found
 
     def _known(self, photo: ScannedPhoto, film: Film) -> list[Observation]:
         """Return prior observations of a film; empty if it is free."""
