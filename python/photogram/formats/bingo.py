@@ -26,6 +26,7 @@ from photogram.formats.reduced_coordinates import (
     reduced_images,
 )
 from photogram.io.csv_text import csv_text
+from photogram.io.places import one_word
 from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, phrase
 
@@ -65,10 +66,7 @@ def _orientation(path: Path, block: ReducedBuilder, options: ReadOptions) -> Non
     for card in cards(path):
         if not card.words or card.ends:
             continue
-        if card.words[0] != "ORIA":
-            raise card.place.error(
-                phrase("format.unknown", what="keyword", value=card.words[0], names=["ORIA"])
-            )
+        one_word(card.place, "keyword", card.words[0], ["ORIA"])
         if len(card.words) < 9:
             raise card.place.error(phrase("format.member", name="photo, camera, X, Y, Z, omega, phi, kappa"))
         angles = to_radians(card.numbers(6, "omega phi kappa"), unit)

@@ -27,6 +27,7 @@ from photogram.formats.column_words import (
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import NAMELESS
 from photogram.io.numbers import finite_number, scaled
+from photogram.io.places import one_word
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.words import Phrase, phrase, quoted
@@ -179,9 +180,7 @@ def settled(
         each for each in (*columns.headings.values(), *columns.ignored) if not _places(each, table.own)
     ]
     if missing and not columns.order:
-        raise table.head.error(
-            phrase("format.unknown", what="heading in --columns", value=missing[0], names=list(table.own))
-        )
+        one_word(table.head, "heading in --columns", missing[0], table.own)
     if "point" in required:
         table = _with_points(table, names, messages)
     if lacking := [each for each in required if each not in table]:

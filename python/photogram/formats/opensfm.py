@@ -22,7 +22,7 @@ from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_lines
 from photogram.io.json import Tree, read_json, to_json, unknown
 from photogram.io.numbers import finite_number
-from photogram.io.places import Place, at_place
+from photogram.io.places import Place, at_place, one_word, positive
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
@@ -166,8 +166,7 @@ def _gps(shots: dict[str, Tree], options: ReadOptions, messages: list[Message]) 
     for name in given:
         dop = shots[name].get("gps_dop", UNKNOWN_DOP)
         sd = np.broadcast_to(options.sd.get("gnss", (dop.number(),)), 3).copy()
-        if not (sd > 0).all():
-            raise dop.error(phrase("format.positive", name="the standard deviation", value=float(sd.min())))
+        positive(dop, "the standard deviation", float(sd.min()))
         if level:
             sd[2] = NO_HEIGHT
         deviations.append(sd)
@@ -194,9 +193,7 @@ def _tracks(
     lines = read_lines(path)
     width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
     if lines and not width and lines[0].startswith("OPENSFM_TRACKS_VERSION"):
-        raise Place(path, 1, lines[0]).error(
-            phrase("format.unknown", what="version", value=lines[0], names=list(_VERSIONS))
-        )
+        one_word(Place(path, 1, lines[0]), "version", lines[0], _VERSIONS)
     first = 1 if width else 0
     width = width or _FIRST
     photo_rows = {name: row for row, name in enumerate(names)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +31,27 @@ def at_place(place: Failing, what: str | Phrase = "") -> Iterator[None]:
             raise
         message = message_of(error)
         raise place.error(phrase("error.at", what=what, message=message) if what else message) from None
+
+
+def positive(place: Failing, name: str, value: float) -> float:
+    """Return a number of a file; reject a number that is not positive."""
+    if not value > 0:
+        raise place.error(phrase("format.positive", name=name, value=value))
+    return value
+
+
+def one_word(place: Failing, what: str, value: str, names: Collection[str]) -> str:
+    """Return a word of a file; reject a word that is not one of some names."""
+    if value not in names:
+        raise place.error(phrase("format.unknown", what=what, value=value, names=list(names)))
+    return value
+
+
+def image_size(place: Failing, width: float, height: float) -> tuple[int, int]:
+    """Return width and height of images of a file; reject sizes that are not whole and positive."""
+    if not all(0 < side < 2**31 and side == int(side) for side in (width, height)):
+        raise place.error(phrase("format.size", width=width, height=height))
+    return int(width), int(height)
 
 
 @dataclass(frozen=True, slots=True)

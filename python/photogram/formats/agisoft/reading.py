@@ -17,7 +17,7 @@ from photogram.formats.images import Y_DOWN, checked_rotation
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
-from photogram.io.places import at_place
+from photogram.io.places import at_place, image_size, one_word, positive
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.words import Phrase, option_sd, phrase
@@ -101,24 +101,14 @@ def _sensors(chunk: Element, block: BlockBuilder) -> None:
 
 def _sensor(element: Element, name: str, messages: list[Message]) -> tuple[Camera, Size, float | None]:
     kind = element.attributes.get("type", "frame")
+    one_word(element, "type of the sensor", kind, ("frame", "fisheye", "spherical"))
     resolution = element.need("resolution")
     width, height = resolution.attribute("width"), resolution.attribute("height")
-    if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
-        raise resolution.error(phrase("format.size", width=width, height=height))
-    size = int(width), int(height)
+    size = image_size(resolution, width, height)
     properties = _properties(element.all("property"), "pixel_width", "focal_length")
     pixel = properties.get("pixel_width") or None
     if kind == "spherical":
         return Camera("equirectangular", {"w": width, "h": height}, name=name), size, pixel
-    if kind not in ("frame", "fisheye"):
-        raise element.error(
-            phrase(
-                "format.unknown",
-                what="type of the sensor",
-                value=kind,
-                names=["frame", "fisheye", "spherical"],
-            )
-        )
     by_class = {each.attributes.get("class", ""): each for each in element.all("calibration")}
     calibration = by_class.get("adjusted") or by_class.get("initial")
     values = {"w": width, "h": height}
@@ -184,9 +174,7 @@ def _similarity(element: Element | None) -> _Similarity | None:
     rotation = None if element is None else element.child("rotation")
     if element is None or rotation is None:
         return None
-    scale = element.number("scale", 1.0)
-    if not scale > 0:
-        raise element.error(phrase("format.positive", name="the scale", value=scale))
+    scale = positive(element, "the scale", element.number("scale", 1.0))
     shift = element.child("translation")
     translation = np.zeros(3) if shift is None else shift.numbers(3)
     return _Similarity(checked_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)

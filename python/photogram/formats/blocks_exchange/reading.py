@@ -18,7 +18,7 @@ from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
-from photogram.io.places import at_place
+from photogram.io.places import at_place, image_size, one_word, positive
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -94,19 +94,10 @@ def read(path: Path, options: ReadOptions) -> Project:
 
 def _group(found: _Reader, element: Element) -> None:
     dimensions = element.need("ImageDimensions")
-    size = dimensions.whole("Width"), dimensions.whole("Height")
-    if not (0 < size[0] < 2**31 and 0 < size[1] < 2**31):
-        raise dimensions.error(phrase("format.size", width=size[0], height=size[1]))
-    kind = element.word("CameraModelType", "Perspective")
-    if kind != "Perspective":
-        raise element.error(
-            phrase("format.unknown", what="CameraModelType", value=kind, names=["Perspective"])
-        )
+    size = image_size(dimensions, dimensions.whole("Width"), dimensions.whole("Height"))
+    one_word(element, "CameraModelType", element.word("CameraModelType", "Perspective"), ["Perspective"])
     orientation = element.word("CameraOrientation", "XRightYDown")
-    if orientation not in ORIENTATIONS:
-        raise element.error(
-            phrase("format.unknown", what="CameraOrientation", value=orientation, names=list(ORIENTATIONS))
-        )
+    one_word(element, "CameraOrientation", orientation, ORIENTATIONS)
     axes = np.array(ORIENTATIONS[orientation], dtype=float)
     pixel = _pixel(element, size)
     name = f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
@@ -126,9 +117,7 @@ def _pixel(element: Element, size: Size) -> float | None:
         pixel = element.number("SensorSize") / max(size)
     else:
         return None
-    if not pixel > 0:
-        raise element.error(phrase("format.positive", name="the size of the sensor", value=pixel))
-    return pixel
+    return positive(element, "the size of the sensor", pixel)
 
 
 def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, name: str) -> Camera:
@@ -167,9 +156,7 @@ def _terms(element: Element) -> dict[str, float]:
         if each.name in _TERMS:
             found[each.name] = each.value
         elif each.text.strip() not in ("", "0", "0.0", "false"):
-            raise each.error(
-                phrase("format.unknown", what="term of the distortion", value=each.name, names=list(_TERMS))
-            )
+            one_word(each, "term of the distortion", each.name, _TERMS)
     return found
 
 
@@ -212,18 +199,13 @@ def _rotation(element: Element) -> Floats:
 def _control(found: _Reader, element: Element) -> None:
     name = element.word("Name") or f"control {len(found.points) + 1}"
     category = element.word("Category", "Full")
+    one_word(element, "Category", category, ("Full", "Horizontal", "Vertical"))
     given = element.need("Position")
     position = np.array([np.nan if given.child(axis) is None else given.number(axis) for axis in "xyz"])
     if category == "Horizontal":
         position[2] = np.nan
     elif category == "Vertical":
         position[:2] = np.nan
-    elif category != "Full":
-        raise element.error(
-            phrase(
-                "format.unknown", what="Category", value=category, names=["Full", "Horizontal", "Vertical"]
-            )
-        )
     default = np.broadcast_to(found.options.sd.get("control", (np.nan,)), 3)
     horizontal = element.number("HorizontalAccuracy", float(default[0]))
     sd = np.array([horizontal, horizontal, element.number("VerticalAccuracy", float(default[2]))])

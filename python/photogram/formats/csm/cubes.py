@@ -19,7 +19,7 @@ from photogram.formats.csm.isd import Detector, Isd, Polynomials, Positions, Tur
 from photogram.formats.csm.reading import fitting, from_pixels, not_zero, read_drift, read_isd, transformed
 from photogram.io.files import reading
 from photogram.io.json import Tree
-from photogram.io.places import at_place
+from photogram.io.places import at_place, one_word, positive
 from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
@@ -111,9 +111,7 @@ class _Table:
 
     def _rows(self) -> Floats:
         records, width = self.keys["Records"].whole(1), len(self.columns)
-        order = self.keys.get("ByteOrder", "Lsb").text().lower()
-        if order not in ("lsb", "msb"):
-            raise self.error(phrase("format.unknown", what="ByteOrder", value=order, names=["Lsb", "Msb"]))
+        order = one_word(self, "ByteOrder", self.keys.get("ByteOrder", "Lsb").text().lower(), ("lsb", "msb"))
         if "^Table" in self.keys:
             raise self.error(phrase("csm.elsewhere"))
         size = 8 * width * records
@@ -257,16 +255,12 @@ def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
 
 def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
     """Return the detector of a scanner whose images are summed only along lines."""
-    summing = instrument["SpatialSumming"].number()
+    summing = instrument["SpatialSumming"]
     centre = [keywords[f"{code}_BORESIGHT_{axis}"].number() for axis in ("SAMPLE", "LINE")]
-    if not summing > 0:
-        raise instrument["SpatialSumming"].error(
-            phrase("format.positive", name="the sum of pixels", value=summing)
-        )
     return Detector(
         np.array(centre),
         np.array([instrument["SampleFirstPixel"].number(), 0.0]),
-        np.array([summing, 1.0]),
+        np.array([positive(summing, "the sum of pixels", summing.number()), 1.0]),
         {
             # ITRANSS and ITRANSL of instruments are focal2pixel of an ISD.
             "csm": from_pixels(keywords[f"{code}_ITRANSS"], keywords[f"{code}_ITRANSL"]),

@@ -22,7 +22,7 @@ from photogram.formats.csm.isd import (
     of_quaternions,
 )
 from photogram.io.json import Tree, read_json, unknown
-from photogram.io.places import at_place
+from photogram.io.places import at_place, positive
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens, LensModel
 from photogram.network.moving_photos import Lines
@@ -182,9 +182,7 @@ def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
     own = tree["framelet_height"]
     height = own.number() / summing
     every = tree["interframe_delay"].number()
-    if not (height > 0 and every > 0):
-        name = "framelet_height and interframe_delay"
-        raise own.error(phrase("format.positive", name=name, value=min(height, every)))
+    positive(own, "framelet_height and interframe_delay", min(height, every))
     if lines % height or lines / height > FRAMELETS:
         raise own.error(phrase("csm.framelets", lines=lines, most=FRAMELETS, height=height * summing))
     first = tree["starting_ephemeris_time"].number() + 0.5 * tree["exposure_duration"].number()
@@ -237,10 +235,7 @@ def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
 
     centre = tree["detector_center"]
     summing = pair("detector_{}_summing")
-    if not (summing > 0).all():
-        raise tree["detector_sample_summing"].error(
-            phrase("format.positive", name="the sum of pixels", value=float(summing.min()))
-        )
+    positive(tree["detector_sample_summing"], "the sum of pixels", float(summing.min()))
     csm = from_pixels(tree["focal2pixel_samples"], tree["focal2pixel_lines"])
     planes: dict[Pixels, Plane] = {"csm": csm, "isis": csm}
     if code is not None:

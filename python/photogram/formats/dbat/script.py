@@ -20,7 +20,7 @@ from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.files import read_beginning, read_lines
-from photogram.io.places import Place, at_place
+from photogram.io.places import Place, at_place, image_size, one_word, positive
 from photogram.io.rows import cells
 from photogram.messages import Message
 from photogram.words import phrase
@@ -116,9 +116,7 @@ def _filter(points: Element) -> Callable[[int], bool]:
     if found is None:
         return lambda _: True
     numbers = {found.place.whole(word.strip()) for word in found.attributes.get("id", "").split(",")}
-    how = found.text.strip()
-    if how not in ("keep", "remove"):
-        raise found.error(phrase("format.unknown", what="filter", value=how, names=["keep", "remove"]))
+    how = one_word(found, "filter", found.text.strip(), ("keep", "remove"))
     return lambda number: (number in numbers) == (how == "keep")
 
 
@@ -126,10 +124,7 @@ def _deviation(element: Element) -> float:
     word = element.attributes.get("sxy")
     if word is None:
         return math.nan
-    value = element.place.number(word.strip(), "sxy")
-    if not value > 0:
-        raise element.error(phrase("format.positive", name="sxy", value=value))
-    return value
+    return positive(element, "sxy", element.place.number(word.strip(), "sxy"))
 
 
 def _operations(operations: Element, name: str) -> Iterator[Element]:
@@ -148,10 +143,8 @@ def _estimates(operations: Element, content: DbatBuilder) -> None:
         for word in ("all", *(name for name in words if name != "all")):
             if word not in words:
                 continue
-            if word not in _GROUPS and word != "all":
-                raise words[word].error(
-                    phrase("format.unknown", what="parameter", value=word, names=list(_GROUPS))
-                )
+            if word != "all":
+                one_word(words[word], "parameter", word, _GROUPS)
             names = {own for group in _GROUPS.values() for own in group} if word == "all" else _GROUPS[word]
             value = words[word].text.strip().lower()
             if value == "true":
@@ -200,20 +193,15 @@ def _numbers(element: Element, name: str, count: int) -> list[float]:
 
 
 def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
-    if (unit := element.word("unit", "mm")) != "mm":
-        raise element.error(phrase("format.unknown", what="unit", value=unit, names=["mm"]))
+    one_word(element, "unit", element.word("unit", "mm"), ["mm"])
     width, height = _numbers(element, "image", 2)
-    if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
-        raise element.need("image").error(phrase("format.size", width=width, height=height))
-    size = int(width), int(height)
+    size = image_size(element.need("image"), width, height)
     sides = _sides(element, size)
     model = element.whole("model") if element.child("model") else PLAIN
     terms = _terms(element)
     skew = element.number("skew", 0.0)
-    if model not in (PLAIN, AFFINE) and (any(terms.values()) or skew or sides[0] != sides[1]):
-        raise element.need("model").error(
-            phrase("format.unknown", what="model", value=str(model), names=[str(PLAIN), str(AFFINE)])
-        )
+    if any(terms.values()) or skew or sides[0] != sides[1]:
+        one_word(element.child("model") or element, "model", str(model), [str(PLAIN), str(AFFINE)])
     if model == PLAIN and skew:
         raise element.need("skew").error(phrase("dbat.skew", model=PLAIN, skew=skew, other=AFFINE))
     c = _principal_distance(element, messages)
@@ -259,9 +247,7 @@ def _principal_distance(element: Element, messages: list[Message]) -> float:
         c = element.number("focal")
     else:
         c = element.number("cc")
-    if not c > 0:
-        raise element.error(phrase("format.positive", name="the principal distance", value=c))
-    return c
+    return positive(element, "the principal distance", c)
 
 
 def _principal_point(

@@ -14,6 +14,7 @@ from photogram.formats.dbat.content import DbatBuilder
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import NAMELESS, read_columns, read_rows
 from photogram.io.numbers import whole_number
+from photogram.io.places import one_word, positive
 from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, option_sd, phrase
 
@@ -76,9 +77,7 @@ def take_photos(table: ColumnTable, content: DbatBuilder) -> None:
 
 def take_poses(table: ColumnTable, content: DbatBuilder, unit: str = "degrees") -> None:
     """Add centres and angles omega, phi, kappa."""
-    if unit not in _RADIANS:
-        names = list(_RADIANS)
-        raise table.head.error(phrase("format.unknown", what="unit of angles", value=unit, names=names))
+    one_word(table.head, "unit of angles", unit, _RADIANS)
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
     angles = table.given(("omega", "phi", "kappa")) * _RADIANS[unit]
     matrices = Attitudes.of("omega_phi_kappa", angles).matrices
@@ -135,8 +134,7 @@ def take_images(table: ColumnTable, content: DbatBuilder, sd: float = math.nan) 
         content.check_photo(number, table.at(row))
     own = _deviations(table, ("sx", "sy"), "sxy")
     own = np.where(np.isnan(own), sd, own)
-    if (own == 0).any():
-        name = "the standard deviation"
-        raise table.error(int(np.argwhere(own == 0)[0][0]), phrase("format.positive", name=name, value=0))
+    for row in np.argwhere(own == 0)[:, 0].tolist():
+        positive(table.at(row), "the standard deviation", 0)
     for image in zip(photos, _whole(table, "id"), table.given(("x", "y")), own, strict=True):
         content.pixel(*image)
