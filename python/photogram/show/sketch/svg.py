@@ -23,7 +23,6 @@ from photogram.show.style import SETTINGS
 Attributes: TypeAlias = dict[str, str | float]
 LETTERS = ", ".join([*SETTINGS["font.sans-serif"], "sans-serif"])
 COLOURS_OF_MAP = 48
-MAX_EXACT_PLACES = 300  # Coordinates of more places are in tenths of a point, of others in hundredths
 MAX_COORDINATE = 1e4  # Points
 DASHES = {"": (), "--": (3.7, 1.6), ":": (1.0, 1.65)}  # Dashes and gaps in line widths
 _POINTS = np.pi / 5 * np.arange(10)
@@ -84,22 +83,20 @@ def _place(box: tuple[float, float, float, float]) -> Attributes:
 
 
 def _joined(lines: Sequence[Floats] | Floats, placed: Placed = POINTS, end: str = "") -> list[str]:
-    """Return every line through (n, 2) points of a panel, with steps between them."""
+    """Return every line through (n, 2) points of a panel, in steps of tenths of a point."""
     line = np.repeat(np.arange(len(lines)), [len(each) for each in lines])
     places = placed.at(np.concatenate([NOWHERE, *lines]))
     known = ~np.isnan(places).any(axis=1)
-    counts = np.bincount(line[known], minlength=len(lines))
-    scale = 10.0 if known.sum() > MAX_EXACT_PLACES else 100.0
-    rounded = np.rint(scale * np.clip(places[known], -MAX_COORDINATE, MAX_COORDINATE))
-    steps = (np.diff(rounded, axis=0, prepend=0.0) / scale + 0.0).tolist()  # Without negative zeros
-    firsts = np.cumsum(counts) - counts
-    starts = (rounded / scale + 0.0)[firsts[counts > 1]].tolist()
-    found, more = [], iter(starts)
-    for first, count in zip(firsts.tolist(), counts.tolist(), strict=True):
+    tenths = np.rint(10.0 * np.clip(places[known], -MAX_COORDINATE, MAX_COORDINATE))
+    starts = (tenths / 10.0 + 0.0).tolist()
+    steps = (np.diff(tenths, axis=0, prepend=0.0) / 10.0 + 0.0).tolist()  # Without negative zeros
+    found, first = [], 0
+    for count in np.bincount(line[known], minlength=len(lines)).tolist():
         if count > 1:
-            x, y = next(more)
+            x, y = starts[first]
             path = " ".join([f"{x:g} {y:g}" for x, y in steps[first + 1 : first + count]])
             found.append(f"M{x:g} {y:g}l{path.replace(' -', '-')}{end}")
+        first += count
     return found
 
 
