@@ -94,10 +94,9 @@ def titled_lines(
 
 
 def _ended(sentence: str) -> str:
-    """Return a sentence with a capital letter, unless a name of a file is first, and with a full stop."""
-    first = sentence.partition(" ")[0]
-    begun = f"{first[:1].upper()}{first[1:]}" if first.isalpha() else first
-    return f"{begun}{sentence[len(first) :]}".removesuffix(".") + "."
+    """Return a sentence with a full stop, and a capital letter unless it begins with the name of a file."""
+    begins = sentence if "." in sentence.partition(" ")[0][:-1] else sentence[:1].upper() + sentence[1:]
+    return begins.removesuffix(".") + "."
 
 
 def _chosen(section: Section, keys: Collection[str]) -> Sequence[Part]:
