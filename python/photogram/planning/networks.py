@@ -127,10 +127,10 @@ class Plan(Documented):
         shades = Shades(float(heights.min()), float(heights.max()), label)
         panels = [_panel(pattern, limits, shades) for pattern in patterns]
         # The legend beside the last panel names the control of all panels.
-        labelled = {mark.label: mark for panel in panels for mark in panel.labelled}
+        every = [mark for panel in panels for mark in panel.labelled if isinstance(mark, Markers)]
         known = {mark.label for mark in panels[-1].labelled}
-        more = [replace(mark, places=NOWHERE) for label, mark in labelled.items() if label not in known]
-        panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside", shades=shades)
+        labelled = {mark.label: replace(mark, places=NOWHERE) for mark in every if mark.label not in known}
+        panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *labelled.values()], legend="beside", shades=shades)
         width, height = np.ptp(limits, axis=0).tolist()
         columns = 1 if width > MAX_SIDE_BY_SIDE * height else len(panels)
         longer = PANEL if columns > 1 else 2 * PANEL
