@@ -130,7 +130,8 @@ class Plan(Documented):
         every = [mark for panel in panels for mark in panel.labelled if isinstance(mark, Markers)]
         known = {mark.label for mark in panels[-1].labelled}
         labelled = {mark.label: replace(mark, places=NOWHERE) for mark in every if mark.label not in known}
-        panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *labelled.values()], legend="beside", shades=shades)
+        marks = [*panels[-1].marks, *labelled.values()]
+        panels[-1] = replace(panels[-1], marks=marks, legend="beside", shades=shades)
         width, height = np.ptp(limits, axis=0).tolist()
         columns = 1 if width > MAX_SIDE_BY_SIDE * height else len(panels)
         longer = PANEL if columns > 1 else 2 * PANEL
