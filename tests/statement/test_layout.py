@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from photogram.network.hull import area, hull, outside
-from photogram.results.statement.layout import area_in_plan
 from photogram.results.statement.layout import layout as layout_of
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 10.0], [100.0, 100.0, 20.0], [0.0, 100.0, 0.0]])
@@ -52,7 +51,7 @@ def test_only_the_area_within_the_hull_of_a_block_counts():
     triangle = SQUARE[[0, 1, 3]]
     corner = [[0.0, 100.0, 0.0]]
     radius = math.hypot(100, 100) / 3
-    assert area_in_plan(triangle) == pytest.approx(5000)
+    assert area(hull(triangle[:, :2])) == pytest.approx(5000)
     within = math.pi * radius**2 / 8  # of the circle about a corner of 45 degrees
     assert layout(corner, triangle, triangle).share_of_area_far == pytest.approx(1 - within / 5000, abs=1e-2)
 

@@ -65,7 +65,7 @@ def collection_parts(names: tuple[str, ...], units: tuple[str, ...]) -> dict[str
     behind = Part("point_rays_behind", ("rays_behind",), ("1",), "images with the point behind the camera")
     return {
         "photos": photos,
-        "points": [behind, *point_parts("collection", _AXES, ("",) * 3, last=False)],
+        "points": [behind, *point_parts("collection", _AXES, ("",) * 3)],
         "images": image_parts("collection", "px"),
     }
 

@@ -143,7 +143,8 @@ def parts_of_block(
     return {
         "photos": photos,
         "points": [
-            *point_parts("block", places, lengths, last=True),
+            *point_parts("block", places, lengths),
+            Part("point_last_corrections", places, lengths, "last correction of {}", prefix="last_change_"),
             Part("block.point_check_sd", places, lengths, CHECK_SD, prefix="check_sd_"),
         ],
         "images": image_parts("block", image_unit),

@@ -67,19 +67,18 @@ def mean_mark_residuals(result: Result) -> list[VectorField]:
     if block.photo_cameras is not None:
         of = block.photo_cameras
     found = []
+    of_marks = np.array(residuals.marks, dtype=object)
     for camera in np.unique(of[residuals.photos]).tolist():
-        sums: dict[str, list[Floats]] = {}
-        for photo, mark, xy in zip(residuals.photos.tolist(), residuals.marks, residuals.xy, strict=True):
-            if of[photo] == camera:
-                sums.setdefault(mark, []).append(xy)
+        own = of[residuals.photos] == camera
+        names = list(dict.fromkeys(of_marks[own].tolist()))
         name = block.camera_names[camera] if block.camera_names else ""
-        count = np.unique(residuals.photos[of[residuals.photos] == camera]).size
+        count = np.unique(residuals.photos[own]).size
         found.append(
             VectorField(
                 f"{name}: residuals of marks, mean of {count} photos",
-                np.array([marks[mark].position[:2] for mark in sums]),
-                np.array([np.mean(own, axis=0) for own in sums.values()]),
-                tuple(mark.removeprefix(f"{name} ") for mark in sums),
+                np.array([marks[mark].position[:2] for mark in names]),
+                np.array([residuals.xy[own & (of_marks == mark)].mean(axis=0) for mark in names]),
+                tuple(mark.removeprefix(f"{name} ") for mark in names),
             )
         )
     return found

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import frozen
+from photogram.arguments.arrays import frozen, standard_deviations
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.film_reduction import Affine, affine_form
@@ -64,9 +64,7 @@ class OnFilm:
     @property
     def film_sd(self) -> Floats:
         """(P, 6) standard deviations of `film`; 0 if fixed."""
-        with np.errstate(invalid="ignore"):
-            variances = np.diagonal(self.film_cofactors, axis1=1, axis2=2) * self.covariance_scale
-            return frozen(np.sqrt(variances))
+        return frozen(standard_deviations(self.film_cofactors, self.covariance_scale))
 
     @property
     def fiducials(self) -> dict[str, AdjustedUnknown]:

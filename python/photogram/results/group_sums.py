@@ -80,11 +80,6 @@ class GroupSum:
     test: GlobalTest | None
 
     @property
-    def scale(self) -> float:
-        """The divisor of q in the test: c = s / r."""
-        return self.spread / self.redundancy if self.redundancy > 0 else math.nan
-
-    @property
     def freedom(self) -> float:
         """Degrees of freedom of q / c, r^2 / s."""
         return self.redundancy**2 / self.spread if self.spread > 0 else math.nan

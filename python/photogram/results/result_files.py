@@ -100,10 +100,9 @@ def _divided(products: np.ndarray, scale: float) -> np.ndarray:
     return found
 
 
-def point_parts(given: str, names: tuple[str, ...], units: tuple[str, ...], *, last: bool) -> list[Part]:
+def point_parts(given: str, names: tuple[str, ...], units: tuple[str, ...]) -> list[Part]:
     """Return the stored arrays of points; `given` is the name of the adjusted network."""
     sd = "standard deviation of {}"
-    more = [Part("point_last_corrections", names, units, "last correction of {}", prefix="last_change_")]
     return [
         Part("point_rays", ("rays",), ("1",), "number of images; 0 for points left out"),
         Part("point_positions", names, units, "adjusted {}"),
@@ -112,7 +111,6 @@ def point_parts(given: str, names: tuple[str, ...], units: tuple[str, ...], *, l
         Part("point_redundancy", names, ("1",) * 3, REDUNDANCY, prefix="redundancy_"),
         Part(f"{given}.point_positions", names, units, "{} as it was given", prefix="given_"),
         Part(f"{given}.point_sd", names, units, GIVEN_SD, prefix="given_sd_"),
-        *(more if last else []),
     ]
 
 

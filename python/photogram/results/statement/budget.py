@@ -130,12 +130,12 @@ def budgets(
 
     values = covariances.propagate(together, items)
     _, effects = covariances.influences(items, together)
-    freedoms, found = _Freedoms(result, rows, components), []
+    freedom_of, found = _freedoms(result, rows, components), []
     for each, value, t in zip(wanted, values.value.tolist(), effects, strict=True):
         squares = result.covariance_scale * t**2
         variance = float(squares.sum())
         share = 1.0 / variance if variance > 0 else 0.0
-        freedom = freedoms.of(squares, variance)
+        freedom = freedom_of(squares, variance)
         sources = tuple(Source(*source, source[-1] * share) for source in rows.sources(squares))
         largest, k = tuple(_largest(rows, squares, t, share)), coverage_factor(coverage, freedom.used)
         numbers = value, math.sqrt(variance), variance / result.covariance_scale
@@ -164,44 +164,39 @@ def budget_fields(texts: Texts, found: Budget) -> dict[str, Any]:
     return {"quantity": found.subject, **fields, "k": k, "p": p}
 
 
-class _Freedoms:
-    """Effective degrees of freedom of variances, by the basis of standard deviations."""
-
-    def __init__(self, result: Result, rows: Rows, components: VarianceComponents | None) -> None:
-        self._common = result.degrees_of_freedom
-        known = math.isinf(result.freedom_of_scale)
-        self._basis = "components" if components is not None else "given" if known else "unit variance"
-        self._names: list[str] = []
-        self._of: Indices = np.full(len(rows.sd), -1)
-        self._covariance = np.zeros((0, 0))
-        if components is None and len(rows.sd) > EXACT:
-            return
+def _freedoms(
+    result: Result, rows: Rows, components: VarianceComponents | None
+) -> Callable[[Floats, float], Freedom]:
+    """Return the function of the degrees of freedom of a variance that is the sum of (M,) squares."""
+    known = math.isinf(result.freedom_of_scale)
+    basis = "components" if components is not None else "given" if known else "unit variance"
+    names, groups = list[str](), np.full(len(rows.sd), -1)
+    covariance: Floats = np.zeros((0, 0))
+    if components is not None or len(rows.sd) <= EXACT:
         grouping = grouped(observables(result), "kind")
-        self._of = rows.groups(grouping)
         matrix = Left(result, grouping, Probing(exact=min(len(rows.sd), EXACT))).matrix()
-        names = list(grouping.groups.names)
-        estimated = [k for k in range(len(names)) if matrix[k, k] > 0]
-        self._names = [kind_of(names[k]) for k in estimated]
-        place = np.full(len(names) + 1, -1)
+        estimated = np.flatnonzero(np.diag(matrix)[: grouping.count] > 0)
+        names = [kind_of(grouping.groups.names[k]) for k in estimated.tolist()]
+        place = np.full(grouping.count + 1, -1)
         place[estimated] = np.arange(len(estimated))
-        self._of = place[self._of]
+        groups = place[rows.groups(grouping)]
         inverse = np.linalg.pinv(matrix[np.ix_(estimated, estimated)], hermitian=True)
-        self._covariance = np.asarray(2.0 * inverse, dtype=np.float64)
+        covariance = np.asarray(2.0 * inverse, dtype=np.float64)
+    own, nu = groups >= 0, 2.0 / np.diag(covariance)
 
-    def of(self, squares: Floats, variance: float) -> Freedom:
-        """Return the degrees of freedom of a variance that is the sum of (M,) squares."""
-        own = self._of >= 0
-        contributions = np.bincount(self._of[own], weights=squares[own], minlength=len(self._names))
-        nu = 2.0 / np.diag(self._covariance)
+    def freedom(squares: Floats, variance: float) -> Freedom:
+        contributions = np.bincount(groups[own], weights=squares[own], minlength=len(names))
         joint = welch = math.nan
         if len(nu) and variance > 0:
             given = max(variance - float(contributions.sum()), 0.0)
-            joint = joint_freedom(contributions, self._covariance, given)
+            joint = joint_freedom(contributions, covariance, given)
             u = np.sqrt(np.append(contributions, given))
             welch = welch_satterthwaite(u, np.append(nu, math.inf))
-        used = {"given": math.inf, "unit variance": self._common, "components": joint}[self._basis]
-        names = dict(zip(self._names, nu.tolist(), strict=True))
-        return Freedom(self._basis, used, self._common, names, joint, welch)
+        common = result.degrees_of_freedom
+        used = {"given": math.inf, "unit variance": common, "components": joint}[basis]
+        return Freedom(basis, used, common, dict(zip(names, nu.tolist(), strict=True)), joint, welch)
+
+    return freedom
 
 
 PHOTOS = 100  # Listed photos with the largest contributions

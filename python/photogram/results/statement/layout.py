@@ -13,7 +13,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.hull import area, hull, outside
+from photogram.network.hull import hull, outside
 
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
 FAR = 1 / 3  # Distance from check points relative to the diagonal
@@ -76,11 +76,6 @@ def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
         float(np.ptp(known) / span) if known.size and span > 0 else math.nan,
         int(outside(own, hull(control[:, :2])).sum()) if len(control) else len(own),
     )
-
-
-def area_in_plan(positions: Floats) -> float:
-    """Return the hull area of (n, 2) or (n, 3) positions in squared plan units."""
-    return area(hull(positions[:, :2])) if len(positions) else 0.0
 
 
 def _least_spacing(plan: Floats) -> float:

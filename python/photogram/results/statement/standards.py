@@ -21,10 +21,11 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import counted
+from photogram.network import hull
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
 from photogram.results.result import Result
-from photogram.results.statement import comparison, layout, lengths
+from photogram.results.statement import comparison, lengths
 from photogram.results.statement.figures import Figures, root_mean
 from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import Asked, lengths_in
@@ -240,11 +241,10 @@ def asprs_figures(
 ) -> Asprs:
     """Return the figures of the ASPRS, and the verdicts on the requested classes."""
     metre = lengths_in(result.block.linear_unit)
-    area = asked.area
+    area, used = asked.area, result.point_positions[result.used_points]
     if area is None:
-        area = layout.area_in_plan(
-            comparison.plan_positions(result.block, result.point_positions[result.used_points])
-        )
+        used = comparison.plan_positions(result.block, used)
+        area = hull.area(hull.hull(used[:, :2])) if len(used) else 0.0
     km2 = area * metre**2 / 1e6
     figures = _accuracies(of_all, of_vegetated)
     classes = asked.classes
