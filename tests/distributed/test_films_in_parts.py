@@ -115,8 +115,9 @@ def test_films_in_parts_are_those_of_one_process(block, whole, parts):
         assert np.abs((one.cofactors - other.cofactors)[at > 0] / at[at > 0]).max(initial=0.0) < 1e-7
         np.testing.assert_allclose(one.redundancy, other.redundancy, rtol=0, atol=1e-7)
         assert one.observations == other.observations
-    for name in ("fiducial_residuals", "fiducial_redundancy"):
-        np.testing.assert_allclose(getattr(found, name), getattr(whole, name), rtol=0, atol=1e-6)
+    for name in ("residuals", "redundancy"):
+        both = (getattr(each.kinds["fiducial"], name) for each in (found, whole))
+        np.testing.assert_allclose(*both, rtol=0, atol=1e-6)
     assert [str(each) for each in found.messages] == [str(each) for each in whole.messages]
 
 

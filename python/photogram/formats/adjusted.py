@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.formats.project import Project
 from photogram.io.csv_text import csv_text
 from photogram.io.sheets import workbook
-from photogram.results.features import Features
+from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.result import Result
 from photogram.results.tables import TABLES
 from photogram.show.quantity import frame, unit_comments
@@ -62,7 +62,10 @@ def table_files(result: Result) -> Mapping[str, bytes]:
 
 def feature_files(features: Features) -> Mapping[str, bytes]:
     """Return the tables of features as CSV by file name."""
-    tables = {"features.csv": features.columns(), "feature_deviations.csv": features.deviation_columns()}
+    tables = {
+        "features.csv": frame(quantity_columns(features)),
+        "feature_deviations.csv": frame(deviation_quantities(features)),
+    }
     return {name: csv_text(columns) for name, columns in tables.items() if columns["feature"]}
 
 

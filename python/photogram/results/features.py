@@ -143,14 +143,6 @@ class Features:
         """Definitions of the features, the argument of :func:`photogram.features`."""
         return {each.name: (each.kind, each.points) for each in self}
 
-    def columns(self) -> dict[str, Any]:
-        """Return the quantities as named columns."""
-        return quantity.frame(quantity_columns(self))
-
-    def deviation_columns(self) -> dict[str, Any]:
-        """Return the deviations of points as named columns."""
-        return quantity.frame(deviation_quantities(self))
-
     def table(self) -> pd.DataFrame:
         """Return the quantities as a data frame: value, sd, k and U = k sd of each."""
         return Table("quantities", "", quantity_columns(self)).frame()

@@ -13,7 +13,6 @@ from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.film_reduction import Affine, affine_form
 from photogram.network.films import Film, Mark, Scan
-from photogram.network.observations import Fiducial
 from photogram.results.parts import AdjustedUnknown, ObservedKind
 
 
@@ -70,26 +69,6 @@ class OnFilm:
     def fiducials(self) -> dict[str, AdjustedUnknown]:
         """Fiducial marks by name of camera and mark: positions in the camera's frame, mm."""
         return {each.name: each for each in self.unknowns if isinstance(each.given, Mark)}
-
-    @property
-    def fiducial_residuals(self) -> Floats:
-        """(k, 2) observed minus computed readings of marks, in the order of the block."""
-        return self._of_readings("residuals")
-
-    @property
-    def fiducial_redundancy(self) -> Floats:
-        """(k, 2) redundancy numbers of the readings."""
-        return self._of_readings("redundancy")
-
-    @property
-    def fiducial_standardized(self) -> Floats:
-        """(k, 2) standardized residuals of the readings."""
-        return self._of_readings("standardized")
-
-    def _of_readings(self, what: str) -> Floats:
-        kind = self.kinds.get(Fiducial.KIND)
-        found: Floats = np.zeros((0, 2)) if kind is None else getattr(kind, what)
-        return found
 
     @property
     def refined(self) -> tuple[Floats, Floats]:

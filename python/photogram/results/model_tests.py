@@ -26,7 +26,6 @@ from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import by_name
 from photogram.network.motion import focal_images
 from photogram.results.distortion import INTERIOR, compared_places, partials_of, rows_of_images
 from photogram.results.fixed_tests import score
@@ -119,10 +118,6 @@ class Comparison(Documented, Brief):
     def best(self) -> Model:
         """The model with the minimum criterion."""
         return self.models[0]
-
-    def difference(self, name: str) -> float:
-        """Return the difference between the criterion of a model and the minimum."""
-        return float(by_name(self.models, name, "model").bic - self.best.bic)
 
     def statement(self) -> str:
         """Return a statement on the criterion."""

@@ -64,11 +64,6 @@ class Observed:
         """(r, k) adjusted minus given: residuals with the sign of check points."""
         return 0.0 - self.residuals
 
-    @property
-    def tests(self) -> Floats:
-        """(r, k) standardized residuals with the sign of the differences."""
-        return 0.0 - self.standardized
-
 
 MAX_BIAS_RATIO = 6.0  # Permitted effect of undetected errors on points, in standard deviations
 

@@ -161,7 +161,7 @@ def _observed(result: AdjustedNetwork, kind: str) -> list[Quantity]:
         deviation(own.sd, axes, member=members("sd"), head="sd given", words=_FREE),
         Quantity(sd[rows], axes, "deviation", head="sd adjusted"),
         redundancy(own.redundancy, axes, seen=np.isfinite(own.sd) & (own.sd > 0)),
-        test_value(own.tests, axes),
+        test_value(0.0 - own.standardized, axes),  # With the sign of the differences
     ]
 
 
