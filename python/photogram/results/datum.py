@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -211,14 +211,6 @@ class CheckPoints:
     assumed: Bools  # (k,) whether the given deviations are assumed
     untested: str  # Reason for a missing test; empty with a test
     agreement: Agreement | None = None  # Tests, if any
-
-    @cached_property
-    def statistics(self) -> tuple[Floats, Floats]:
-        """(k,) test values T (F if the unit weight is estimated) and their probabilities."""
-        if self.agreement is None:
-            return np.full(len(self.rows), math.nan), np.full(len(self.rows), math.nan)
-        tested = self.agreement.points
-        return tested.values, np.exp(tested.log_probability())
 
 
 def check_points(result: Result) -> CheckPoints:

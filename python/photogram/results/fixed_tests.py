@@ -42,10 +42,6 @@ class Held:
     images: Indices
     partials: Indices
 
-    @property
-    def name(self) -> Phrase:
-        return Phrase("named.held", {"named": self.named})
-
 
 def held_tested(result: Result) -> list[Tested]:
     """Return tests of fixed stations and points with the worst images, if required."""
@@ -80,7 +76,8 @@ def held_tests(
         # Free unknowns may absorb it.
         value = score(factor, columns, residuals) if np.isfinite(columns).all() else None
         if value is not None:
-            found.append((each.name, value, float(len(each.partials))))
+            name = Phrase("named.held", {"named": each.named})
+            found.append((name, value, float(len(each.partials))))
     if not found:
         return []
     names, values, dimensions = zip(*found, strict=True)

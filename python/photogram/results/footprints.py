@@ -139,8 +139,6 @@ class Ellipses:
     major: Floats  # (n,) semi-axes in the unit of the positions
     minor: Floats
     azimuth: Floats  # (n,) of the major axis, clockwise from the second axis (north): radians, -pi/2 to pi/2
-    # Probability that the ellipse contains the true position; None: standard ellipses (39 %)
-    confidence: float | None
 
     def outlines(self, centres: Floats, scale: float = 1.0) -> Floats:
         """Return (n, 37, 2) closed outlines about (n, 2) centres, enlarged."""
@@ -160,8 +158,9 @@ def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Elli
     """Return the error ellipses of (n, 2, 2) or larger covariances of east and north.
 
     The axes are the roots of the eigenvalues, times the root of the quantile of chi-square with two degrees
-    of freedom, -2 ln(1 - confidence): 2.4477 for 95 %. The azimuth is half of atan2(2 s_en, s_nn - s_ee). NaN
-    if the covariance is NaN.
+    of freedom, -2 ln(1 - confidence): 2.4477 for 95 %. They contain the true position with the probability
+    `confidence`; None: standard ellipses (39 %). The azimuth is half of atan2(2 s_en, s_nn - s_ee). NaN if
+    the covariance is NaN.
     """
     factor = 1.0 if confidence is None else math.sqrt(-2.0 * math.log1p(-confidence))
     east, north, both = covariances[:, 0, 0], covariances[:, 1, 1], covariances[:, 0, 1]
@@ -170,7 +169,6 @@ def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Elli
         factor * np.sqrt(mean + half),
         factor * np.sqrt(np.maximum(mean - half, 0.0)),
         0.5 * np.arctan2(2 * both, north - east),
-        confidence,
     )
 
 

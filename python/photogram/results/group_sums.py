@@ -214,21 +214,14 @@ def sums_by_kind(result: Result) -> dict[str, tuple[int, float, float]]:
     counts, squares, redundancy = sums_of(result, grouping)
     columns = counts.tolist(), redundancy.tolist(), squares.tolist()
     found = dict(zip(grouping.groups.names, zip(*columns, strict=True), strict=True))
-    more = []
-    for unknown in result.unknowns:
-        sd, w = unknown.given.deviations, unknown.standardized  # w = v / (sd sqrt(r))
-        squares = w**2 * unknown.redundancy
-        more.append((unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, squares))
-    for camera in result.cameras:
-        with np.errstate(all="ignore"):
-            squares = ((camera.given.values - camera.values) / camera.given.deviations) ** 2
-        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
-        more.append(("camera", weighted, camera.redundancy, squares))
-    for kind, weighted, redundancy, squares in more:
-        if weighted.any():
+    more: list[tuple[str, Any, Floats]] = [(each.kind, each, each.change) for each in result.unknowns]
+    more += [("camera", each, each.values - each.given.values) for each in result.cameras]
+    for kind, each, change in more:
+        sd = each.given.deviations
+        if (weighted := (sd > 0) & np.isfinite(sd)).any():
             count, r, q = found.get(kind, (0, 0.0, 0.0))
-            r, q = r + float(redundancy[weighted].sum()), q + float(np.nansum(squares[weighted]))
-            found[kind] = count + int(weighted.sum()), r, q
+            q += float(((change[weighted] / sd[weighted]) ** 2).sum())
+            found[kind] = count + int(weighted.sum()), r + float(each.redundancy[weighted].sum()), q
     return found
 
 

@@ -242,7 +242,10 @@ _EITHER = "standard deviation that was given, or is assumed: {}"
 def check_points(result: Result) -> list[Quantity]:
     """Return check points: adjusted minus given, standard deviations of both, tests with probabilities."""
     checks = result.check_points
-    statistic, p = checks.statistics
+    statistic = p = np.full(len(checks.rows), math.nan)
+    if checks.agreement is not None:
+        tested = checks.agreement.points
+        statistic, p = tested.values, np.exp(tested.log_probability())
     return [
         *_compared(result, checks.rows, checks.differences, checks.given_sd),
         column("assumed", checks.assumed, about="whether standard deviations of control are assumed"),

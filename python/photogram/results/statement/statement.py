@@ -15,7 +15,6 @@ from photogram.arguments.objects import require_kind
 from photogram.errors import AdjustmentError, InputError
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import unknown_name
 from photogram.results.result import Result
 from photogram.results.statement import comparison, tables
 from photogram.results.statement import standards as by_standard
@@ -154,14 +153,6 @@ class Statement(Brief):
             coverage=self.asked.coverage,
         )
         return tables.budget_member(found[0])
-
-    def __getitem__(self, name: str) -> dict[str, Any]:
-        """Return a budget of the page by the name of its quantity."""
-        for each in self.taken_apart:
-            if each.quantity == name:
-                return tables.budget_member(each)
-        names = [each.quantity for each in self.taken_apart]
-        raise InputError(unknown_name("budget", name, names))
 
     def brief(self) -> tuple[str, Rows]:
         """Return a summary of the statement."""
