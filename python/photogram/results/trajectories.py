@@ -64,6 +64,9 @@ class AdjustedTrajectory:
     rotation: Floats
     position_sd: Floats  # (K, 3) standard deviations; 0 if fixed
     rotation_sd: Floats
+    # (K, 3) redundancy numbers of the given values; 0 unless weighted
+    position_redundancy: Floats
+    rotation_redundancy: Floats
     joint: Joint  # Returns the joint covariance of common unknowns by name
 
     def __post_init__(self) -> None:
@@ -196,7 +199,7 @@ def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
     def adjusted(own: Trajectory) -> AdjustedTrajectory:
         values = {
             f"{name}{suffix}": np.array([getattr(found[id(each)], what) for each in part]).reshape(-1, 3)
-            for suffix, what in (("", "position"), ("_sd", "sd"))
+            for suffix, what in (("", "position"), ("_sd", "sd"), ("_redundancy", "redundancy"))
             for name, part in zip(("position", "rotation"), own.coefficients, strict=True)
         }
         return AdjustedTrajectory(own, **values, joint=joint)
