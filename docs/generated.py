@@ -75,7 +75,7 @@ def helps() -> Iterator[tuple[str, str]]:
     from photogram.cli import app
     from photogram.cli.commands import COMMANDS
 
-    for name, (_, home) in COMMANDS.items():
+    for name, home in COMMANDS.items():
         _, *others = [home] if isinstance(home, str) else home
         for words in [[name], *([name, part] for part in others)]:
             environment = {"COLUMNS": WIDTH, "TERMINAL_WIDTH": WIDTH, "NO_COLOR": "1"}

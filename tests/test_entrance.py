@@ -10,7 +10,7 @@ import pytest
 
 from files.test_guards import COMMANDS, RUNS
 from photogram.cli import app
-from photogram.cli.job import Writes, roles
+from photogram.cli.options import Writes, roles
 
 PACKAGE = str(files("photogram").joinpath("examples"))
 ELSE = {"plan": ["--strips", "2", "--photos-per-strip", "4"], "new": ["made"], "simulate": ["made"]} | {

@@ -410,7 +410,7 @@ def test_section_14_the_command_line_applies_what_common_and_options_say(run):
     options = ("--air-refraction", "standard", "--water-index", "1.341")
     assert refraction(*options) == asked | {"air": "standard", "refractive_index": 1.341}
     # The guide's own record asks for both, and its listing says that neither is included.
-    assert job_refraction(common, water="none") == Refraction("giant")
+    assert job_refraction(common, water=None) == Refraction("giant")
     none = ("--air-refraction", "none", "--water-refraction", "none")
     straight = run("giant", "block", "--json", "result.json", *none)  # rays that were bent do not meet
     assert "--air-refraction for another model" in " ".join(straight.output.split())

@@ -16,7 +16,7 @@ import photogram
 from photogram import adjust, adjust_in_parts, read_result
 from photogram.cli import app
 from photogram.cli.in_parts import TAKEN
-from photogram.cli.job import _option
+from photogram.cli.options import option_name
 from photogram.distributed import Division
 from photogram.formats import ReadOptions, read
 
@@ -131,7 +131,7 @@ def test_every_option_is_taken_or_refused_of_a_project_on_disk():
     of_files = {each.name for each in fields(ReadOptions)}
     command = next(each for each in app.registered_commands if each.callback.__name__ == "adjust")
     options = {
-        _option(each)
+        option_name(each)
         for each in signature(command.callback).parameters.values()
         if each.name not in of_files | {"path", "example"}
     }

@@ -12,7 +12,7 @@ from test_guards import COMMANDS, RUNS, outputs, place, words  # noqa: F401  # t
 
 import photogram
 from fuzz.kills import Trials, kinds
-from photogram.cli.job import Writes
+from photogram.cli.options import Writes
 
 SOURCES = Path(photogram.__file__).parent
 COMMAND = [sys.executable, "-m", "photogram.cli"]

@@ -13,7 +13,8 @@ import typer
 from typer.models import ArgumentInfo
 
 from photogram.cli import app
-from photogram.cli.job import Job, Reads, Writes, roles, with_job
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Reads, Writes, roles
 
 EXAMPLES = Path(str(files("photogram") / "examples"))
 PROJECT = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")

@@ -13,7 +13,7 @@ import pytest
 from typer.models import ArgumentInfo, OptionInfo
 
 from photogram.cli import app
-from photogram.cli.job import Writes
+from photogram.cli.options import Writes
 
 PROMPT = [
     sys.executable,

@@ -14,11 +14,10 @@ import numpy as np
 import photogram
 from photogram.arguments.types import Floats
 from photogram.cli import calibrate as calibrating
-from photogram.cli.calibrate import CornerBasisName
 from photogram.formats import to_files
 from photogram.formats.targets.calibrations import adjusted_project
 from photogram.targets import read
-from photogram.targets.choices import Shape
+from photogram.targets.choices import CornerBasis, Shape
 
 from .projects import Files
 
@@ -61,7 +60,7 @@ def board_run(place: Path, rng: Random, quiet: bool) -> list[str]:
     elif rng.random() < 0.1:
         given["outliers"] = "mrcal"
     if rng.random() < 0.05:
-        given["components"] = [rng.choice([*CornerBasisName])]
+        given["components"] = [rng.choice(get_args(CornerBasis))]
     if rng.random() < 0.2:
         given["to"] = [rng.choice(FORMATS)]
     calibrating.calibrate(

@@ -16,6 +16,7 @@ import numpy as np
 
 import photogram
 from photogram import cli
+from photogram.adjustment.options import Ordering
 from photogram.cli import (
     absolute_orientation,
     check,
@@ -26,7 +27,6 @@ from photogram.cli import (
     stellar_camera,
 )
 from photogram.cli.console import errors, output
-from photogram.cli.options import OrderingName
 from photogram.targets import Calibrated
 
 from .boards import board_run
@@ -115,7 +115,7 @@ def _giant(place: Path, rng: Random, quiet: bool) -> list[str]:
         json=place / "result.json",
         listing=listing,
         as_published=rng.random() < 0.25,
-        ordering=rng.choice(get_args(OrderingName)),
+        ordering=rng.choice(get_args(Ordering)),
         threads=1,
         no_html=_without_page(rng),
         quiet=quiet,

@@ -16,8 +16,8 @@ import numpy as np
 
 import photogram
 from photogram import Block, formats
+from photogram.adjustment.options import CurrentVariance
 from photogram.cli import adjust as adjusting
-from photogram.cli.components import UnitVarianceName
 from photogram.distributed import Division
 from photogram.formats import ReadOptions
 from photogram.formats.images import to_corner
@@ -135,7 +135,7 @@ def project_run(main: str) -> Callable[[Path, Random, bool], list[str]]:
         options = {
             "datum": rng.choice(("inner", "minimum", "control")) if rng.random() < 0.2 else None,
             "loss": rng.choice(("huber", "cauchy")) if rng.random() < 0.15 else None,
-            "unit_variance": rng.choice(get_args(UnitVarianceName)) if rng.random() < 0.3 else None,
+            "unit_variance": rng.choice(get_args(CurrentVariance)) if rng.random() < 0.3 else None,
         }
         calibrated = rng.choice(PARAMETERS) if rng.random() < 0.15 else ""
         with _disk(rng):

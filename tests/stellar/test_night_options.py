@@ -33,7 +33,7 @@ def line(text, name):
 
 def test_the_words_of_the_options_are_those_of_the_package():
     assert {*get_args(Lens)} == {*LENSES, AUTO}
-    assert {effect.name.lower() for effect in Effect} == {one.name for one in fields(Effects)}
+    assert {effect.replace("-", "_") for effect in get_args(Effect)} == {one.name for one in fields(Effects)}
 
 
 def test_one_principal_distance(folder):
@@ -53,14 +53,14 @@ def test_two_principal_distances_where_the_file_has_one(folder):
     assert document["lens"]["common_scale"] is False
 
 
-@pytest.mark.parametrize("effect", Effect)
+@pytest.mark.parametrize("effect", get_args(Effect))
 def test_effects_are_left_out_of_places(folder, effect):
-    night = read_night(folder / "night.toml", {"places": {effect.name.lower(): False}})
-    named = effect.value.replace("-", " ")
+    night = read_night(folder / "night.toml", {"places": {effect.replace("-", "_"): False}})
+    named = effect.replace("-", " ")
     assert night.site.effects.left_out == (named,)
-    text, document = run(folder, "--without", effect.value)
+    text, document = run(folder, "--without", effect)
     assert line(text, "effects left out of places") == named
-    assert document["effects"][effect.name.lower()] is False
+    assert document["effects"][effect.replace("-", "_")] is False
 
 
 def test_a_failed_test_names_the_effects_that_are_left_out(folder):

@@ -15,6 +15,8 @@ __all__ = ["AdjustOptions", "AsPublished", "DatumName", "Ordering", "UnitVarianc
 
 DatumName = Literal["control", "minimum", "inner"]
 UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
+CurrentVariance = Literal["constrained", "unity", "redundancy"]  # Without the default of the 1987 program
+LossOrNone = Literal["none", "huber", "cauchy"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
@@ -81,14 +83,14 @@ class AdjustOptions(Checked):
     True
     """
 
-    datum: DatumName | InnerConstraints | MinimumConstraints | None = None
-    unit_variance: UnitVariance = "constrained"
-    loss: Loss | None = None
+    datum: DatumName | InnerConstraints | MinimumConstraints | None = option(None, kind=DatumName)
+    unit_variance: UnitVariance = option("constrained", kind=CurrentVariance)
+    loss: Loss | None = option(None, kind=LossOrNone, parse=lambda name: None if name == "none" else name)
     covariance: bool | Literal["verdict"] = True
     tolerance: float | AsPublished = 1e-5
-    max_iterations: int | None = option(None, 1)
+    max_iterations: int | None = option(None, 1, name="--iterations")
     ordering: Ordering = "auto"
-    max_bias_ratio: float | None = option(None, 0.0)
+    max_bias_ratio: float | None = option(None, 0.0, is_open=True)
 
     def __post_init__(self) -> None:
         from photogram.adjustment.robust import loss_row

@@ -28,7 +28,7 @@ def option(
     high: float = math.inf,
     *,
     is_open: bool = False,
-    kind: type | None = None,
+    kind: Any = None,
     parse: Callable[[str], Any] | None = None,
     name: str = "",
 ) -> Any:
@@ -194,6 +194,7 @@ def _limited(check: Check, limits: Mapping[str, Any], of: str, *, optional: bool
 
     low, high = limits.get("low", -math.inf), limits.get("high", math.inf)
     code = "range" if high < math.inf else "least" if low else "not-negative"
+    code = "positive" if limits.get("open") and (low, high) == (0, math.inf) else code
     code = "whole-range" if code == "range" and of == "int" else code
 
     def limited(name: str, value: Any) -> Any:

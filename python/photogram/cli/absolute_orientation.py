@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -11,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
-from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_document, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
-from photogram.cli.job import Folder, Input, InputFile, Job, OutputFile, Reads, Writes, with_job
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, InputFile, OutputFile, Reads, Writes, misuse
 from photogram.cli.projects import EXAMPLE, read_project
 from photogram.formats.read_options import ReadOptions
 
@@ -22,20 +20,20 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
     from photogram.absolute_orientation.cards import Deck
     from photogram.absolute_orientation.orientation import Orientation
+    from photogram.absolute_orientation.stream import Document
     from photogram.io.writing import OutputSet
 
 
 ModelPointSd = Annotated[float, typer.Option(min=0.0)]
 
 
-@with_job(example=("absolute_orientation", "stations.csv"), ending="-oriented")
+@with_job("absolute-orientation", example=("absolute_orientation", "stations.csv"), ending="-oriented")
 def absolute_orientation(
     job: Job,
     *,
     file: Input,
     points: InputFile = None,
     points_out: OutputFile = None,
-    out: Folder,
     documents: OfPrograms,
     trace: OutputFile = None,
     reject: list[str] | None = None,
@@ -63,6 +61,8 @@ def absolute_orientation(
     if trace and method == "rigorous":
         raise misuse("--trace", "requires", options="--method report or fill-in")
     from photogram import orient
+    from photogram.absolute_orientation.document import point_rows, without_points
+    from photogram.absolute_orientation.stream import Document, decimals_for
     from photogram.absolute_orientation.trace import trace_text
     from photogram.messages import Message
 
@@ -70,10 +70,9 @@ def absolute_orientation(
         ground_unit, model_unit = "m", "mm"
         points = points or file.with_name("points.csv")
         job.reads(points)
-    target = points_out or (out / f"{points.stem}-transformed.csv" if points else None)
-    pictures = documents.announce(job, out, TEXT, picture="residuals")
-    if target:
-        job.writes(target)
+    target = points_out or (documents.folder / f"{points.stem}-transformed.csv" if points else None)
+    documents.declare(job, TEXT, pictures=["residuals"])
+    job.writes(*([target] if target else []))
     deck = _read(file, format, zero_missing, ground_unit, model_unit)
     result = orient(
         deck.stations,
@@ -89,21 +88,35 @@ def absolute_orientation(
     if points and not result.usable:
         result.messages.append(Message.of("orientation.no-points"))
         points = None
-    made = {out / TEXT: result.report().encode()}
-    if pictures:
-        made |= {path: result.plot().render(path.suffix[1:]) for path in pictures}
-    if trace:
-        made[trace] = trace_text(result).encode()
-    if not points:
-        made |= documents.as_json(result)
-    made |= _records(result, part_two, restart_out, deck.identification if ident is None else ident)
     document = replace(result.document(), title=file.name)
-    made |= documents.page(job, "absolute-orientation", out, lambda: document)
+    made = documents.inside({TEXT: result.report().encode()})
+    made |= documents.pictures(lambda: {"residuals": result.plot()})
+    made |= {trace: trace_text(result).encode()} if trace else {}
+    made |= {} if points else documents.as_json(result)
+    made |= _records(result, part_two, restart_out, deck.identification if ident is None else ident)
+    made |= documents.page(job, lambda: document)
     written = list(made)
     with job.outputs() as outputs:
         if points and target:
-            _stream(job, outputs, result, points, target, documents.json, point_sd, decimals)
-            written = [target, *([documents.json] if documents.json else []), *written]
+            rows = None
+            if documents.json:
+                rows = Document(
+                    documents.json, b"".join(without_points(result)), point_rows(*result.transform_points())
+                )
+                written.insert(0, documents.json)
+            if decimals is None:
+                decimals = decimals_for((result.rms or 0.0) / result.similarity.scale)
+            _stream(
+                job,
+                outputs,
+                result.similarity,
+                points,
+                target,
+                document=rows,
+                point_sd=point_sd,
+                decimals=decimals,
+            )
+            written.insert(0, target)
         for path, content in made.items():
             outputs.write(path, content)
     job.conclude(
@@ -113,7 +126,7 @@ def absolute_orientation(
     )
 
 
-@with_job()
+@with_job("absolute-orientation transform")
 def transform(
     job: Job,
     *,
@@ -124,24 +137,16 @@ def transform(
     decimals: Annotated[int, typer.Option(min=0, max=15)] = 6,
 ) -> None:
     """Transform any number of model points with an earlier orientation (part II)."""
-    from photogram.absolute_orientation import read_similarity, transform_file
+    from photogram.absolute_orientation import read_similarity
     from photogram.absolute_orientation.cards import read_transformation
 
     similarity = read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
-    with job.outputs() as outputs, _progress(job, points) as progress:
-        count = transform_file(
-            similarity,
-            points,
-            out,
-            decimals=decimals,
-            point_sd=point_sd,
-            outputs=outputs,
-            progress=progress,
-        )
+    with job.outputs() as outputs:
+        count = _stream(job, outputs, similarity, points, out, point_sd=point_sd, decimals=decimals)
     job.conclude([out], summary=lambda: output.print(f"{count} points"))
 
 
-@with_job(example=EXAMPLE)
+@with_job("absolute-orientation relative", example=EXAMPLE)
 def relative(
     job: Job,
     *,
@@ -231,37 +236,26 @@ def _records(
 def _stream(
     job: Job,
     outputs: OutputSet,
-    result: Orientation,
+    similarity: Similarity,
     points: Path,
     target: Path,
-    json: Path | None,
+    *,
+    document: Document | None = None,
     point_sd: float,
-    decimals: int | None,
-) -> None:
-    from photogram.absolute_orientation.document import point_rows, without_points
-    from photogram.absolute_orientation.stream import Document, decimals_for, transform_file
+    decimals: int,
+) -> int:
+    """Transform points, and show on standard error how many are done; return their number."""
+    from photogram.absolute_orientation import transform_file
 
-    if decimals is None:
-        decimals = decimals_for((result.rms or 0.0) / result.similarity.scale)
-    document = None
-    if json:
-        document = Document(json, b"".join(without_points(result)), point_rows(*result.transform_points()))
-    with _progress(job, points) as progress:
-        transform_file(
-            result.similarity,
+    text = f"transforming {escape(points.name)}"
+    with job.status(text) as status:
+        return transform_file(
+            similarity,
             points,
             target,
             decimals=decimals,
             point_sd=point_sd,
             document=document,
             outputs=outputs,
-            progress=progress,
+            progress=None if status is None else lambda done: status.update(f"{text}: {done} points"),
         )
-
-
-@contextmanager
-def _progress(job: Job, points: Path) -> Iterator[Callable[[int], None] | None]:
-    """Show on standard error how many points are done."""
-    text = f"transforming {escape(points.name)}"
-    with job.status(text) as status:
-        yield None if status is None else lambda done: status.update(f"{text}: {done} points")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.command_classes import misuse
 from photogram.cli.documents import PageAndJson
-from photogram.cli.job import Folder, Input, Job, OutputFolder, Reads, with_job
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, Reads, misuse
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -19,13 +19,12 @@ if TYPE_CHECKING:
     from photogram.film.years import DatedCamera
 
 
-@with_job(example=("certificate", "rc10.toml"))
+@with_job("certificate", example=("certificate", "rc10.toml"))
 def certificate(
     job: Job,
     *,
     path: Input,
     camera: str | None = None,
-    out: OutputFolder = None,
     documents: PageAndJson,
 ) -> None:
     """Check a camera's certificate: typing errors, marks from distances, lens from its table.
@@ -37,10 +36,10 @@ def certificate(
     from photogram.film import Certificate
 
     found = Certificate.read(path, camera)
-    documents.conclude(job, "certificate", found, out, text=False)
+    documents.conclude(job, found, report=False)
 
 
-@with_job(example=(), ending="-compared", name="camera")
+@with_job("camera compare", example=(), ending="-compared", example_name="camera")
 def compare_certificates(
     job: Job,
     *,
@@ -48,7 +47,6 @@ def compare_certificates(
     day: list[str] | None = None,
     name: str = "1",
     angle: Annotated[float | None, typer.Option(min=0.1, max=89.0)] = None,
-    out: Folder,
     documents: PageAndJson,
 ) -> None:
     """Compare calibrations of cameras over years: drift, steps, control charts.
@@ -65,8 +63,7 @@ def compare_certificates(
     else:
         read = _read(calibrations or [], day or [], name)
     found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
-    tables = ("calibrations", "series")
-    documents.conclude(job, "camera compare", found, out, text=False, tables=tables)
+    documents.conclude(job, found, report=False, tables=("calibrations", "series"))
 
 
 def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:

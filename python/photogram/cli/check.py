@@ -5,27 +5,23 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from photogram.cli.console import print_sections
 from photogram.cli.documents import TEXT, PageAndJson
-from photogram.cli.job import Folder, Input, Job, Reads, with_job
-from photogram.cli.options import Threads
-from photogram.cli.projects import EXAMPLE, described, read_project
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, Reads, Threads
+from photogram.cli.projects import EXAMPLE, read_project
 from photogram.formats.read_options import ReadOptions
-
-if TYPE_CHECKING:
-    pass
 
 GALVESTON = "galveston"  # The packaged example, a directory of photogram.examples
 
 
-@with_job(example=EXAMPLE, ending="-checked")
+@with_job("check", example=EXAMPLE, ending="-checked")
 def check_project(
     job: Job,
     *,
     path: Input,
-    out: Folder,
     documents: PageAndJson,
     reading: ReadOptions,
     threads: Threads = None,
@@ -35,22 +31,21 @@ def check_project(
     The project is not changed. Exit code 3: a serious mistake.
     """
     from photogram import diagnose
+    from photogram.formats.description import described
 
-    documents.place(out)  # rejected before any input is read
     project = read_project(job, path, reading)
     if not job.quiet:
         print_sections(described(project), "`photogram info`")
     with job.status("checking"):
         found = diagnose(project.block, threads=threads)
-    documents.conclude(job, "check", found, out)
+    documents.conclude(job, found)
 
 
-@with_job(example=(GALVESTON,), ending="-checked", name=GALVESTON)
+@with_job("giant check", example=(GALVESTON,), ending="-checked", example_name=GALVESTON)
 def check(
     job: Job,
     *,
     directory: Annotated[Path, Reads.PROJECT],
-    out: Folder,
     documents: PageAndJson,
     limits: str | None = None,
     threads: Threads = None,
@@ -62,7 +57,7 @@ def check(
     from photogram.giant import Limits, read_project
     from photogram.giant.checking import check as checked
 
-    documents.announce(job, out, TEXT)
+    documents.declare(job, TEXT)
     project = read_project(directory)
     allowed = Limits.parse(limits) if limits else None
     with job.status("checking"):
@@ -71,4 +66,4 @@ def check(
     inside, shown = f"{directory}{os.sep}", f"{job.shown(directory)}{os.sep}"
     for section in found.sections:
         section.findings = [replace(each, text=each.text.replace(inside, shown)) for each in section.findings]
-    documents.conclude(job, "giant check", found, out)
+    documents.conclude(job, found)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.command_classes import misuse
-from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, MaxBiasRatio, snooped
-from photogram.cli.console import OF_NETWORKS, print_document, print_sections
+from photogram.adjustment.options import AdjustOptions
+from photogram.cli.components import Basis, outcome
 from photogram.cli.documents import TEXT, Documents
-from photogram.cli.job import Input, Job, OutputFolder, Without, adjustment_status, with_job
-from photogram.cli.options import OrderingName, Threads, check_alone
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Changes, Input, Threads, Without, misuse
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.snooping_options import SnoopOptions, UnitWeight
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust
-    from photogram.collection import AdjustedCollection, Collection
+    from photogram.collection import AdjustedCollection
 
 PACKED = (".bz2", ".gz")
 
@@ -33,7 +34,6 @@ class CollectionFit:
     tolerance: float | None = None
     max_iterations: Annotated[int, typer.Option(min=1)] = 200
     covariance: Annotated[bool, typer.Option("--covariance/--no-covariance")] = True
-    max_bias_ratio: MaxBiasRatio = None
 
     @property
     def robust(self) -> robust.Loss | None:
@@ -45,16 +45,15 @@ class CollectionFit:
         return None
 
 
-@with_job(example=("collection", "ring.txt"))
+@with_job("collection", example=("collection", "ring.txt"))
 def collection(
     job: Job,
     *,
     problem: Input,
-    out: OutputFolder = None,
     documents: Annotated[Documents, Without("xlsx", "crs", "map")],
     fit: CollectionFit,
+    choices: Annotated[Mapping[str, Any], Changes(AdjustOptions, "ordering", "max_bias_ratio")],
     components: list[Basis] | None = None,
-    ordering: OrderingName = "auto",
     threads: Threads = None,
     snoop: bool = False,
     snooping: Annotated[SnoopOptions, Without("robust", "parts", "max_rounds", "unit_weight")],
@@ -62,73 +61,49 @@ def collection(
     strict: bool = False,
 ) -> None:
     """Adjust photos of unknown cameras by Levenberg-Marquardt steps from any initial values."""
-    if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
-        raise misuse("--out", "folder", name="adjusted.txt")
-    from photogram.collection import to_bytes
+    from photogram.collection import adjust, to_bytes
     from photogram.collection.formats import recognised
-    from photogram.show.forms import text
 
+    if (out := documents.out) is not None and out.suffix in (".txt", *PACKED) and not out.exists():
+        raise misuse("--out", "folder", name="adjusted.txt")
     if job.is_example and documents.plots:
-        out = out or Path("example-adjusted")
+        documents = replace(documents, out=out or Path("example-adjusted"))
     packing = problem.suffix if problem.suffix in PACKED else ""
     photos, found = recognised(problem)
     adjusted = f"adjusted{found.suffix}{packing}"
-    documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
-    documents.check_plots(job, out)
+    documents.declare(job, TEXT, adjusted, pictures=None)
     photos = photos.replace(image_sd=fit.sd)
     if snoop:
-        check_alone(job, "--snoop", ("--loss", "--scale"))
-    # The value of --sd is not verified, so the default differs from blocks.
-    snooping = replace(snooping, unit_weight=unit_weight)
-    result = _adjusted(job, photos, fit, snooping if snoop else None, components, ordering, threads)
-    result = result.with_max_bias_ratio(fit.max_bias_ratio)
-    result = result.estimated(job, photos, components, threads)
-    written = documents.plots_of(result.result, out)
-    if out is not None:
-        written[out / TEXT] = text(result.document).encode()
-        written[out / adjusted] = to_bytes(result.result.adjusted(), packing, found.name)
-        written |= result.files(out)
-    title = problem.name
-    written |= documents.page(job, "collection", out, lambda: replace(result.document, title=title))
-    written |= documents.as_json(result.subject)
+        job.alone("--snoop", ("--loss", "--scale"))
+    options = {
+        "tolerance": fit.tolerance,
+        "max_iterations": fit.max_iterations,
+        "ordering": choices.get("ordering", "auto"),
+    }
 
-    def summarize() -> None:
-        print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
-        print_document(result.document, "the report", *OF_NETWORKS)
+    def complete(result: AdjustedCollection) -> AdjustedCollection:
+        return result.with_max_bias_ratio(choices.get("max_bias_ratio"))
 
-    job.finish(
-        written,
-        documents.data(result.result),
-        documents.charts(result.result),
-        summary=summarize,
+    result = outcome(
+        job,
+        photos,
+        partial(adjust, photos, loss=fit.robust, covariance=fit.covariance, **options),
+        complete,
+        # The value of --sd is not verified, so the default differs from blocks.
+        snooping=replace(snooping, unit_weight=unit_weight) if snoop else None,
+        bases=components or (),
+        threads=threads,
+        options=options,
+        name="cost",
+        factor=0.5,
+    )
+    files = {adjusted: to_bytes(result.result.adjusted(), packing, found.name), **result.files}
+    documents.conclude(
+        job,
+        result.subject,
+        files if documents.out is not None else {},
+        document=replace(result.document, title=problem.name),
+        network=result.result,
+        above=[("File", [f"{job.shown(problem)}: {found.title}"])],
         code=result.verdict.exit_code(strict=strict),
     )
-
-
-def _adjusted(
-    job: Job,
-    photos: Collection,
-    fit: CollectionFit,
-    snooping: SnoopOptions | None,
-    components: list[Basis] | None,
-    ordering: OrderingName,
-    threads: int | None,
-) -> AdjustmentOutcome[AdjustedCollection]:
-    """Adjust a collection, with removal of gross errors on request."""
-    from photogram.collection import AdjustedCollection, adjust
-
-    with adjustment_status(job, name="cost", factor=0.5) as progress:
-        options: dict[str, Any] = {
-            "tolerance": fit.tolerance,
-            "max_iterations": fit.max_iterations,
-            "ordering": ordering,
-            "progress": progress,
-        }
-        if snooping is None:
-            return AdjustmentOutcome(
-                adjust(photos, loss=fit.robust, covariance=fit.covariance, threads=threads, **options)
-            )
-        log, made = snooped(photos, components, threads, snooping, options)
-        if not isinstance(log.result, AdjustedCollection):
-            raise TypeError("a collection gives the result of a collection")
-        return AdjustmentOutcome(log.result, log, made)

@@ -2,86 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
-import sys
-from copy import copy
-from dataclasses import MISSING, Field
-from functools import cache, partial
-from inspect import Parameter
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin
+from typing import Any
 
-import typer
 from typer.core import TyperCommand, TyperGroup
-from typer.models import OptionInfo
-
-from photogram.words import phrase
-
-UNLIMITED = 1e9  # Limits of numbers that the help does not show
-
-
-@cache
-def declarations() -> dict[str, tuple[str, str | None, str]]:
-    """Return panel, placeholder and help of options by name; see `options.toml`."""
-    panel, table = "", {}
-    for line in Path(__file__).with_name("options.toml").read_text(encoding="utf-8").splitlines():
-        if line.startswith("["):
-            panel = line.strip('[]"')
-        elif line and not line.startswith("#"):
-            name, _, value = line.partition(" = ")
-            texts = json.loads(value)  # strings and lists of them are the same in JSON
-            placeholder, text = (None, texts) if isinstance(texts, str) else texts
-            table[name.strip('"')] = panel, placeholder, text
-    return table
-
-
-def misuse(option: str, code: str, /, **fields: Any) -> typer.BadParameter:
-    """Return the error of an option: a code of the family `usage` with fields."""
-    return typer.BadParameter(str(phrase(f"usage.{code}", **fields)), param_hint=option)
-
-
-def declared(parameter: Parameter, owner: str) -> Parameter:
-    """Return an option, argument or class of options with its declaration."""
-    annotated = get_origin(parameter.annotation) is Annotated
-    kind, *marks = get_args(parameter.annotation) if annotated else (parameter.annotation,)
-    table, name = declarations(), parameter.name
-    panel, placeholder, text = table.get(f"{owner}.{name}") or table[name]
-    options = [mark for mark in marks if isinstance(mark, OptionInfo)]
-    if panel == "Arguments":
-        info = typer.Argument(metavar=placeholder, help=text)
-    else:
-        flag = [f"--{name.replace('_', '-')}"] if kind is bool else []
-        info = copy(options[0]) if options else typer.Option(*flag)
-        info.metavar, info.help, info.rich_help_panel = placeholder, text, panel
-    others = [mark for mark in marks if mark not in options]
-    return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[(kind, info, *others)])
-
-
-def option_of(field: Field[Any], kind: type) -> Parameter:
-    """Return the option of a field of a class of options; the help shows its limits."""
-    hint: Any = field.metadata.get("kind")
-    if hint is None:
-        hint = eval(str(field.type), vars(sys.modules[kind.__module__]))
-    default = None if field.default in ((), MISSING) else field.default
-    if field.metadata.get("kind") is not None and default is None:
-        hint |= None
-    if name := field.metadata.get("name"):
-        hint = Annotated[hint, typer.Option(name)]
-    low, high = (field.metadata.get(name, limit) for name, limit in (("low", -math.inf), ("high", math.inf)))
-    if int in (hint, field.metadata.get("kind")):
-        limits = (("min", low), ("max", high))
-        closed: dict[str, Any] = {name: limit for name, limit in limits if isinstance(limit, int)}
-        hint = Annotated[hint, typer.Option(**closed)] if closed else hint
-    parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=hint)
-    parameter = declared(parameter, kind.__name__)
-    if hint in (float, float | None) and -low < UNLIMITED:
-        sign = "" if field.metadata["open"] else "="
-        interval = f"x>{sign}{low:g}" if high > UNLIMITED else f"{low:g}<{sign}x<{sign}{high:g}"
-        _, info = get_args(parameter.annotation)
-        info.metavar = f"{info.metavar or '<float>'} [{interval}]"
-    return parameter
 
 
 class _Params:

@@ -9,6 +9,7 @@ import typer
 
 from photogram.cli.command_classes import Command, Group, GroupWithMain
 from photogram.cli.console import output
+from photogram.cli.options import declarations
 
 if TYPE_CHECKING:
     app: typer.Typer
@@ -19,96 +20,42 @@ ADJUST = (
     " `photogram adjust quarry --self-calibrate f,cx,cy,k1,k2 --map quarry.gpkg`"
 )
 
-COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
-    "adjust": (
-        "Adjust a block of any supported format: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...",
-        "adjust.adjust",
-    ),
-    "calibrate": (
-        "Calibrate cameras and rigs with images of a board: cameras with their uncertainty.",
-        "calibrate.calibrate",
-    ),
-    "check": (
-        "Search for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
-        "check.check_project",
-    ),
-    "info": (
-        "Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.",
-        "project_commands.info",
-    ),
-    "convert": (
-        "Write a project in another format and list the data that the format cannot contain.",
-        "project_commands.convert",
-    ),
-    "convert-lens": (
-        "Fit a lens of another model to a camera and report the differences.",
-        "convert_lens.convert_lens",
-    ),
-    "metadata": (
-        "List positions of photographs from their files: EXIF, XMP, .MRK, geo.txt ...; write a table.",
-        "project_commands.metadata",
-    ),
-    "features": (
-        "Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.",
-        "features.features",
-    ),
-    "statement": (
-        "Write an accuracy statement of a block by published standards: page, PDF, JSON document, tables.",
-        "statement.statement",
-    ),
-    "new": ("Write a small real project as tables with comments on their contents.", "project_commands.new"),
-    "collection": (
-        "Adjust photos of unknown cameras by Levenberg-Marquardt steps from any initial values.",
-        "collection.collection",
-    ),
-    "perspective-center": (
-        "Determine perspective centre, attitude and distortion of projectors from grid measurements.",
-        "perspective_center.perspective_center",
-    ),
-    "plan": (
-        "Predict the accuracy of a network before the flight for two patterns of control.",
-        "plan.plan",
-    ),
-    "simulate": (
-        "Write a simulated block as a GIANT project, or as tables if cameras move, with its truth.",
-        "simulate.simulate",
-    ),
-    "certificate": (
-        "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
-        "camera.certificate",
-    ),
-    "film": (
-        "Adjust a block on film in one step and in two; take marks from MicMac.",
-        {"compare": "film.film", "marks": "film.marks"},
-    ),
-    "giant": ("Adjust or check a GIANT project.", {"adjust": "giant.giant", "check": "check.check"}),
-    "absolute-orientation": (
-        "Orient a model absolutely, or transform its points.",
-        {
-            "orient": "absolute_orientation.absolute_orientation",
-            "transform": "absolute_orientation.transform",
-            "relative": "absolute_orientation.relative",
-        },
-    ),
-    "comparator": (
-        "Calibrate a comparator, correct measurements, compare calibrations.",
-        {
-            "calibrate": "comparator.comparator",
-            "correct": "comparator.correct",
-            "compare": "comparator.compare_calibrations",
-        },
-    ),
-    "camera": ("Compare calibrations of cameras over years.", {"compare": "camera.compare_certificates"}),
-    "stellar-camera": (
-        "Calibrate a camera by a plate with stars, or by exposures of the sky.",
-        {
-            "plate": "stellar_camera.stellar_camera",
-            "exposures": "stellar_camera.exposures",
-            "places": "stellar_camera.places",
-        },
-    ),
+COMMANDS: dict[str, str | dict[str, str]] = {
+    "adjust": "adjust.adjust",
+    "calibrate": "calibrate.calibrate",
+    "check": "check.check_project",
+    "info": "project_commands.info",
+    "convert": "project_commands.convert",
+    "convert-lens": "convert_lens.convert_lens",
+    "metadata": "project_commands.metadata",
+    "features": "features.features",
+    "statement": "statement.statement",
+    "new": "project_commands.new",
+    "collection": "collection.collection",
+    "perspective-center": "perspective_center.perspective_center",
+    "plan": "plan.plan",
+    "simulate": "simulate.simulate",
+    "certificate": "camera.certificate",
+    "film": {"compare": "film.film", "marks": "film.marks"},
+    "giant": {"adjust": "giant.giant", "check": "check.check"},
+    "absolute-orientation": {
+        "orient": "absolute_orientation.absolute_orientation",
+        "transform": "absolute_orientation.transform",
+        "relative": "absolute_orientation.relative",
+    },
+    "comparator": {
+        "calibrate": "comparator.comparator",
+        "correct": "comparator.correct",
+        "compare": "comparator.compare_calibrations",
+    },
+    "camera": {"compare": "camera.compare_certificates"},
+    "stellar-camera": {
+        "plate": "stellar_camera.stellar_camera",
+        "exposures": "stellar_camera.exposures",
+        "places": "stellar_camera.places",
+    },
 }
-"""Purpose of each command, and file and function; a group lists its commands, the main command first."""
+"""File and function of each command; a group lists its commands, the main command first."""
 
 
 def application(word: str | None = None) -> typer.Typer:
@@ -122,7 +69,8 @@ def application(word: str | None = None) -> typer.Typer:
         no_args_is_help=True,
         pretty_exceptions_enable=False,
     )
-    for name, (purpose, home) in COMMANDS.items():
+    for name, home in COMMANDS.items():
+        _, _, purpose = declarations()[f"command.{name}"]
         if word not in (None, name):
             made.command(name, cls=Command, help=purpose)(_not_loaded)
         elif isinstance(home, str):

@@ -4,40 +4,43 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.console import print_document, print_remark, print_withheld
-from photogram.cli.documents import Documents, PageAndJson
-from photogram.cli.job import Folder, Job, OutputFile, Reads, Without, with_job
+from photogram.cli.console import print_document, print_remark
+from photogram.cli.documents import PageAndJson
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Changes, OutputFile, Reads
+from photogram.comparator.options import Options
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
+    from photogram.io.writing import Content
 
 
 Hand = Literal["file", "left", "right"]  # Handedness of the comparator against the plate
 
 
-@with_job(example=("comparator", "comparator-3.txt"), ending="-calibrated", name="comparator")
+@with_job(
+    "comparator", example=("comparator", "comparator-3.txt"), ending="-calibrated", example_name="comparator"
+)
 def comparator(
     job: Job,
     *,
     paths: Annotated[list[Path] | None, Reads.FILE] = None,
     grid: Annotated[list[str] | None, Reads.FILE] = None,
     hand: Hand = "file",
-    out: Folder,
-    json: OutputFile = None,
-    documents: Annotated[PageAndJson, Without("json")],
+    documents: PageAndJson,
     pdf: bool = False,
     plots: Annotated[bool, typer.Option("--plots/--no-plots")] = True,
     as_published: bool = False,
-    polynomial: Annotated[bool, typer.Option("--polynomial/--linear-only")] = True,
-    estimate_grid: bool = False,
+    choices: Annotated[Mapping[str, Any], Changes(Options, "polynomial", "estimate_grid")],
     each_case: bool = False,
     date: str | None = None,
     strict: bool = False,
@@ -47,14 +50,13 @@ def comparator(
     Writes listing.txt, report.html (with plots), correction.json and the corrected grid of each plate. If the
     verdict forbids their use because of outliers, correction and grid are withheld. The exit code is 4.
     """
-    from photogram.comparator import Options, calibrate, find_grid, read
+    from photogram.comparator import calibrate, find_grid, listing, read
     from photogram.errors import InputError
     from photogram.statistics.verdict import worst
 
     left_handed = None if hand == "file" else hand == "left"
     sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
-    options = Options.as_published() if as_published else Options()
-    options = replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
+    options = replace(Options.as_published() if as_published else Options(), **choices)
     if each_case:
         sessions = [replace(session, plot_each_case=True) for session in sessions]
     calibrations = [calibrate(session, options) for session in sessions]
@@ -63,32 +65,41 @@ def comparator(
             text = message.phrase or str(message.text)
             raise InputError(text, file=message.file, record=message.record, text=message.record_text)
     job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
-    several = len(calibrations) > 1
-    placed = {out / str(k) if several else out: one for k, one in enumerate(calibrations, 1)}
-    written = _results(job, placed, _run_date(date), pdf=pdf and plots)
-    if documents.html is not None or (plots and not pdf):
-        written |= _pages(job, placed, documents)
-    asked = {json: _document(calibrations)} if json is not None else {}
-    job.write(written, asked)
-    for place, one in placed.items():
-        if not one.usable:
-            fields = {"comparator": one.session.comparator, "reason": one.verdict.headline}
-            print_withheld(phrase("command.correction-withheld", **fields), _corrections(one, place))
+    run_date, several = _run_date(date), len(calibrations) > 1
+    files: dict[Path, Content] = {}
+    for number, one in enumerate(calibrations, 1):
+        own = replace(documents, out=documents.folder / str(number)) if several else documents
+        files |= own.inside({"listing.txt": listing(one, run_date).encode()})
+        reason = {"comparator": one.session.comparator, "reason": one.verdict.headline}
+        withheld = phrase("command.correction-withheld", **reason)
+        files |= own.unless_withheld(_corrections(one), withheld, usable=one.usable)
+        if pdf and plots:
+            files |= own.inside(_pdf(job, one, run_date))
+        if documents.html is not None or (plots and not pdf):
+            mark = f"-{number}" if documents.html is not None and several else ""
+            files |= own.page(job, replace(one, messages=job.told(one.messages)).document, mark)
+    texts = [one.to_json() for one in calibrations] if documents.json is not None else []
+    json = b"[" + b",\n".join(texts) + b"]\n" if several else b"".join(texts)
     code = worst(calibration.verdict for calibration in calibrations)
-    job.conclude([*written, *asked], summary=lambda: _summarize(calibrations), code=code)
+    job.finish(
+        files,
+        {documents.json: json} if documents.json is not None else {},
+        summary=lambda: _summarize(calibrations),
+        code=code,
+    )
 
 
-def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
+def _corrections(calibration: Calibration) -> dict[str, bytes]:
     """Return the files for corrections: corrections and corrected grids."""
     from photogram.comparator.calibration import adjusted_grid, corrected_grid
 
-    made = {place / "correction.json": calibration.correction.to_json()}
+    made = {"correction.json": calibration.correction.to_json()}
     if calibration.joint:
-        made[place / "correction-joint.json"] = calibration.joint.correction.to_json()
+        made["correction-joint.json"] = calibration.joint.correction.to_json()
     for plate in calibration.plates:
-        made[place / f"grid-{plate}.csv"] = corrected_grid(calibration, plate).to_csv()
+        made[f"grid-{plate}.csv"] = corrected_grid(calibration, plate).to_csv()
         if calibration.joint:
-            made[place / f"grid-{plate}-joint.csv"] = adjusted_grid(calibration, plate).to_csv()
+            made[f"grid-{plate}-joint.csv"] = adjusted_grid(calibration, plate).to_csv()
     return made
 
 
@@ -107,44 +118,19 @@ def _run_date(date: str | None) -> str:
         raise InputError(phrase("command.epoch", value=epoch)) from None
 
 
-def _results(job: Job, placed: dict[Path, Calibration], run_date: str, *, pdf: bool) -> dict[Path, bytes]:
-    """Return all files of the output folder except pages."""
-    from photogram.comparator import listing
-
-    written: dict[Path, bytes] = {}
-    for place, calibration in placed.items():
-        written[place / "listing.txt"] = listing(calibration, run_date).encode()
-        if calibration.usable:
-            written |= _corrections(calibration, place)
-    if pdf:
-        try:
-            written |= {place / "report.pdf": _pdf(one, run_date) for place, one in placed.items()}
-        except ModuleNotFoundError:
-            if not job.quiet:
-                print_remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
-    return written
-
-
-def _pdf(calibration: Calibration, run_date: str) -> bytes:
+def _pdf(job: Job, calibration: Calibration, run_date: str) -> dict[str, bytes]:
+    """Return the report as PDF; none, with a remark, if a package is missing."""
     from photogram.show.page import Fact
-    from photogram.show.pdf import page_pdf
 
-    return page_pdf(replace(calibration.document(), head=[Fact("Date of the run", run_date)]))
+    try:
+        from photogram.show.pdf import page_pdf
 
-
-def _pages(job: Job, placed: dict[Path, Calibration], documents: Documents) -> dict[Path, bytes]:
-    """Make the reports for the browser, one for each calibration."""
-    written: dict[Path, bytes] = {}
-    for number, (place, calibration) in enumerate(placed.items(), 1):
-        mark = f"-{number}" if documents.html is not None and len(placed) > 1 else ""
-        make = replace(calibration, messages=job.told(calibration.messages)).document
-        written |= documents.page(job, "comparator", place, make, mark)
-    return written
-
-
-def _document(calibrations: list[Calibration]) -> bytes:
-    documents = [calibration.to_json() for calibration in calibrations]
-    return documents[0] if len(documents) == 1 else b"[" + b",\n".join(documents) + b"]\n"
+        page = replace(calibration.document(), head=[Fact("Date of the run", run_date)])
+        return {"report.pdf": page_pdf(page)}
+    except ModuleNotFoundError:
+        if not job.quiet:
+            print_remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
+        return {}
 
 
 def _summarize(calibrations: list[Calibration]) -> None:
@@ -154,7 +140,7 @@ def _summarize(calibrations: list[Calibration]) -> None:
         print_document(calibration.document(), "listing.txt", "variance", "linear", remarks=remarks)
 
 
-@with_job()
+@with_job("comparator correct")
 def correct(
     job: Job,
     *,
@@ -184,12 +170,11 @@ def correct(
     job.finish({corrected: made} if corrected else {})
 
 
-@with_job(example=(), ending="-compared", name="comparator")
+@with_job("comparator compare", example=(), ending="-compared", example_name="comparator")
 def compare_calibrations(
     job: Job,
     *,
     calibrations: Annotated[list[Path] | None, Reads.FILE] = None,
-    out: Folder,
     documents: PageAndJson,
 ) -> None:
     """Compare calibrations over years: drift, steps, control charts; adjust their grids together.
@@ -198,20 +183,9 @@ def compare_calibrations(
     grid has changed. Grids that do not agree with their readings are withheld.
     """
     from photogram.comparator import compare as compared
+    from photogram.comparator.simulation import simulated_years
 
-    if job.is_example:
-        from photogram.comparator.simulation import simulated_years
-
-        found = compared(simulated_years())
-    else:
-        found = compared(calibrations or [])
+    found = compared(simulated_years() if job.is_example else calibrations or [])
     grids = found.grids if found.usable_grids else {}
-    documents.conclude(
-        job,
-        "comparator compare",
-        found,
-        out,
-        text=False,
-        more={out / f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()},
-        tables=("calibrations", "series"),
-    )
+    files = {f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()}
+    documents.conclude(job, found, files, report=False, tables=("calibrations", "series"))

@@ -1,16 +1,12 @@
-"""Variance components of commands, and the basis of the unit variance."""
+"""Adjustments of commands with removal of gross errors and variance components."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from enum import StrEnum
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar, cast
 
-import typer
-
-from photogram.cli.job import Job, estimation_status
+from photogram.cli.job import Job, adjustment_status, estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -23,45 +19,8 @@ if TYPE_CHECKING:
     from photogram.statistics.verdict import Verdict
 
 Network = TypeVar("Network", bound="AdjustedNetwork")
-COMPONENTS = "components.txt"
-
-
-UnitVarianceName = Literal["constrained", "unity", "redundancy"]
-MaxBiasRatio = Annotated[float | None, typer.Option(min=0.001)]
-
-
-class Basis(StrEnum):
-    """Criteria for groups of observations."""
-
-    KIND = "kind"
-    CAMERA = "camera"
-    STRIP = "strip"
-    PHOTO = "photo"
-    POINT_CLASS = "point-class"
-    COMPONENT = "component"
-    RAYS = "rays"
-
-
-def _groups(bases: list[Basis]) -> list[str]:
-    return [basis.replace("-", " ") for basis in bases]
-
-
-def snooped(
-    network: object,
-    bases: list[Basis] | None,
-    threads: int | None,
-    how: SnoopOptions,
-    options: Mapping[str, Any],
-) -> tuple[Snooped, Cleaned | None]:
-    """Remove gross errors; estimate weights alternately if components are requested."""
-    if bases:
-        from photogram.adjustment.cleaning import clean
-
-        made = clean(network, _groups(bases), how, threads=threads, **options)
-        return made.snooped, made
-    from photogram.adjustment.snooping import snoop
-
-    return snoop(network, how, threads=threads, **options), None
+Basis = Literal["kind", "camera", "strip", "photo", "point-class", "component", "rays"]
+"""Criteria for groups of observations."""
 
 
 @dataclass(frozen=True)
@@ -83,27 +42,11 @@ class AdjustmentOutcome(Generic[Network]):
         """The verdict that determines the exit code."""
         return (self.components or self.subject).verdict
 
-    def with_max_bias_ratio(self, ratio: float | None) -> AdjustmentOutcome[Network]:
-        """Return the outcome with another limit of the effects of undetected errors."""
-        result = self.result.with_max_bias_ratio(ratio)
-        return replace(self, result=result, log=self.log and replace(self.log, result=result))
-
-    def estimated(
-        self, job: Job, network: object, bases: list[Basis] | None, threads: int | None
-    ) -> AdjustmentOutcome[Network]:
-        """Return the outcome with requested components if it lacks them."""
-        if self.cleaned is not None or not bases:
-            return self
-        from photogram.adjustment.components import variance_components
-
-        with estimation_status(job) as progress:
-            found = variance_components(network, _groups(bases), threads=threads, progress=progress)
-        return replace(self, components=found)
-
-    def files(self, out: Path) -> dict[Path, bytes]:
-        """Return the file of variance components in the output folder."""
+    @property
+    def files(self) -> dict[str, bytes]:
+        """The file of variance components, if the user wants them."""
         weights = self.cleaned or self.components
-        return {} if weights is None else {out / COMPONENTS: weights.report().encode()}
+        return {} if weights is None else {"components.txt": weights.report().encode()}
 
     @cached_property
     def document(self) -> Document:
@@ -114,3 +57,41 @@ class AdjustmentOutcome(Generic[Network]):
             return self.cleaned.document()
         network = self.subject.document()
         return network if self.components is None else weighed_document(self.components, network)
+
+
+def outcome(
+    job: Job,
+    network: object,
+    adjust: Callable[..., Network],
+    complete: Callable[[Network], Network],
+    *,
+    snooping: SnoopOptions | None,
+    bases: Sequence[Basis],
+    threads: int | None,
+    options: Mapping[str, Any],
+    **status: Any,
+) -> AdjustmentOutcome[Network]:
+    """Adjust a network, and remove gross errors and estimate variance components on request.
+
+    `adjust` adjusts once, `complete` adds messages to a result, and `options` are those of snooping.
+    """
+    from photogram.adjustment.cleaning import clean
+    from photogram.adjustment.components import variance_components
+    from photogram.adjustment.snooping import snoop
+
+    groups = [basis.replace("-", " ") for basis in bases]
+    log = cleaned = components = None
+    with adjustment_status(job, **status) as progress:
+        common: dict[str, Any] = {"threads": threads, "progress": progress}
+        if snooping is None:
+            result = adjust(**common)
+        elif groups:
+            cleaned = clean(network, groups, snooping, **common, **options)
+            log = cleaned.snooped
+        else:
+            log = snoop(network, snooping, **common, **options)
+    result = complete(result if log is None else cast("Network", log.result))
+    if groups and cleaned is None:
+        with estimation_status(job) as estimated:
+            components = variance_components(network, groups, threads=threads, progress=estimated)
+    return AdjustmentOutcome(result, log and replace(log, result=result), cleaned, components)

@@ -24,7 +24,7 @@ NOT_CONVERGED = 3
 NOT_USABLE = 4
 SHOWN = 40  # Maximum number of lines of a section in the summary of a command
 
-OF_NETWORKS = ("remarks", "components", "removed", "features", "tests", "worst")
+SUMMARY = ("remarks", "components", "removed", "features", "tests", "worst")
 """Sections of the document of a network in the summary of a command."""
 
 EXTRAS = {

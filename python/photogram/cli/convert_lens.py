@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.arguments.fields import option
-from photogram.cli.command_classes import misuse
-from photogram.cli.console import print_document
-from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, with_job
-from photogram.lazy_dataclasses import dataclass
+from photogram.cli.console import NOT_USABLE
+from photogram.cli.documents import Documents
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Only, Reads, misuse
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.targets.calibration_options import pair
 from photogram.targets.worth_options import distances_of
 from photogram.words import phrase
@@ -21,8 +22,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.network.cameras import Camera
     from photogram.targets import Conversion
-
-BEYOND_TOLERANCE = 4  # The exit code of a difference that is larger than asked
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class LensFit:
         )
 
 
-@with_job()
+@with_job("convert-lens")
 def convert_lens(
     job: Job,
     *,
@@ -60,28 +59,30 @@ def convert_lens(
     camera: str | None = None,
     fit: LensFit,
     tolerance: float | None = None,
-    out: OutputFolder = None,
-    json: OutputFile = None,
-    plots: bool = False,
+    documents: Annotated[Documents, Only("out", "json", "plots")],
 ) -> None:
     """Fit a lens of another model to a camera and report the differences.
 
     The report contains root mean square and largest difference of 60 x 40 pixels, the largest one's position,
     and the motion of the axes. If the camera has covariances, the new camera has covariances, too.
     """
-    if plots and out is None:
-        raise misuse("--plots", "requires", options="--out DIR")
+    documents = replace(documents, no_html=True)
+    documents.declare(job, pictures=["difference"])
+    from photogram.targets.drawing import plot_difference
+
     source, known = _camera(job, path, camera)
     extent = fit.size or known
     if extent is None:
         raise misuse("--size", "no-size", file=path)
     with job.status("fitting the lens"):
         found = fit.converted(source, to, extent)
-    job.finish(
-        {} if out is None else {out / name: content for name, content in _files(found, plots).items()},
-        {} if json is None else {json: found.to_json()},
-        summary=lambda: print_document(found.document(), "report.txt"),
-        code=0 if tolerance is None or found.within(tolerance) else BEYOND_TOLERANCE,
+    documents.conclude(
+        job,
+        found,
+        _files(found) if documents.out is not None else {},
+        plots=lambda: {"difference": plot_difference(found.difference)},
+        tables=(),
+        code=0 if tolerance is None or found.within(tolerance) else NOT_USABLE,
     )
 
 
@@ -105,18 +106,15 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
     return shifted(project.block.cameras[row], -MIDDLE), project.sizes[row]
 
 
-def _files(found: Conversion, plots: bool) -> dict[str, bytes]:
+def _files(found: Conversion) -> dict[str, bytes]:
     """Return the output files: the camera in each suitable format."""
     from photogram.errors import InputError
-    from photogram.targets.drawing import plot_difference
     from photogram.targets.output.formats import CAMERA_FORMATS
 
-    files = {"report.txt": found.report().encode(), "difference.csv": found.to_csv()}
+    files = {"difference.csv": found.to_csv()}
     for name, make in CAMERA_FORMATS.items():
         try:
             files |= {f"{name}/{file}": content for file, content in make(found.rig()).items()}
         except InputError:
             continue
-    if plots:
-        files["difference.png"] = plot_difference(found.difference).render("png")
     return files

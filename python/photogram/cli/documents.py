@@ -5,31 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rich.markup import escape
 
-from photogram.cli.command_classes import misuse
-from photogram.cli.console import output, print_document, print_remark, print_sections
-from photogram.cli.job import Job, OutputFile, OutputFolder, Without
-from photogram.cli.options import PictureFormat
+from photogram.cli.console import (
+    SUMMARY,
+    output,
+    print_document,
+    print_remark,
+    print_sections,
+    print_withheld,
+)
+from photogram.cli.job import Job
+from photogram.cli.options import Only, OutputFile, OutputFolder, Without, misuse
 from photogram.lazy_dataclasses import dataclass
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.results.network import AdjustedNetwork
     from photogram.show.forms import TitledLines
-    from photogram.show.page import Document, Drawing
+    from photogram.show.page import Document
     from photogram.show.sketch.plot import Plot
 
 TEXT, HTML = "report.txt", "report.html"
+PictureFormat = Literal["png", "pdf", "svg"]
 
 
 @dataclass(frozen=True)
 class Documents:
     """Options for the forms of a result."""
 
+    out: OutputFolder = None
     json: OutputFile = None
     xlsx: OutputFile = None
     html: OutputFile = None
@@ -42,31 +50,55 @@ class Documents:
     ply: OutputFile = None
     ply_origin: tuple[float, float, float] | None = None
 
-    def place(self, out: Path | None) -> Path | None:
-        """Return the path of the browser report; None without a report."""
+    def __post_init__(self) -> None:
+        if self.no_html and self.html is not None:
+            raise misuse("--no-html", "conflict", options="--html")
+
+    @property
+    def folder(self) -> Path:
+        """The output folder of a command that has one always."""
+        assert self.out is not None
+        return self.out
+
+    @property
+    def place(self) -> Path | None:
+        """The path of the browser report; None without a report."""
         if self.no_html:
-            if self.html is not None:
-                raise misuse("--no-html", "conflict", options="--html")
             return None
-        return self.html or (out / HTML if out is not None else None)
+        return self.html or (self.out / HTML if self.out is not None else None)
 
-    def announce(self, job: Job, out: Path | None, *names: str, picture: str = "") -> list[Path]:
-        """Declare outputs: files, browser report and one plot; return its path."""
-        drawn = []
-        if picture and self.plots:
-            if out is None:
+    def inside(self, files: Mapping[str, Content]) -> dict[Path, Content]:
+        """Return files of the output folder by their paths; none without a folder."""
+        return {} if self.out is None else {self.out / name: each for name, each in files.items()}
+
+    def unless_withheld(
+        self, files: Mapping[str, Content], message: Phrase, *, usable: bool
+    ) -> dict[Path, Content]:
+        """Return files of the output folder; none, with a message, if the verdict forbids their use."""
+        paths = self.inside(files)
+        if usable:
+            return paths
+        print_withheld(message, paths)
+        return {}
+
+    def declare(self, job: Job, *names: str, pictures: Iterable[str] | None = ()) -> None:
+        """Declare outputs: files, browser report, and requested plots; None: the plots of networks."""
+        if self.plots:
+            if self.out is None:
                 raise misuse("--plots", "requires", options="--out DIR")
-            drawn = [out / f"{picture}.{self.plot_format}"]
-        place = self.place(out)
-        job.writes(*drawn, *(out / name for name in names if out is not None), *([place] if place else []))
-        return drawn
+            from photogram.plots.accessor import PLOTS
+            from photogram.show.style import MATPLOTLIB, need
 
-    def page(
-        self, job: Job, command: str, out: Path | None, make: Callable[[], Document], mark: str = ""
-    ) -> dict[Path, bytes]:
+            if self.plot_format != "svg":
+                need(*MATPLOTLIB)
+            drawn = PLOTS if pictures is None else pictures
+            names = (*names, *(f"{name}.{self.plot_format}" for name in drawn))
+        place = self.place
+        job.writes(*self.inside(dict.fromkeys(names, b"")), *([place] if place else []))
+
+    def page(self, job: Job, make: Callable[[], Document], mark: str = "") -> dict[Path, bytes]:
         """Return the browser report; none, with a remark, if its contours require contourpy."""
-        place = self.place(out)
-        if place is None:
+        if self.place is None:
             return {}
         from photogram.show.html import page_html
         from photogram.show.run import reproducibility
@@ -74,63 +106,45 @@ class Documents:
         try:
             with job.status("drawing the report"):
                 page = make()
-                content = page_html(page.with_sections(reproducibility(job.run(command), page.phases)))
+                content = page_html(page.with_sections(reproducibility(job.run(), page.phases)))
         except ModuleNotFoundError as error:
             if self.html is not None or error.name != "contourpy":
                 raise
             if not job.quiet:
                 print_remark(phrase("command.no-file", name=HTML, extra="report"))
             return {}
-        return {place.with_stem(place.stem + mark): content}
+        return {self.place.with_stem(self.place.stem + mark): content}
 
-    def check_plots(self, job: Job, out: Path | None) -> None:
-        """Declare all plots of a network as outputs, if the user wants plots."""
+    def pictures(self, make: Callable[[], Mapping[str, Plot | None]], mark: str = "") -> dict[Path, Content]:
+        """Return plots by name as files, if the user wants plots."""
         if not self.plots:
-            return
-        if out is None:
-            raise misuse("--plots", "requires", options="--out DIR")
-        from photogram.plots.accessor import PLOTS
-        from photogram.show.style import MATPLOTLIB, need
-
-        if self.plot_format != "svg":
-            need(*MATPLOTLIB)
-        job.writes(*(out / f"{name}.{self.plot_format}" for name in PLOTS))
-
-    def plots_of(self, result: AdjustedNetwork, out: Path | None) -> dict[Path, bytes]:
-        """Return the plots of a network as files, if the user wants plots."""
-        return self._plot_files(result.plot.available, out)
-
-    def drawings(self, make: Callable[[], Sequence[Drawing]], out: Path | None) -> dict[Path, bytes]:
-        """Return drawings of a page as files, if the user wants plots."""
-        return self._plot_files(lambda: {drawing.name: drawing.sketch() for drawing in make()}, out)
-
-    def _plot_files(
-        self, make: Callable[[], Mapping[str, Plot | None]], out: Path | None
-    ) -> dict[Path, bytes]:
-        if not self.plots or out is None:
             return {}
-        ending, plots = self.plot_format, make()
-        return {out / f"{name}.{ending}": plot.render(ending) for name, plot in plots.items() if plot}
+        drawn = {name: plot for name, plot in make().items() if plot is not None}
+        ending = self.plot_format
+        return self.inside({f"{name}{mark}.{ending}": plot.render(ending) for name, plot in drawn.items()})
 
-    def as_json(self, result: Any) -> dict[Path, bytes]:
+    def as_json(self, result: Any, mark: str = "") -> dict[Path, bytes]:
         """Return the file of `--json FILE`; none without it."""
-        return {} if self.json is None else {self.json: result.to_json()}
+        return {} if self.json is None else {self.json.with_stem(self.json.stem + mark): result.to_json()}
 
-    def charts(
-        self,
-        result: AdjustedNetwork,
-        sizes: Sequence[tuple[float, float] | None] = (),
-        *,
-        quiet: bool = False,
-    ) -> dict[Path, bytes]:
-        """Return the files of `--map FILE` and `--ply FILE`; none without them."""
+    def of_network(
+        self, result: AdjustedNetwork, sizes: Sequence[tuple[float, float] | None], *, quiet: bool
+    ) -> dict[Path, Content]:
+        """Return the files of `--parquet`, `--xlsx`, `--map` and `--ply`, if the user wants them."""
         from photogram import Result
 
-        files: dict[Path, bytes] = {}
+        files: dict[Path, Content] = {}
+        if self.parquet is not None:
+            files |= {self.parquet / name: content for name, content in result._files().items()}
+        if self.xlsx is not None and isinstance(result, Result):
+            from photogram.formats.adjusted import excel_file
+
+            files[self.xlsx] = excel_file(result)
         if self.map is not None and isinstance(result, Result):
             from photogram.formats.maps import map_files
 
-            files, remarks = map_files(result, self.map, self.crs, sizes=sizes)
+            charts, remarks = map_files(result, self.map, self.crs, sizes=sizes)
+            files |= charts
             for remark in () if quiet else remarks:
                 print_remark(remark)
         if self.ply is not None:
@@ -141,43 +155,78 @@ class Documents:
             files[self.ply] = point_cloud(result, in_crs, origin=self.ply_origin or (0.0, 0.0, 0.0))
         return files
 
-    def data(self, result: AdjustedNetwork) -> dict[Path, Content]:
-        """Return the files of `--parquet DIR`; none without it."""
-        if self.parquet is None:
-            return {}
-        return {self.parquet / name: content for name, content in result._files().items()}
-
     def conclude(
         self,
         job: Job,
-        command: str,
         result: Any,
-        out: Path | None,
+        files: Mapping[str, Content] | None = None,
         *,
-        text: bool = True,
-        more: dict[Path, bytes] | None = None,
+        document: Document | None = None,
+        network: AdjustedNetwork | None = None,
+        sizes: Sequence[tuple[float, float] | None] = (),
+        plots: Callable[[], Mapping[str, Plot | None]] = dict,
+        report: bool = True,
+        beside: Mapping[Path, Content] | None = None,
+        below: Iterable[TitledLines] = (),
         above: Iterable[TitledLines] = (),
-        tables: Sequence[str] = (),
+        tables: Sequence[str] | None = None,
+        remarks: Iterable[object] = (),
         code: int | None = None,
     ) -> None:
-        """Write a result and further files, print its report or tables, exit by its verdict."""
+        """Write a result, print a summary, and exit by the verdict.
+
+        Parameters
+        ----------
+        files, beside
+            Further files of the output folder by name, and files in other places.
+        document
+            Document of the result; None: its own.
+        network, sizes
+            Adjusted network with plots, Parquet files and maps, and pixels of its photos.
+        plots
+            Plots by name, beside those of a network.
+        report, below
+            Whether the text of the document is a file of the output folder, and lines below it.
+        above, tables, remarks
+            Lines above the summary, its tables or sections, and remarks below. None: the whole report of a
+            result that is no network.
+        code
+            Exit code; None: of the verdict.
+        """
+        from photogram.show.cells import formatted
+        from photogram.show.forms import text
+
+        made = document or result.document()
+        made = made if network is None else formatted(made)
+        lines = [line for title, own in below for line in (title, *(f"  {each}" for each in own))]
+        texts = {TEXT: "\n".join([text(made), *lines, *([""] if lines else [])]).encode()} if report else {}
 
         def summarize() -> None:
             print_sections(above, "the report")
-            if tables:
-                print_document(result.document(), "the report", *tables)
-            else:
-                output.print(escape(result.report().removesuffix("\n")))
+            if network is None and tables is None:
+                output.print(escape(text(made).removesuffix("\n")))
+                return
+            keys = (*(SUMMARY if network is not None else ()), *(tables or ()))
+            print_document(made, TEXT if report else "the report", *keys, remarks=remarks)
 
-        document, page = self.as_json(result), self.page(job, command, out, result.document)
-        texts = {out / TEXT: result.report().encode()} if text and out is not None else {}
-        files = [texts, document, page] if texts else [{**(more or {}), **page}, document]
-        job.finish(*files, summary=summarize, code=result.verdict.exit if code is None else code)
+        job.finish(
+            self.inside(texts | dict(files or {})),
+            beside or {},
+            lambda: self.page(job, lambda: made),
+            lambda: self.pictures(
+                lambda: {**({} if network is None else network.plot.available()), **plots()}
+            ),
+            lambda: self.as_json(result),
+            lambda: {} if network is None else self.of_network(network, sizes, quiet=job.quiet),
+            summary=summarize,
+            code=result.verdict.exit if code is None else code,
+        )
 
 
 OF_NETWORKS = ("xlsx", "parquet", "crs", "map", "ply", "ply_origin")
 OfPrograms = Annotated[Documents, Without(*OF_NETWORKS)]
 PageAndJson = Annotated[Documents, Without("plots", "plot_format", *OF_NETWORKS)]
+FilesAndJson = Annotated[Documents, Only("out", "json")]
 
 
 def check_maps(chart: Path | None) -> None:

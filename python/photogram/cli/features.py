@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.adjust import result_at
-from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_document
-from photogram.cli.job import Input, Job, OutputFile, OutputFolder, with_job
-from photogram.cli.options import Threads
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, OutputFile, OutputFolder, Threads, misuse
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import dataclass, fields
 
@@ -43,7 +42,7 @@ class FeatureOptions:
         return found
 
 
-@with_job(example=("flange",))
+@with_job("features", example=("flange",))
 def features(
     job: Job,
     *,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from photogram.cli.adjust import adjusted_block, started_block
 from photogram.cli.console import print_sections
 from photogram.cli.documents import PageAndJson
-from photogram.cli.job import Folder, Input, Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Threads
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, OutputFolder, Reads, Threads
 from photogram.cli.projects import read_project
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import replace
@@ -21,12 +21,11 @@ if TYPE_CHECKING:
     from photogram.show.forms import TitledLines
 
 
-@with_job(example=("archive",), ending="-film")
+@with_job("film", example=("archive",), ending="-film")
 def film(
     job: Job,
     *,
     path: Input,
-    out: Folder,
     documents: PageAndJson,
     reading: ReadOptions,
     threads: Threads = None,
@@ -43,8 +42,7 @@ def film(
     from photogram.film import compare_steps
 
     found = compare_steps(*(_adjusted(job, path, reading, how, threads) for how in ("inside", "before")))
-    code = found.inside.verdict.exit_code(strict=strict)
-    documents.conclude(job, "film", found, out, code=code)
+    documents.conclude(job, found, code=found.inside.verdict.exit_code(strict=strict))
 
 
 def _adjusted(job: Job, path: Path, reading: ReadOptions, interior: str, threads: int | None) -> Result:
@@ -59,7 +57,7 @@ def _adjusted(job: Job, path: Path, reading: ReadOptions, interior: str, threads
     return adjusted_block(job, project, started or block, threads=threads)
 
 
-@with_job()
+@with_job("film marks")
 def marks(
     job: Job,
     *,

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
 from photogram.cli.job import Job, adjustment_status
+from photogram.lazy_dataclasses import replace
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram.cli.choices import Choices
     from photogram.distributed import Division
     from photogram.distributed.plan import PartsPlan
 
@@ -37,7 +38,7 @@ def adjusted_on_disk(
     path: Path,
     target: Path,
     division: Division,
-    choices: Choices,
+    choices: Mapping[str, Any],
     threads: int | None,
     *,
     is_plan: bool,
@@ -48,14 +49,11 @@ def adjusted_on_disk(
 
     if not streamable(path):
         return False
-    for name in job.given:
-        if name not in TAKEN:
-            typed = [option for option in job.given if option in DIVIDING]
-            raise misuse(name, "parquet-in-parts", options=typed)
+    job.only(TAKEN, "parquet-in-parts", options=[each for each in job.given if each in DIVIDING])
     from photogram.formats import in_parts
 
     reading, folder = ReadOptions(), Path(division.folder or target / "run")
-    change = choices.options
+    change = partial(replace, **choices)
     if is_plan:
         print_plan(in_parts.planned_on_disk(path, reading, folder, division, change=change))
         return True

@@ -5,11 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
-from enum import Enum
 from functools import partial, wraps
 from importlib.resources import as_file, files
 from inspect import Parameter, signature
@@ -18,10 +17,19 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
-from typer.models import ArgumentInfo, OptionInfo
 
-from photogram.cli.command_classes import declared, misuse, option_of
 from photogram.cli.console import errors, failures, print_report, print_written
+from photogram.cli.options import (
+    Reads,
+    Writes,
+    arrange,
+    declared,
+    given_options,
+    misuse,
+    option_name,
+    options_of,
+    roles,
+)
 from photogram.messages import Message
 from photogram.words import phrase
 
@@ -34,31 +42,7 @@ if TYPE_CHECKING:
     from photogram.io.writing import Files, OutputSet
     from photogram.show.run import Run
 
-STANDS = {"example": "--example", "plan_views": "--plan"}
-"""Options that replace the first argument of a command, by parameter."""
 LARGEST = 2**53  # Largest integer of an option; larger doubles are not exact counts
-
-
-class Reads(Enum):
-    """Input of a command that an option or argument names."""
-
-    FILE = "file"
-    PROJECT = "directory of a GIANT project"
-
-
-class Writes(Enum):
-    """Output of a command that an option or argument names."""
-
-    FILE = "file"
-    DIRECTORY = "directory of results"
-    EITHER = "file or directory"
-
-
-Input = Annotated[Path, Reads.FILE]
-InputFile = Annotated[Path | None, Reads.FILE]
-OutputFile = Annotated[Path | None, Writes.FILE]
-Folder = Annotated[Path, Writes.DIRECTORY]
-OutputFolder = Annotated[Path | None, Writes.DIRECTORY]
 
 
 class Job:
@@ -70,39 +54,45 @@ class Job:
 
     def __init__(
         self,
-        files: Iterable[Path] = (),
-        projects: Iterable[Path] = (),
-        outputs: Iterable[Path] = (),
-        directories: Iterable[Path] = (),
         *,
+        paths: Mapping[Reads | Writes, list[Path]] | None = None,
+        name: str = "",
         quiet: bool = False,
         options: Mapping[str, Any] | None = None,
     ) -> None:
         self._began, self._clock = datetime.now(UTC), time.perf_counter()
         self._options = dict(options or {})
-        self._files, self._projects = list(files), list(projects)
-        self._outputs, self._directories = list(outputs), list(directories)
+        given = paths or {}
+        self._files, self._projects, self._outputs, self._directories = (
+            [*given.get(role, ())] for role in (Reads.FILE, Reads.PROJECT, Writes.FILE, Writes.DIRECTORY)
+        )
         self._spared: list[Path] = []
-        self._failures = failures()
         self._resources = ExitStack()
         self._examples: list[Path] = []
-        self.quiet, self.is_example = quiet, False
+        self.name, self.quiet, self.is_example = name, quiet, False
 
     def __enter__(self) -> Job:
-        self._failures.__enter__()
-        try:
+        with ExitStack() as resources:  # Converts an error of the checks
+            resources.enter_context(failures())
             self._check()
-        except Exception as error:
-            # The context is not entered when this raises: its exit would never see the error.
-            self._failures.__exit__(type(error), error, error.__traceback__)
-            raise
+            self._resources = resources.pop_all()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> bool | None:
-        self._resources.close()
-        return self._failures.__exit__(kind, error, trace)
+        return self._resources.__exit__(kind, error, trace)
+
+    def alone(self, option: str, others: Collection[str]) -> None:
+        """Reject an option in combination with others; the message names them."""
+        if typed := [name for name in self._options if name in others]:
+            raise misuse(option, "conflict", options=typed)
+
+    def only(self, permitted: Collection[str], code: str, **fields: Any) -> None:
+        """Reject all options and arguments except some; `code` is one of the family `usage`."""
+        for name in self._options:
+            if name not in permitted:
+                raise misuse(name, code, **fields)
 
     @property
     def given(self) -> Mapping[str, Any]:
@@ -188,14 +178,14 @@ class Job:
         if code:
             raise typer.Exit(code)
 
-    def run(self, command: str) -> Run:
-        """Return options, inputs and times of the run of a command for its report."""
+    def run(self) -> Run:
+        """Return options, inputs and times of the run for its report."""
         from photogram.show.run import Run, input_files
 
         found, others = input_files(self._inputs())
         inputs = [replace(each, path=self.shown(each.path)) for each in found]
         seconds = time.perf_counter() - self._clock
-        return Run(f"photogram {command}", self._options, inputs, self._began, seconds, others)
+        return Run(f"photogram {self.name}", self._options, inputs, self._began, seconds, others)
 
     @contextmanager
     def status(self, text: str) -> Iterator[Status | None]:
@@ -261,21 +251,9 @@ _PHASES = {"form": "normal equations", "solve": "solution", "invert": "standard 
 def adjustment_status(
     job: Job, text: str = "adjusting", name: str = "weighted sum of squares", factor: float = 1.0
 ) -> Iterator[Callable[[Progress], None] | None]:
-    """Show the progress of an adjustment; see :func:`shown`."""
+    """Show phase and last iteration of an adjustment."""
     with job.status(text) as status:
         yield None if status is None else shown(status, name, factor)
-
-
-@contextmanager
-def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
-    """Show the number of completed adjustments of a variance component estimation."""
-    with job.status("variance components") as status:
-
-        def show(number: int, _: object) -> None:
-            if status is not None:
-                status.update(f"variance components, adjustment {number + 1}")
-
-        yield show
 
 
 def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None]:
@@ -294,6 +272,14 @@ def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None
     return show
 
 
+@contextmanager
+def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
+    """Show the number of completed adjustments of a variance component estimation."""
+    text = "variance components"
+    with job.status(text) as status:
+        yield lambda number, _: status and status.update(f"{text}, adjustment {number + 1}")
+
+
 def _check_name(path: Path) -> None:
     """Reject a path that the system cannot access; readers report a missing file."""
     try:
@@ -301,56 +287,6 @@ def _check_name(path: Path) -> None:
     except OSError as error:
         if error.errno not in (errno.ENOENT, errno.ENOTDIR):
             raise OSError(error.errno, error.strerror, str(path)) from None
-
-
-class Without:
-    """Mark of an annotation: class of options without these names."""
-
-    def __init__(self, *names: str) -> None:
-        self.names = names
-
-
-def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
-    """Return the roles of options and arguments of a command that are paths."""
-    found = {}
-    for each in _options(command)[0]:
-        if (role := _mark(each, (Reads, Writes))) is not None:
-            found[each.name] = role
-        elif _holds_path(each.annotation):
-            raise TypeError(f"{command.__name__}: {each.name} must be marked as one of Reads or Writes")
-    return found
-
-
-def _mark(parameter: Parameter, kind: type | tuple[type, ...]) -> Any:
-    """Return the mark of a kind in the annotation of an option or argument; None without one."""
-    return next((each for each in get_args(parameter.annotation)[1:] if isinstance(each, kind)), None)
-
-
-def _holds_path(kind: object) -> bool:
-    return kind is Path or any(_holds_path(part) for part in get_args(kind))
-
-
-def _with_role(parameter: Parameter) -> Parameter:
-    """Return a field of a class of options; its path without a role is an input file."""
-    if not _holds_path(parameter.annotation) or _mark(parameter, (Reads, Writes)) is not None:
-        return parameter
-    return parameter.replace(annotation=Annotated[parameter.annotation, Reads.FILE])
-
-
-def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[Parameter]]]]:
-    """Return options and arguments of a command, and its option classes."""
-    options: list[Parameter] = []
-    grouped: dict[str, tuple[type, list[Parameter]]] = {}
-    for parameter in signature(command, eval_str=True).parameters.values():
-        kind, *marks = get_args(parameter.annotation) or (parameter.annotation,)
-        if isinstance(kind, type) and is_dataclass(kind):
-            without = [name for mark in marks if isinstance(mark, Without) for name in mark.names]
-            own = [_with_role(option_of(each, kind)) for each in fields(kind) if each.name not in without]
-            grouped[parameter.name] = kind, own
-            options += own
-        elif parameter.name != "job":
-            options.append(declared(parameter, command.__name__))
-    return options, grouped
 
 
 def default_out(source: Path, ending: str, example: str = "") -> Path:
@@ -366,33 +302,36 @@ def default_out(source: Path, ending: str, example: str = "") -> Path:
 
 
 def with_job(
+    name: str = "",
     *,
     example: Sequence[str] | None = None,
     ending: str = "",
-    name: str = "example",
+    example_name: str = "example",
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that runs a command inside a :class:`Job`, its parameter `job`.
 
-    The fields of a parameter that is a dataclass are options, except fields in a mark :class:`Without`. Each
-    command has the option `--quiet`.
+    The fields of a parameter that is a dataclass are options; marks :class:`Without`, :class:`Only` and
+    :class:`Changes` select some of them. Each command has the option `--quiet`.
 
     Parameters
     ----------
+    name
+        Name of the command in reports.
     example
         The packaged example, a directory of photogram.examples and a file in it, that the option `--example`
         assigns to the first argument. Empty: the command makes its example. None: without the option.
     ending
         Ending of the default of `out`, after the name of the first argument; empty: without default.
-    name
+    example_name
         Name of the example in this default.
     """
-    return partial(_with_job, example=example, ending=ending, name=name)
+    return partial(_with_job, name=name, example=example, ending=ending, example_name=example_name)
 
 
 def _with_job(
-    command: Callable[..., None], *, example: Sequence[str] | None, ending: str, name: str
+    command: Callable[..., None], *, name: str, example: Sequence[str] | None, ending: str, example_name: str
 ) -> Callable[..., None]:
-    own, grouped = _options(command)
+    own, classes = options_of(command)
     marked = roles(command)
     first, several = own[0].name, "list" in str(own[0].annotation)
     if example is not None:
@@ -403,27 +342,20 @@ def _with_job(
     own.append(declared(Parameter("quiet", Parameter.KEYWORD_ONLY, default=False, annotation=quiet), "Job"))
 
     @wraps(command)
-    def with_one(**values: Any) -> None:
+    def run(**values: Any) -> None:
         for parameter in own:
             value = values.get(parameter.name, parameter.default)
             if isinstance(value, int) and abs(value) > LARGEST:
-                raise misuse(_option(parameter), "large", limit=LARGEST, value=value)
+                raise misuse(option_name(parameter), "large", limit=LARGEST, value=value)
         if "example" in values:
-            _arrange(own, values)
-        found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
+            arrange(own, values)
+        paths: dict[Reads | Writes, list[Path]] = {role: [] for role in (*Reads, *Writes)}
         for path_name, role in marked.items():
-            given = values.get(path_name)
-            paths = given if isinstance(given, list) else [given]
-            found[role] += [Path(path) for path in paths if path is not None]
-        job = Job(
-            found[Reads.FILE],
-            found[Reads.PROJECT],
-            found[Writes.FILE],
-            found[Writes.DIRECTORY],
-            options=_given(own, values),
-            quiet=values.pop("quiet", False),
-        )
-        with job:
+            value = values.get(path_name)
+            several_paths = value if isinstance(value, list) else [value]
+            paths[role] += [Path(path) for path in several_paths if path is not None]
+        given, is_quiet = given_options(own, values), values.pop("quiet", False)
+        with Job(paths=paths, name=name, options=given, quiet=is_quiet) as job:
             if values.pop("example", False):
                 job.is_example = True
                 if example:
@@ -433,88 +365,21 @@ def _with_job(
                         job.reads(path)
             if ending and (job.is_example or values[first]):
                 source = values[first][0] if several and values[first] else values[first]
-                shown = name if job.is_example else ""
+                shown = example_name if job.is_example else ""
                 values["out"] = values.get("out") or default_out(source, ending, shown)
                 job.writes_inside(values["out"])
-            for group, (kind, fields) in grouped.items():
-                values[group] = _made(kind, fields, values)
+            for parameter_name, each in classes.items():
+                values[parameter_name] = each.value(values)
             command(job=job, **values)
 
-    with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)
-    with_one.__annotations__ = {parameter.name: parameter.annotation for parameter in own}
-    return with_one
+    run.__dict__["__signature__"] = signature(command).replace(parameters=own)
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in own}
+    return run
 
 
 def _optional(parameter: Parameter) -> Parameter:
-    """Return an argument that `--example` can replace, or an output with a default."""
+    """Return an argument that `--example` can replace."""
     if parameter.default is not Parameter.empty:
         return parameter
     kind, *marks = get_args(parameter.annotation)
     return parameter.replace(default=None, annotation=Annotated[(kind | None, *marks)])
-
-
-def _made(kind: type, options: Iterable[Parameter], values: dict[str, Any]) -> Any:
-    """Return an object of a class of options; errors of its constructor name the option."""
-    from photogram.errors import InputError
-
-    names = {each.name: _option(each) for each in options}
-    parsers: dict[str, Any] = {each.name: each.metadata.get("parse") for each in fields(kind)}
-    given = {name: values.pop(name) for name in names if values.get(name) is not None}
-    for name in given:
-        try:
-            given[name] = parsers[name](given[name]) if parsers[name] else given[name]
-        except InputError:
-            raise
-        except ValueError as error:
-            raise misuse(names[name], "form", form=str(error), value=given[name]) from None
-    for name in names:
-        values.pop(name, None)
-    try:
-        return kind(**given)
-    except InputError as error:
-        known = error.phrase.fields if error.phrase else {}
-        if known.get("what") not in names:
-            raise
-        message = known["message"]
-        if "options" in message.fields:
-            message = phrase(message.code, options=[names[name] for name in message.fields["options"]])
-        raise typer.BadParameter(str(message), param_hint=names[known["what"]]) from None
-
-
-def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[str, str]:
-    """Return options and arguments without defaults, as a user writes them."""
-    found = {}
-    for parameter in parameters:
-        value = values.get(parameter.name, parameter.default)
-        if value == parameter.default or value is None:
-            continue
-        argument = _mark(parameter, ArgumentInfo)
-        name = _option(parameter) if argument is None else str(argument.metavar)
-        each = value if isinstance(value, list) else [value]
-        found[name] = ", ".join(str(getattr(one, "value", one)) for one in each)
-    return found
-
-
-def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
-    """Assign values to arguments; an option may replace the first argument."""
-    marks = {parameter.name: _mark(parameter, ArgumentInfo) for parameter in parameters}
-    arguments = {name: mark.metavar for name, mark in marks.items() if mark is not None}
-    given = [values[name] for name in arguments if values[name]]
-    stands = [word for name, word in STANDS.items() if name in values]
-    instead = sum(bool(values.get(name)) for name in STANDS)
-    first, *others = arguments.values()
-    if len(given) + instead > len(arguments) or not (given or instead):
-        raise misuse(str(first), "alternatives", names=[first, *stands])
-    if len(given) + instead < len(arguments):
-        raise misuse(str(others[-1]), "missing")
-    if instead:
-        values.update(zip(arguments, [None, *given], strict=True))
-
-
-def _option(parameter: Parameter) -> str:
-    """Return the name of an option on the command line."""
-    mark = _mark(parameter, OptionInfo)
-    # In an annotation, the default of the mark is the first option name.
-    given = () if mark is None else (mark.default, *(mark.param_decls or ()))
-    names = [each for each in given if isinstance(each, str)] or ["--" + parameter.name.replace("_", "-")]
-    return next((each for each in names if each.startswith("--")), names[0])

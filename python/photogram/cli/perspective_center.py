@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from photogram.cli.console import print_document, print_remark
 from photogram.cli.documents import OfPrograms
-from photogram.cli.job import Folder, Input, Job, with_job
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
+    from photogram.show.sketch.plot import Plot
 
 
-@with_job(example=("perspective_center", "grid.deck"), ending="-resected")
+@with_job("perspective-center", example=("perspective_center", "grid.deck"), ending="-resected")
 def perspective_center(
     job: Job,
     *,
     deck: Input,
-    out: Folder,
     documents: OfPrograms,
     as_published: bool = False,
     weights: Literal["equal", "readings", "deviations"] = "equal",
@@ -31,9 +31,10 @@ def perspective_center(
     The run stops at the first set that cannot be read or solved. The sets before it are written to --out.
     """
     from photogram.perspective_center import run_deck
+    from photogram.perspective_center.listing import listing
     from photogram.statistics.verdict import worst
 
-    pictures = documents.announce(job, out, "listing.txt", picture="residuals")
+    documents.declare(job, "listing.txt", pictures=["residuals"])
     unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
     run = run_deck(
         deck,
@@ -42,32 +43,23 @@ def perspective_center(
         together=together or bool(unknown),
         unknown=unknown,
     )
-    stopped = run.stop is not None
+    stopped, results = run.stop is not None, run.results
     job.finish(
-        _files(run, documents.json, out, pictures),
-        documents.page(job, "perspective-center", out, run.document) if run.results else {},
+        documents.as_json(run),
+        documents.inside({"listing.txt": listing(run).encode()} if results or not stopped else {}),
+        documents.pictures(lambda: _plots(run)),
+        documents.page(job, run.document) if results else {},
         summary=lambda: _summarize(run),
-        code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
+        code=0 if stopped else worst((each.verdict for each in results), strict=strict),
     )
     if run.stop is not None:
         raise run.stop.error
 
 
-def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> dict[Path, bytes]:
-    """Make all files but the report for the browser, before anything is written."""
-    made = {}
-    if json is not None:
-        made[json] = run.to_json()
-    if run.results or run.stop is None:
-        from photogram.perspective_center.listing import listing
+def _plots(run: Run) -> dict[str, Plot]:
+    from photogram.perspective_center.plot import run_sketch
 
-        made[folder / "listing.txt"] = listing(run).encode()
-    if pictures and run.results:
-        from photogram.perspective_center.plot import run_sketch
-
-        plot = run_sketch(run.results)
-        made |= {path: plot.render(path.suffix[1:]) for path in pictures}
-    return made
+    return {"residuals": run_sketch(run.results)} if run.results else {}
 
 
 def _summarize(run: Run) -> None:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.check import GALVESTON
-from photogram.cli.command_classes import misuse
-from photogram.cli.console import output, print_remark
+from photogram.cli.console import print_remark
 from photogram.cli.documents import TEXT, OfPrograms
-from photogram.cli.job import Job, OutputFolder, Reads, Without, with_job
-from photogram.cli.simulate import MotionOptions, OfPython, SpaceOptions
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Reads, Without, misuse
+from photogram.cli.simulate import Bent, MotionOptions, OfPython, SpaceOptions
 from photogram.lazy_dataclasses import replace
 from photogram.network.simulation_options import ControlPattern, SimulationOptions
 
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 OfPlans = Without(*OfPython.names, "check_points", "blunders", "blunder_size")
 
 
-@with_job()
+@with_job("plan")
 def plan(
     job: Job,
     *,
     network: Annotated[SimulationOptions, OfPlans],
     space: SpaceOptions,
+    bent: Bent,
     moves: MotionOptions,
     projects: Annotated[list[Path] | None, Reads.PROJECT] = None,
     packaged: Annotated[bool, typer.Option("--example")] = False,
     against: ControlPattern = "corners",
     against_spacing: int | None = None,
     against_position_sd: float | None = None,
-    out: OutputFolder = None,
     documents: OfPrograms,
 ) -> None:
     """Predict the accuracy of a network before the flight for two patterns of control.
@@ -50,11 +50,12 @@ def plan(
         if projects:
             raise misuse("--example", "conflict", options="DIR")
         projects = [job.packaged(GALVESTON)]
-        out = out or (Path("example-planned") if documents.plots else None)
-    pictures = documents.announce(job, out, TEXT, picture="plan")
+        if documents.plots:
+            documents = replace(documents, out=documents.out or Path("example-planned"))
+    documents.declare(job, TEXT, pictures=["plan"])
     if projects:
-        simulated = network, space, moves, against, against_spacing, against_position_sd
-        if simulated != (SimulationOptions(), SpaceOptions(), MotionOptions(), "corners", None, None):
+        simulated = network, space, bent, moves, against, against_spacing, against_position_sd
+        if simulated != (SimulationOptions(), SpaceOptions(), {}, MotionOptions(), "corners", None, None):
             raise misuse("DIR", "simulation")
         patterns = _adjusted(projects)
     else:
@@ -64,24 +65,16 @@ def plan(
             control_spacing=network.control_spacing if against_spacing is None else against_spacing,
             position_sd=network.position_sd if against_position_sd is None else against_position_sd,
         )
-        patterns = _simulated(space, moves, network, second)
+        patterns = _simulated(*(space.of(each, bent, moves) for each in (network, second)))
     made = predict(patterns)
-    texts = {} if out is None else {out / TEXT: made.report().encode()}
-    page = documents.page(job, "plan", out, made.document)
-    drawn = {path: made.plot().render(path.suffix[1:]) for path in pictures}
-    job.finish(
-        {**texts, **page, **documents.as_json(made), **drawn},
-        summary=lambda: output.print(made.report(), markup=False, end=""),
-    )
+    documents.conclude(job, made, plots=lambda: {"plan": made.plot()}, code=0)
 
 
-def _simulated(space: SpaceOptions, moves: MotionOptions, *networks: SimulationOptions) -> dict[str, Block]:
+def _simulated(*networks: SimulationOptions) -> dict[str, Block]:
     """Simulate networks with true positions and without observations."""
     from photogram.network.simulation import simulate
 
-    patterns = {
-        _name(network): simulate(space.of(network, moves), check_points=0).truth for network in networks
-    }
+    patterns = {_name(network): simulate(network, check_points=0).truth for network in networks}
     if len(patterns) < len(networks):
         raise misuse("--against", "same-pattern", pattern=next(iter(patterns)))
     return patterns

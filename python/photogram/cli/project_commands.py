@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from photogram.cli.console import print_sections
-from photogram.cli.job import Input, Job, OutputFile, Reads, Writes, with_job
-from photogram.cli.projects import EXAMPLE, described, read_project
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, OutputFile, Reads, Writes
+from photogram.cli.projects import EXAMPLE, read_project
 from photogram.formats.read_options import ReadOptions
 from photogram.messages import counted, listed
 from photogram.words import phrase
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 
 
-@with_job(example=EXAMPLE)
+@with_job("info", example=EXAMPLE)
 def info(
     job: Job,
     *,
@@ -31,6 +32,7 @@ def info(
 
     If the project requests an accuracy statement, the command describes the subject of the statement.
     """
+    from photogram.formats.description import described
     from photogram.io.json import to_json
 
     project = read_project(job, path, reading)
@@ -60,7 +62,7 @@ def _asked(project: Project) -> list[TitledLines]:
     return [("Accuracy statement", ["; ".join(said)])]
 
 
-@with_job(example=EXAMPLE)
+@with_job("convert", example=EXAMPLE)
 def convert(
     job: Job,
     *,
@@ -71,6 +73,7 @@ def convert(
 ) -> None:
     """Write a project in another format and list the data that the format cannot contain."""
     from photogram.formats import cannot_hold, target
+    from photogram.formats.description import described
 
     chosen = target(out, to)
     project = read_project(job, path, reading)
@@ -83,7 +86,7 @@ def convert(
     job.finish(chosen.files(project), summary=lambda: print_sections(sections, "`photogram info`"))
 
 
-@with_job()
+@with_job("metadata")
 def metadata(
     job: Job,
     path: Annotated[Path, Reads.FILE],
@@ -123,7 +126,7 @@ SOURCES = {
 """Packaged examples, directories of photogram.examples."""
 
 
-@with_job()
+@with_job("new")
 def new(
     job: Job,
     out: Annotated[Path, Writes.DIRECTORY],

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from photogram.cli.adjust import result_at
-from photogram.cli.choices import Choices
+from photogram.cli.choices import Choices, Unknowns
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.job import Folder, Input, Job, with_job
-from photogram.cli.options import Threads
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, OutputFolder, Threads
 from photogram.cli.statement_output import StatementOptions, stated, statement_files
 from photogram.formats.read_options import ReadOptions
 from photogram.words import phrase
@@ -21,16 +21,17 @@ if TYPE_CHECKING:
     from photogram.show.forms import TitledLines
 
 
-@with_job(example=("survey",), ending="-statement")
+@with_job("statement", example=("survey",), ending="-statement")
 def statement(
     job: Job,
     *,
     path: Input,
-    out: Folder,
+    out: OutputFolder = None,
     wanted: StatementOptions,
     crs: str | None = None,
     reading: ReadOptions,
     choices: Choices,
+    unknowns: Unknowns,
     keep_all: bool = False,
     threads: Threads = None,
     strict: bool = False,
@@ -42,7 +43,9 @@ def statement(
     survey, in the table of control or by --sd check=0.01. --example is the project of `photogram new --kind
     survey`.
     """
-    result, project = result_at(job, path, reading, threads, choices=choices, keep_all=keep_all)
+    assert out is not None
+    chosen: dict[str, Any] = {"choices": choices, "unknowns": unknowns, "keep_all": keep_all}
+    result, project = result_at(job, path, reading, threads, **chosen)
     project = project or _project_beside(job, path, result)
     asked = wanted.asked(project, reading, result.block.linear_unit)
     assumed = () if project is None else project.lacks

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photogram.arguments.fields import option
-from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark
-from photogram.cli.job import InputFile, Job, Without
+from photogram.cli.job import Job
+from photogram.cli.options import InputFile, Without, misuse
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.words import phrase
@@ -102,7 +102,6 @@ def stated(
     result: Result,
     asked: Mapping[str, Any],
     *,
-    command: str = "statement",
     crs: str | None = None,
     strict: bool = False,
     assumed: Sequence[Phrase | str] = (),
@@ -114,7 +113,7 @@ def stated(
     from photogram.formats.crs_results import placed
     from photogram.results.statement.comparison import System
 
-    run = job.run(command)
+    run = job.run()
     system = None
     if crs is not None:
         place = placed(result, crs)

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.console import output, print_document, print_withheld
+from photogram.cli.console import output, print_document
 from photogram.cli.documents import OfPrograms
-from photogram.cli.job import Input, InputFile, Job, OutputFolder, Writes, with_job
-from photogram.cli.options import Threads
+from photogram.cli.job import Job, with_job
+from photogram.cli.options import Input, InputFile, Threads, Writes
 from photogram.words import phrase
 
 if TYPE_CHECKING:
+    from photogram.io.writing import Content
     from photogram.stellar.night_calibration import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
@@ -24,23 +25,15 @@ if TYPE_CHECKING:
 
 Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "kannala_brandt"]
 """Lenses of digital cameras; `photogram.stellar.lenses` has them."""
+Effect = Literal["annual-aberration", "light-deflection", "diurnal-aberration", "refraction"]
+"""Effects on star positions."""
 
 
-class Effect(StrEnum):
-    """Effects on star positions."""
-
-    ANNUAL_ABERRATION = "annual-aberration"
-    LIGHT_DEFLECTION = "light-deflection"
-    DIURNAL_ABERRATION = "diurnal-aberration"
-    REFRACTION = "refraction"
-
-
-@with_job(example=("stellar", "plate.toml"))
+@with_job("stellar-camera", example=("stellar", "plate.toml"))
 def stellar_camera(
     job: Job,
     *,
     deck: Input,
-    out: OutputFolder = None,
     documents: OfPrograms,
     as_published: bool = False,
     strict: bool = False,
@@ -53,13 +46,13 @@ def stellar_camera(
     from photogram.statistics.verdict import worst
     from photogram.stellar import calibrate
     from photogram.stellar.cameras import camera_document
+    from photogram.stellar.plots import sketches
 
     problems, inputs = _read(deck)
     job.reads(*inputs)
-    pictures = documents.plot_format if documents.plots else ""
-    target = out or Path(f"{deck.stem}-calibrated")
-    documents.place(target)  # rejected before any computation
-    written: dict[Path, bytes] = {}
+    documents = replace(documents, out=documents.out or Path(f"{deck.stem}-calibrated"))
+    documents.declare(job)
+    files: dict[Path, Content] = {}
     asked: dict[Path, bytes] = {}
     results = []
     for number, problem in enumerate(problems, 1):
@@ -68,20 +61,18 @@ def stellar_camera(
         result = calibrate(problem)
         results.append(result)
         mark = f"-{number}" if len(problems) > 1 else ""
-        written |= _files(result, target, mark, pictures)
-        written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
-        written |= documents.page(job, "stellar-camera", target, result.document, mark)
-        if documents.json is not None:
-            asked[documents.json.with_stem(documents.json.stem + mark)] = result.to_json()
-    job.finish(
-        written,
-        asked,
-        summary=lambda: _summarize(results),
-        code=worst((result.verdict for result in results), strict=strict),
-    )
+        cameras = {f"camera{mark}.json": camera_document(result)}
+        files |= documents.inside(_files(result, mark))
+        withheld = phrase("command.camera-withheld", names=list(cameras))
+        files |= documents.unless_withheld(cameras, withheld, usable=result.verdict.usable)
+        files |= documents.pictures(partial(sketches, result), mark)
+        files |= documents.page(job, result.document, mark)
+        asked |= documents.as_json(result, mark)
+    code = worst((result.verdict for result in results), strict=strict)
+    job.finish(files, asked, summary=lambda: _summarize(results), code=code)
 
 
-@with_job(example=("exposures", "night.toml"))
+@with_job("stellar-camera exposures", example=("exposures", "night.toml"))
 def exposures(
     job: Job,
     *,
@@ -91,7 +82,6 @@ def exposures(
     without: list[Effect] | None = None,
     any_roll: bool = False,
     blind: tuple[float, float] | None = None,
-    out: OutputFolder = None,
     documents: OfPrograms,
     threads: Threads = None,
     strict: bool = False,
@@ -100,24 +90,43 @@ def exposures(
     from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_file import inputs, read_night
+    from photogram.stellar.night_plots import sketches
 
     job.reads(*inputs(night))
-    pictures = documents.plot_format if documents.plots else ""
-    said = _said(lens, common_scale, without or [], any_roll, blind)
+    documents = replace(documents, out=documents.out or Path(f"{night.stem}-calibrated"))
+    documents.declare(job)
+    said: dict[str, dict[str, Any]] = {
+        "camera": {"lens": lens, "common_scale": common_scale},
+        "matching": {"roll_known": False if any_roll else None, "blind_field_deg": blind},
+        "places": {effect.replace("-", "_"): False for effect in without or []},
+    }
+    given = {
+        table: {key: value for key, value in values.items() if value is not None}
+        for table, values in said.items()
+    }
     with at_place(Place(night)):
-        result = calibrate_night(read_night(night, said), threads)
-    target = out or Path(f"{night.stem}-calibrated")
-    written = _night_files(result, target, pictures)
-    written |= documents.page(job, "stellar-camera exposures", target, result.document)
-    job.finish(
-        written,
-        documents.as_json(result),
-        summary=lambda: _summarize([result], "parameters"),
+        result = calibrate_night(read_night(night, given), threads)
+    document = result.document()
+    tables = {
+        f"{name}.csv": document.table(key).frame().to_csv(index=False).encode()
+        for name, key in (("exposures", "exposures"), ("star-images", "images"))
+    }
+    cameras = _night_cameras(result)
+    withheld = phrase("command.camera-withheld", names=list(cameras))
+    documents.conclude(
+        job,
+        result,
+        tables,
+        document=document,
+        plots=lambda: sketches(result),
+        beside=documents.unless_withheld(cameras, withheld, usable=result.verdict.usable),
+        tables=("parameters",),
+        remarks=result.messages,
         code=result.verdict.exit_code(strict=strict),
     )
 
 
-@with_job()
+@with_job("stellar-camera places")
 def places(
     job: Job,
     out: Annotated[Path, Writes.FILE],
@@ -147,28 +156,9 @@ def places(
     job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
 
 
-def _said(
-    lens: Lens | None,
-    common_scale: bool | None,
-    without: list[Effect],
-    any_roll: bool,
-    blind: tuple[float, float] | None,
-) -> dict[str, dict[str, Any]]:
-    """Return the settings of the options by tables and keys of the file."""
-    said: dict[str, dict[str, Any]] = {
-        "camera": {"lens": lens, "common_scale": common_scale},
-        "matching": {"roll_known": False if any_roll else None, "blind_field_deg": blind},
-        "places": {effect.replace("-", "_"): False for effect in without},
-    }
-    return {
-        table: {key: value for key, value in values.items() if value is not None}
-        for table, values in said.items()
-    }
-
-
-def _summarize(results: Sequence[Result | CalibratedNight], *tables: str) -> None:
+def _summarize(results: Sequence[Result]) -> None:
     for result in results:
-        print_document(result.document(), "the report", *tables, remarks=result.messages)
+        print_document(result.document(), "the report", remarks=result.messages)
 
 
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
@@ -179,49 +169,24 @@ def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
     return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
 
 
-def _cameras(result: Result | CalibratedNight, files: dict[Path, bytes]) -> dict[Path, bytes]:
-    """Return the files of a camera; print a message if the verdict withholds them."""
-    if result.verdict.usable:
-        return files
-    print_withheld(phrase("command.camera-withheld", names=[path.name for path in files]), files)
-    return {}
-
-
-def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, bytes]:
-    """Create all files of one problem."""
-    from photogram.stellar.plots import sketches
+def _files(result: Result, mark: str) -> dict[str, bytes]:
+    """Return the listing of one problem, and the prints of the report on request."""
     from photogram.stellar.printout import plate_list, printout
 
-    made = {out / f"listing{mark}.txt": result.report().encode()}
+    made = {f"listing{mark}.txt": result.report().encode()}
     if result.problem.options.as_published:
-        made[out / f"printout{mark}.txt"] = printout(result).encode()
+        made[f"printout{mark}.txt"] = printout(result).encode()
     if result.problem.options.plate_list:
-        made[out / f"plate{mark}.txt"] = plate_list(result)
-    if pictures:
-        from photogram.stellar.plots import sketches
-
-        plots = sketches(result).items()
-        made |= {out / f"{name}{mark}.{pictures}": plot.render(pictures) for name, plot in plots}
+        made[f"plate{mark}.txt"] = plate_list(result)
     return made
 
 
-def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path, bytes]:
-    """Create all files of a night."""
+def _night_cameras(result: CalibratedNight) -> dict[str, bytes]:
+    """Return the camera files of a night."""
     from photogram.stellar.camera_yaml import WITH_YAML, to_yaml
-    from photogram.stellar.night_plots import sketches
 
-    document = result.document()
-    made = {out / "report.txt": result.report().encode()}
-    for name, key in (("exposures.csv", "exposures"), ("star-images.csv", "images")):
-        made[out / name] = document.table(key).frame().to_csv(index=False).encode()
-    cameras = {out / "camera.json": result.camera.to_json()}
+    cameras = {"camera.json": result.camera.to_json()}
     if result.camera.lens in WITH_YAML:
-        cameras[out / "camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
-        cameras[out / "camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
-    made |= _cameras(result, cameras)
-    if pictures:
-        from photogram.stellar.night_plots import sketches
-
-        plots = sketches(result).items()
-        made |= {out / f"{name}.{pictures}": plot.render(pictures) for name, plot in plots}
-    return made
+        cameras["camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
+        cameras["camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
+    return cameras

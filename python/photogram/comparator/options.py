@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from photogram.arguments.fields import Checked
+from photogram.arguments.fields import Checked, option
 from photogram.lazy_dataclasses import dataclass
 
 
@@ -55,7 +55,7 @@ class Options(Checked):
     free_residuals: Literal["report", "exact"] = "report"
     order: Literal["measured", "listing"] = "measured"
     pages: Literal["all", "published"] = "all"
-    polynomial: bool = True
+    polynomial: bool = option(True, name="--polynomial/--linear-only")
     joint: bool = True
     estimate_grid: bool = False
 

@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.formats.project import Project
 from photogram.io.csv_text import csv_text
 from photogram.io.sheets import workbook
+from photogram.network.film_reduction import is_scanned
 from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.result import Result
 from photogram.results.tables import TABLES
 from photogram.show.quantity import frame, unit_comments
+from photogram.words import Phrase, phrase
 
 _TABLES = {
     "photos": "photo",
@@ -36,6 +39,28 @@ def adjusted(project: Project, result: Result) -> Project:
     """Return a project with adjusted parameters; observations are unchanged."""
     starts = np.where(np.isfinite(result.point_positions), result.point_positions, project.starts)
     return project.replace(block=result.restarted(), starts=starts, lacks=())
+
+
+def project_files(project: Project, result: Result) -> tuple[dict[str, bytes], list[Phrase]]:
+    """Return the tables of a result, the adjusted project in its own format and as tables, and remarks."""
+    from photogram.formats import FORMATS, to_files
+
+    after, files, remarks = adjusted(project, result), dict(table_files(result)), []
+    own = next((name for name, each in FORMATS.items() if each.title == project.title), "plain")
+    for name in dict.fromkeys(("plain", own)):
+        folder = "adjusted" if name == "plain" else f"adjusted-{name}"
+        form = FORMATS[name]
+        made = {}
+        try:
+            made = dict(to_files(after, name)) if form.write is not None else {}
+        except InputError as error:
+            if name == own == "plain" and not is_scanned(after.block):
+                raise
+            remarks.append(phrase("command.not-written", format=form.title, error=error))
+        if name != "plain" and form.results is not None:
+            made |= form.results(after, result)
+        files |= {f"{folder}/{file}": content for file, content in made.items()}
+    return files, remarks
 
 
 def table_files(result: Result) -> Mapping[str, bytes]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from photogram.messages import Message
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
-from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
+from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.structuring import FEWEST_TIES, structure, ties
 from photogram.words import Phrase, phrase
 
@@ -140,28 +140,17 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
     return block, messages
 
 
-def job_refraction(
-    common: Common,
-    *,
-    air: Air | Literal["none"] | None = None,
-    water: Water | Literal["none"] | None = None,
-    index: float | None = None,
-) -> Refraction | None:
-    """Return the refraction of a job as in COMMON, or of the named models.
-
-    `none` omits a model that COMMON requires; None follows COMMON. `index` is the refractive index of water.
-    """
-    asked = air or ("giant" if common.air_refraction else "none")
-    in_air = None if asked == "none" else asked
-    asked_below = water or ("giant" if common.water_refraction else "none")
-    if asked_below == "none":
-        return Refraction(in_air) if in_air else None
-    level = common.water_level / metres_per_unit(_linear_unit(common))
-    return (
-        Refraction(in_air, asked_below, level)
-        if index is None
-        else Refraction(in_air, asked_below, level, index)
-    )
+def job_refraction(common: Common, **changes: Any) -> Refraction | None:
+    """Return the refraction of a job as in COMMON, with other fields of a :class:`Refraction`."""
+    own = {
+        "air": "giant" if common.air_refraction else None,
+        "water": "giant" if common.water_refraction else None,
+        "water_level": common.water_level / metres_per_unit(_linear_unit(common)),
+        **changes,
+    }
+    if own["air"] is None and own["water"] is None:
+        return None
+    return Refraction(**own) if own["water"] is not None else Refraction(own["air"])
 
 
 def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from photogram.arguments.fields import check_fields
+from photogram.arguments.fields import Checked, option
 from photogram.arguments.objects import require
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import Phrase
@@ -21,8 +21,13 @@ Water = Literal["giant", "snell"]
 METRES_PER_UNIT = {"m": 1.0, "ft": 0.3048}  # Linear units whose length is known
 
 
+def _model(name: str, words: object) -> Any:
+    """Return the option of a model; the word `none` is None."""
+    return option(None, kind=words, parse=lambda word: None if word == "none" else word, name=name)
+
+
 @dataclass(frozen=True)
-class Refraction:
+class Refraction(Checked):
     """Refraction models of the rays between points and cameras (`docs/refraction.md`).
 
     Parameters
@@ -45,16 +50,15 @@ class Refraction:
         If a model does not exist, the level is not finite, or the index is not finite and at least 1.
     """
 
-    air: Air | None = None
-    water: Water | None = None
+    air: Air | None = _model("--air-refraction", Literal[Air, "none"])
+    water: Water | None = _model("--water-refraction", Literal[Water, "none"])
     water_level: float = 0.0
-    refractive_index: float = 1.340
+    refractive_index: float = option(1.340, 1.0, name="--water-index")
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        require(math.isfinite(self.water_level), "water_level", "finite", value=self.water_level)
-        good = 1 <= self.refractive_index < math.inf
-        require(good, "refractive_index", "least", low=1, value=self.refractive_index)
+        super().__post_init__()
+        for name in ("water_level", "refractive_index"):
+            require(math.isfinite(getattr(self, name)), name, "finite", value=getattr(self, name))
 
     def phrase(self, linear_unit: str) -> Phrase:
         """Return the refraction models as a message."""

@@ -80,6 +80,12 @@ class Simulation:
     truth: Block
     blunders: Blunders
 
+    def to_json(self) -> bytes:
+        """Return the truth as a JSON document, `truth.json` of `photogram simulate`."""
+        from photogram.network.simulated_truth import truth_json
+
+        return truth_json(self.truth, self.blunders.images, self.blunders.amounts)
+
 
 def simulate(options: SimulationOptions | None = None, **changes: Unpack[SimulationKeywords]) -> Simulation:
     """Simulate a block of vertical photographs.

@@ -6,4 +6,5 @@ Shape = Literal["held", "bend", "points"]  # estimated: none, centre-line deflec
 ViewBy = Literal["name", "time"]
 Synchronisation = Literal["known", "none", "offset"]
 Regularisation = Literal["mrcal"]
+CornerBasis = Literal["kind", "camera", "level", "photo", "component", "rays"]
 PixelOrigin = Literal["corner", "center"]

@@ -20,6 +20,7 @@ from photogram.errors import InputError
 from photogram.results.components import VarianceComponents
 from photogram.results.group_sums import GroupsArgument
 from photogram.show.quantity import Axis, Quantity, chosen
+from photogram.targets.choices import CornerBasis
 from photogram.targets.regularisation import weighted_block
 from photogram.words import phrase
 
@@ -126,9 +127,6 @@ _HEADS = {
 
 def _sums(group: Indices, values: Floats, count: int) -> Floats:
     return np.stack([np.bincount(group, weights=column, minlength=count) for column in values.T], axis=1)
-
-
-CornerBasis = Literal["kind", "camera", "level", "photo", "component", "rays"]
 
 
 def corner_components(
