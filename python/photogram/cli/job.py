@@ -275,9 +275,13 @@ def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None
 @contextmanager
 def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
     """Show the number of completed adjustments of a variance component estimation."""
-    text = "variance components"
-    with job.status(text) as status:
-        yield lambda number, _: status and status.update(f"{text}, adjustment {number + 1}")
+    with job.status("variance components") as status:
+
+        def show(number: int, _: object) -> None:
+            if status is not None:
+                status.update(f"variance components, adjustment {number + 1}")
+
+        yield show
 
 
 def _check_name(path: Path) -> None:
