@@ -9,7 +9,7 @@ from photogram.formats import ReadOptions
 from photogram.formats.models import lost
 
 TEXT = """\
-camera C 3000.0 4000 3000
+camera C 3000.0 2000.0 1500.0 4000 3000
 photo A C 0.0 0.0 100.0 0.0 0.0 0.0
 photo B C 50.0 0.0 100.0 1.0 -2.0 3.0
 control P 10.0 5.0 0.0 0.02

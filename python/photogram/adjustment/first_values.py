@@ -19,7 +19,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message, listed
-from photogram.network.attitudes import Attitudes
+from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block, flown_by, require_block
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.film_reduction import as_seen, is_scanned
@@ -402,8 +402,7 @@ def _started(
     if found.any():
         new_positions[found] = axes.from_cartesian(positions[found])
         matrices = axes.to_local(attitudes[found], new_positions[found])
-        form = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-        new_attitudes[found] = Attitudes(matrices).values(form)  # type: ignore[arg-type]
+        new_attitudes[found] = Attitudes(matrices).values(angles_form(block.photo_to_ground))
     changes: dict[str, Floats] = {}
     for name, values in (("position", new_positions), ("attitude", new_attitudes)):
         given, sd = getattr(block, f"photo_{name}s"), getattr(block, f"photo_{name}_sd")

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.regression import Regression, given_points
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.attitudes import Attitudes, Representation, angles_form
 from photogram.network.block import Block
 from photogram.words import Phrase, phrase
 
@@ -189,8 +189,7 @@ def quaternion_readings(matrices: Floats) -> dict[str, tuple[Phrase, Floats]]:
 def read_as(block: Block, name: str) -> Block:
     """Return a block with another angle definition; see :func:`attitude_readings`."""
     _, matrices = attitude_readings(block)[name]
-    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-    return block.replace(photo_attitudes=Attitudes(matrices).values(form))
+    return block.replace(photo_attitudes=Attitudes(matrices).values(angles_form(block.photo_to_ground)))
 
 
 def _scaled(block: Block, factors: Floats, *, points: bool) -> Block:
@@ -221,7 +220,7 @@ def _exchanged(block: Block, *, points: bool) -> Block:
 
 def _centres(block: Block, axes: Floats) -> Block:
     """Return a block with positions C = -R't of translations t; R = F A', F' = `axes`."""
-    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    form = angles_form(block.photo_to_ground)
     to_photo = Attitudes.of(form, block.photo_attitudes).matrices.transpose(0, 2, 1)
     turned = block.photo_positions @ axes
     return block.replace(photo_positions=-np.einsum("pji,pj->pi", to_photo, turned))

@@ -19,7 +19,7 @@ from photogram.formats.project import Project, Repeated, Size
 from photogram.formats.rigging import FrameOf, mounted
 from photogram.io.places import Failing, Place, at_place
 from photogram.messages import Message
-from photogram.network.attitudes import Attitudes
+from photogram.network.attitudes import angles_form, known_angles
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
@@ -192,8 +192,12 @@ class BlockBuilder:
         """Add an observed position of a photo."""
         self._gnss[photo] = _Located(place or self.place, xyz, np.broadcast_to(sd, 3), crs)
 
-    def image(self, photo: Hashable, point: Hashable, x: float, y: float) -> None:
+    def image(
+        self, photo: Hashable, point: Hashable, x: float, y: float, place: Failing | None = None
+    ) -> None:
         """Add an image observation of a photo that was added before."""
+        if photo not in self.photo_rows:
+            raise (place or self.place).error(phrase("format.undefined", what="photo", name=str(photo)))
         if point not in self.point_rows:
             self.point(point)
         self.image_keys.append((photo, point))
@@ -242,17 +246,12 @@ class BlockBuilder:
         starts, points = self._point_fields()
         self._add_gnss()
         images, repeated = self._image_fields()
-        angles = np.full((len(self.photo_ids), 3), np.nan)
-        known = np.isfinite(matrices).all(axis=(1, 2))
-        if known.any():
-            to_ground = fields.get("photo_to_ground", False)
-            kind = "omega_phi_kappa_photo_to_ground" if to_ground else "omega_phi_kappa"
-            angles[known] = Attitudes(matrices[known]).values(kind)  # type: ignore[arg-type]
+        form = angles_form(fields.get("photo_to_ground", False))
         with self._repeated_names(), at_place(self.place):
             block = Block(
                 photo_ids=self.photo_ids,
                 photo_positions=centres,
-                photo_attitudes=angles,
+                photo_attitudes=known_angles(form, matrices),
                 photo_position_sd=np.asarray(self.position_sd),
                 photo_attitude_sd=np.asarray(self.attitude_sd),
                 cameras=self.cameras,

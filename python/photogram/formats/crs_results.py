@@ -14,7 +14,7 @@ from photogram.formats.crs import axes_of, has_place, is_on, to_system, turned_c
 from photogram.formats.project import frame_of
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid, lengths_of_units
@@ -76,7 +76,7 @@ class Placed:
 
         The sense of the angles is the one of the block.
         """
-        kind = _representation(self.result.block)
+        kind = angles_form(self.result.block.photo_to_ground)
         if self.attitudes.step_covariances is None:
             return self.attitudes.values(kind), np.full((len(self.photos), 3), np.nan)
         return self.attitudes.values(kind), self.attitudes.standard_deviations(kind)
@@ -239,15 +239,12 @@ def _positions(names: Sequence[str], xyz: Floats, covariances: Floats) -> dict[s
     }
 
 
-def _representation(block: Block) -> Representation:
-    return "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-
-
 def _own_attitudes(result: Result) -> Attitudes:
     """Return the attitudes of the photos relative to the axes of the block."""
     covariances = result.photo_covariances[:, 3:, 3:]
     known = bool(np.isfinite(covariances).all())
-    return Attitudes.of(_representation(result.block), result.photo_attitudes, covariances if known else None)
+    form = angles_form(result.block.photo_to_ground)
+    return Attitudes.of(form, result.photo_attitudes, covariances if known else None)
 
 
 def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:

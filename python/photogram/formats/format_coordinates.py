@@ -11,7 +11,7 @@ from photogram.errors import InputError
 from photogram.formats.models import intersected
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
-from photogram.network.attitudes import Attitudes
+from photogram.network.attitudes import angles_form, known_angles
 from photogram.network.block import Block, refuse_passages, refuse_trajectories
 from photogram.network.cameras import Camera
 from photogram.network.geometry import (
@@ -137,11 +137,7 @@ def in_topocentric(project: Project) -> Project:
     def turned(positions: Floats, attitudes: Floats) -> Floats:
         local = axes @ local_frames(positions).transpose(0, 2, 1)
         matrices = local @ attitude_matrices(block.replace(photo_attitudes=attitudes))
-        known = np.isfinite(matrices).all(axis=(1, 2))
-        found = np.full_like(attitudes, np.nan)
-        kind = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-        found[known] = Attitudes(matrices[known]).values(kind)  # type: ignore[arg-type]
-        return found
+        return known_angles(angles_form(block.photo_to_ground), matrices)
 
     photos = block.photo_positions
     observed, angles = block.photo_positions_observed, block.photo_attitudes_observed

@@ -5,7 +5,7 @@ A missing image size is an :class:`photogram.InputError` if the conversion needs
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -62,6 +62,14 @@ def to_corner(project: Project) -> Floats:
     return by_camera(
         block.image_xy, which, lambda row, own: in_corner(block.cameras[row], project.sizes[row], own)
     )
+
+
+def named_pixels(project: Project) -> Iterator[tuple[str, str, float, float]]:
+    """Yield photo, point, column and row of the image observations as :func:`to_corner`."""
+    block = project.block
+    columns = (block.image_photos.tolist(), block.image_points.tolist(), to_corner(project).tolist())
+    for photo, point, (column, row) in zip(*columns, strict=True):
+        yield block.photo_ids[photo], block.point_ids[point], column, row
 
 
 def known_size(camera: Camera, size: Size | None) -> Size:
@@ -180,6 +188,14 @@ def lens_of(camera: Camera, size: Size | None) -> Lens | None:
         terms = {"k1": values["k"]}
     fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
     return Lens(fx, fy, values["cx"], values["cy"], **terms)
+
+
+def lens_with(camera: Camera, size: Size | None, title: str, *terms: str) -> Lens:
+    """Return an exactly equivalent lens with some terms for the format of a title; reject other cameras."""
+    lens = lens_of(camera, size)
+    if lens is None or not lens.is_plain(*terms):
+        raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title=title))
+    return lens
 
 
 def _about_middle(camera: Camera, size: Size, terms: Mapping[str, float]) -> Lens | None:

@@ -11,7 +11,7 @@ from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project
 from photogram.messages import Message
-from photogram.network.attitudes import Attitudes
+from photogram.network.attitudes import known_angles
 from photogram.network.directions import image_directions
 from photogram.network.motion import on_shared
 from photogram.network.observations import Control, Position
@@ -57,14 +57,10 @@ def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, me
     """Return a project transformed by scale, (3, 3) rotation, (3,) translation."""
     block = project.block
     scale, turn, shift = by
-    matrices = attitude_matrices(block)
-    posed = np.isfinite(matrices).all(axis=(1, 2))
-    angles = block.photo_attitudes.copy()
-    angles[posed] = Attitudes(turn @ matrices[posed]).values("omega_phi_kappa")
     return project.replace(
         block=block.replace(
             photo_positions=scale * block.photo_positions @ turn.T + shift,
-            photo_attitudes=angles,
+            photo_attitudes=known_angles("omega_phi_kappa", turn @ attitude_matrices(block)),
             photo_to_ground=False,
         ),
         starts=scale * project.starts @ turn.T + shift,

@@ -14,7 +14,7 @@ from photogram.errors import InputError, message_of
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format
-from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
+from photogram.formats.images import Y_DOWN, lens_with, named_pixels, sizes_of, to_corner
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
@@ -304,16 +304,13 @@ def _control(project: Project) -> bytes:
 
     found = positions.copy()
     found[own], _ = from_frame(GEOGRAPHIC, positions[own], np.zeros((len(own), 3, 3)), project.frame)
-    known = set(own.tolist())
+    known = {block.point_ids[row]: found[row].tolist() for row in own.tolist()}
     lines = ["WGS84"]
     # OpenSfM counts pixels from the centre of the first one and ends names at blanks.
-    pixels = (to_corner(project) - 0.5).tolist()
-    for photo, point, pixel in zip(
-        block.image_photos.tolist(), block.image_points.tolist(), pixels, strict=True
-    ):
+    for photo, point, column, row in named_pixels(project):
         if point in known:
-            names = ("_".join(name.split()) for name in (block.photo_ids[photo], block.point_ids[point]))
-            lines.append(" ".join([*map(repr, [*found[point].tolist(), *pixel]), *names]))
+            names = ("_".join(name.split()) for name in (photo, point))
+            lines.append(" ".join([*map(repr, [*known[point], column - 0.5, row - 0.5]), *names]))
     return ("\n".join(lines) + "\n").encode() if len(lines) > 1 else b""
 
 
@@ -329,9 +326,7 @@ def _camera_member(camera: Camera, size: Size) -> dict[str, Any]:
         terms = {name: values.get(name, 0.0) for name in ("k1", "k2", "k3", "k4")}
         terms["k1"] = values.get("k", terms["k1"])
     else:
-        kind, lens = "brown", lens_of(camera, size)
-        if lens is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
-            raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title="OpenSfM"))
+        kind, lens = "brown", lens_with(camera, size, "OpenSfM", "k1", "k2", "k3", "p1", "p2")
         fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
         terms = {name: getattr(lens, name) for name in ("k1", "k2", "p1", "p2", "k3")}
     return {

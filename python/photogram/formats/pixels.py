@@ -15,6 +15,7 @@ from photogram.formats.columns import PLAIN, in_units
 from photogram.formats.format import Format
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.plain.cameras import read_cameras
+from photogram.formats.plain.photos import cameras_of
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
@@ -23,9 +24,7 @@ from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.csv_text import csv_text
-from photogram.io.delimited import read_columns
-from photogram.io.files import read_beginning
-from photogram.io.rows import DELIMITERS
+from photogram.io.delimited import read_columns, read_head
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
@@ -53,23 +52,11 @@ def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
 def _recognises(path: Path) -> bool:
     if not path.is_file() or path.suffix.lower() not in (".csv", ".tsv", ".txt"):
         return False
+    spelling = partial(PLAIN.spelled, _KNOWN)
     try:
-        begin = read_beginning(path)
+        return set(_NEEDED) <= set(spelling(read_head(path, _NEEDED, spelling)))
     except InputError:
         return False
-    return set(_NEEDED) <= set(PLAIN.spelled(_KNOWN, _headings(begin)))
-
-
-def _headings(begin: str) -> list[str]:
-    lines = [line for line in begin.replace("\r", "\n").split("\n") if line.strip()]
-    for line in lines:
-        if not line.lstrip("\xef\xbb\xbf \t").startswith("#"):
-            break
-    else:
-        return []
-    line = line.lstrip("\xef\xbb\xbf").casefold()
-    mark = next((each for each in DELIMITERS if each in line), None)
-    return [word.strip().strip('"') for word in line.split(mark)]
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -83,7 +70,7 @@ def read(path: Path, options: ReadOptions) -> Project:
     for own in zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True):
         block.camera(*own)
     photos, points = table.names("photo"), table.names("point")
-    which = _cameras_of(table, [each.name for each in block.cameras])
+    which = np.array(cameras_of(table, [each.name for each in block.cameras]), dtype=np.int64)
     of_photo = np.zeros(len(photos.names), dtype=np.int64)
     of_photo[photos.rows] = which
     other = np.flatnonzero(of_photo[photos.rows] != which)
@@ -116,19 +103,6 @@ def _sd(table: ColumnTable, options: ReadOptions) -> Floats | None:
         value = float(found[bad[0]].min())
         raise table.error(int(bad[0]), phrase("format.positive", name="the standard deviation", value=value))
     return found
-
-
-def _cameras_of(table: ColumnTable, names: list[str]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    if "camera" not in table:
-        if len(names) > 1:
-            raise table.head.error(phrase("format.camera-column", n=len(names)))
-        return np.zeros(table.count, dtype=np.int64)
-    places = {name: row for row, name in enumerate(names)}
-    texts = table.texts("camera", names[0] if len(names) == 1 else "")
-    bad = next((row for row, name in enumerate(texts) if name not in places), None)
-    if bad is not None:
-        raise table.error(bad, phrase("format.undefined", what="camera", name=texts[bad]))
-    return np.array([places[name] for name in texts], dtype=np.int64)
 
 
 def write(project: Project) -> Mapping[str, bytes]:

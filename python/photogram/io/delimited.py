@@ -61,6 +61,16 @@ def read_columns(
     return _read(path, header, numbers)
 
 
+def read_head(path: Path, known: Collection[str] = (), spelling: Spelling = tuple) -> list[str]:
+    """Return the names of the columns in a file, in small letters; see :func:`read_columns`."""
+    if path.suffix == ".parquet":
+        import pyarrow.parquet
+
+        return [name.strip().lower() for name in pyarrow.parquet.read_schema(path).names]
+    head, delimiter = _head(path, read_beginning(path), known, spelling, None)
+    return [cell.strip().lower() for cell in _split(head, delimiter)]
+
+
 def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool = False) -> tuple[str, ...]:
     """Return the names of all columns; `settled`: the user may choose."""
     columns = tuple(spelling(own))

@@ -201,6 +201,27 @@ class Attitudes:
         return np.asarray(-np.einsum("nji,nj->ni", self.values("matrix_to_vision"), shifts))
 
 
+def angles_form(photo_to_ground: bool) -> Representation:
+    """Return the representation of the angles of a block."""
+    return "omega_phi_kappa_photo_to_ground" if photo_to_ground else "omega_phi_kappa"
+
+
+def known_matrices(form: Representation, angles: Floats) -> Floats:
+    """Return (n, 3, 3) matrices A of (n, 3) angles; NaN for unknown ones."""
+    found = np.full((len(angles), 3, 3), np.nan)
+    if (known := np.isfinite(angles).all(axis=1)).any():
+        found[known] = Attitudes.of(form, angles[known]).matrices
+    return found
+
+
+def known_angles(form: Representation, matrices: Floats) -> Floats:
+    """Return (n, 3) angles of (n, 3, 3) matrices A; NaN for unknown ones."""
+    found = np.full((len(matrices), 3), np.nan)
+    if (known := np.isfinite(matrices).all(axis=(1, 2))).any():
+        found[known] = Attitudes(matrices[known]).values(form)
+    return found
+
+
 _FROM: dict[str, Callable[[Floats], Floats]] = {
     "matrix": lambda a: a,
     "matrix_to_photo": lambda a: a.transpose(0, 2, 1),

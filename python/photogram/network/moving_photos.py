@@ -16,7 +16,7 @@ from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.lens import Lens
 from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
@@ -349,7 +349,7 @@ def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
     if observed is not None:
         place = np.where(np.isfinite(sd_position), observed[row], place)
     time = own.time or 0.0
-    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    form = angles_form(block.photo_to_ground)
     attitude = Attitudes.of(form, block.photo_attitudes[[row]]).matrices
     table = Table(np.array([time]), place[np.newaxis], np.array([time]), attitude)
     shape = (3,)

@@ -15,6 +15,7 @@ from photogram.arguments.objects import require_kind
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
+from photogram.network.attitudes import angles_form
 from photogram.network.block import Block, refuse_trajectories
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
@@ -352,7 +353,7 @@ class Result(OnFilm, AdjustedNetwork):
         photo rotates by rho about its own axes (x right, y up, z towards the viewer): its true attitude is A
         Exp(rho), A the adjusted one (docs/conventions.md). NaN if phi is 90 degrees.
         """
-        kind = "omega_phi_kappa_photo_to_ground" if self.block.photo_to_ground else "omega_phi_kappa"
+        kind = angles_form(self.block.photo_to_ground)
         _, rates = _photocore.attitudes_from_numbers(kind, self.photo_attitudes, np.eye(3))
         jacobian = np.tile(np.eye(6), (len(rates), 1, 1))
         jacobian[:, 3:, 3:] = rates

@@ -11,7 +11,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.agisoft import FILE
 from photogram.formats.block_contents import correlated_control, posed
-from photogram.formats.images import Y_DOWN, known_size, lens_of, to_corner
+from photogram.formats.images import Y_DOWN, known_size, lens_with, to_corner
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
@@ -126,9 +126,8 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
     if camera.model.startswith("agisoft_"):
         values = {name: value for name, value in camera.parameters.items() if name not in ("w", "h")}
         return camera.model.split("_")[1], values
-    lens = lens_of(camera, size)
-    if lens is None or size is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
-        raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title="Metashape"))
+    lens = lens_with(camera, size, "Metashape", "k1", "k2", "k3", "p1", "p2")
+    size = known_size(camera, size)
     # p1 is the coefficient of r^2 + 2 x^2 in Metashape.
     return "frame", {
         "f": lens.fy,

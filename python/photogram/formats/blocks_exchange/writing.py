@@ -8,11 +8,10 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
 from photogram.formats.blocks_exchange import FILE
 from photogram.formats.blocks_exchange.reading import CENTER
-from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
+from photogram.formats.images import Y_DOWN, lens_with, sizes_of, to_corner
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
@@ -69,11 +68,7 @@ def _xyz(position: Floats) -> str:
 
 
 def _camera(camera: Camera, size: Size) -> list[str]:
-    lens = lens_of(camera, size)
-    if lens is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
-        raise InputError(
-            phrase("format.model", camera=camera.title, model=camera.model, title="BlocksExchange")
-        )
+    lens = lens_with(camera, size, "BlocksExchange", "k1", "k2", "k3", "p1", "p2")
     terms = {"K1": lens.k1, "K2": lens.k2, "K3": lens.k3, "P1": lens.p2, "P2": lens.p1}
     return [
         f"<Name>{_text(camera.title)}</Name>",

@@ -330,7 +330,7 @@ def _large_tests(found: Placed, types: Sequence[ComponentTests]) -> Iterator[tup
                 yield places[point_rows[point]], own
             elif moment is not None:
                 yield _flown(found, moment), own
-            else:
+            elif photo is not None:
                 yield found.photos[photo_rows[photo]], own
 
 

@@ -32,6 +32,7 @@ from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables, Transform
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
+from photogram.io.delimited import read_head
 from photogram.io.parquet import coded
 from photogram.messages import missing_columns, unknown_name
 from photogram.network.block import checked, refuse_passages
@@ -157,9 +158,8 @@ class Streamed:
         if "use" in columns:
             message = phrase("plain.parts-column", column="use")
             raise InputError(message, file=settings.tables["images"])
-        if "points" in settings.tables and any(
-            name.strip().lower().startswith("sd") for name in read_head(settings.tables["points"])
-        ):
+        named = read_head(settings.tables["points"]) if "points" in settings.tables else []
+        if any(name.startswith("sd") for name in named):
             message = phrase("plain.parts-column", column="sd_x")
             raise InputError(message, file=settings.tables["points"])
         self._columns = columns
@@ -327,17 +327,6 @@ class Streamed:
             image_sd=whole("sd", (2,), np.float64),
             observations=observations,
         )
-
-
-def read_head(path: Path) -> list[str]:
-    """Return the names of the columns of a table."""
-    if path.suffix == ".parquet":
-        import pyarrow.parquet
-
-        return list(pyarrow.parquet.read_schema(path).names)
-    from photogram.io.delimited import read_columns
-
-    return list(read_columns(path).columns)
 
 
 def _stripped(column: Any) -> tuple[list[str], Indices]:

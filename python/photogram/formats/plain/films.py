@@ -203,9 +203,8 @@ class _Reader:
     def _film(self, photo: ScannedPhoto, mirrored: bool, start: Floats) -> Film:
         kind, machine = self.kinds[photo.film], photo.machine
         held = np.array(kind.sd_size) == 0
-        roll, size, bend = kind.roll, [0.0, 0.0, 0.0], None
-        if not held[0]:
-            roll, size[0] = None, float(kind.roll.position[0])
+        roll = kind.roll if held[0] else None
+        size, bend = [0.0 if held[0] else float(kind.roll.position[0]), 0.0, 0.0], None
         if kind.model == "conformal":
             held[1:] = True
         if kind.model in ("bilinear", "projective"):

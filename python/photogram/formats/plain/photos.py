@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -70,7 +71,8 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     kept = np.flatnonzero(use)
     if len(kept) < table.count:
         tables.remark("plain.unused-photos", table.path, n=table.count - len(kept))
-    which, groups = _camera_of(table, cameras), table.texts("group")
+    names = [each.name for each in cameras.cameras]
+    which, groups = cameras_of(table, names), table.texts("group")
     unused = frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used)
     return Photos(
         table,
@@ -89,21 +91,16 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     )
 
 
-def _camera_of(table: ColumnTable, cameras: Cameras) -> list[int]:
-    places = {each.name: row for row, each in enumerate(cameras.cameras)}
-    if "camera" not in table:
-        if len(places) > 1:
-            raise table.head.error(phrase("plain.which-camera", count=len(places)))
-        return [0] * table.count
-    found = []
-    for row, name in enumerate(table.texts("camera")):
-        if not name and len(places) == 1:
-            found.append(0)
-        elif name not in places:
-            raise table.unknown_error(row, "camera", "camera", name, places)
-        else:
-            found.append(places[name])
-    return found
+def cameras_of(table: ColumnTable, names: Sequence[str]) -> list[int]:
+    """Return the index of the camera of each row; a single camera needs no name."""
+    only = names[0] if len(names) == 1 else ""
+    if "camera" not in table and not only:
+        raise table.head.error(phrase("plain.which-camera", count=len(names)))
+    places = {name: row for row, name in enumerate(names)}
+    texts = table.texts("camera", only)
+    if (row := next((row for row, name in enumerate(texts) if name not in places), None)) is not None:
+        raise table.unknown_error(row, "camera", "camera", texts[row], places)
+    return [places[name] for name in texts]
 
 
 def _attitude_weights(

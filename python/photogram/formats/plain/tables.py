@@ -32,7 +32,7 @@ from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
-from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.attitudes import Attitudes, Representation, angles_form, known_angles
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
@@ -415,10 +415,7 @@ def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
 
 def angles_of(matrices: Floats, block: Block) -> Floats:
     """Return (n, 3) omega, phi, kappa (degrees) of photo axes as columns; NaN for NaN."""
-    kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-    found, known = np.full((len(matrices), 3), np.nan), ~np.isnan(matrices).any(axis=(1, 2))
-    found[known] = degrees_typed(Attitudes(matrices[known]).values(kind), MATRIX_ROUNDING)
-    return found
+    return degrees_typed(known_angles(angles_form(block.photo_to_ground), matrices), MATRIX_ROUNDING)
 
 
 class Transform:

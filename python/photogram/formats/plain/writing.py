@@ -30,7 +30,7 @@ from photogram.io.csv_text import csv_text
 from photogram.io.files import read_text
 from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
 from photogram.io.toml import quoted_text, toml_text, with_comments
-from photogram.network.attitudes import Attitudes
+from photogram.network.attitudes import angles_form, known_matrices
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.film_reduction import camera_unit
@@ -80,12 +80,7 @@ def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
 
 def attitude_matrices(block: Block) -> Floats:
     """Return (P, 3, 3) attitudes A of photos, photo to object; NaN if unknown."""
-    found = np.full((len(block.photo_ids), 3, 3), np.nan)
-    known = ~np.isnan(block.photo_attitudes).any(axis=1)
-    if known.any():
-        kind = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-        found[known] = Attitudes.of(kind, block.photo_attitudes[known]).matrices  # type: ignore[arg-type]
-    return found
+    return known_matrices(angles_form(block.photo_to_ground), block.photo_attitudes)
 
 
 def write(project: Project) -> Mapping[str, bytes]:
