@@ -1,10 +1,13 @@
-"""Point names (`names.csv`) for formats with numbers, and colours."""
+"""Point names (`names.csv`) for formats with numbers, and values by name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.formats.plain.statement_tables import asked_by_other_names
@@ -18,6 +21,7 @@ from photogram.words import phrase
 
 NAMES = "names.csv"
 LARGEST = 2**53
+T = TypeVar("T")
 
 
 def with_names(project: Project, path: Path) -> Project:
@@ -91,17 +95,17 @@ def names_file(numbers: Mapping[str, int]) -> dict[str, bytes]:
     return {NAMES: csv_text({"point": list(numbers.values()), "name": list(numbers)})}
 
 
-class Colours(Mapping[str, Sequence[int]]):
-    """Red, green and blue of points by name, from 0 to 255."""
+class NamedValues(Mapping[str, T]):
+    """Values by name, in a dictionary that is created on demand."""
 
-    def __init__(self, names: Sequence[str], values: Indices) -> None:
+    def __init__(self, names: Sequence[str], values: Indices | Sequence[T]) -> None:
         self._names, self._values = names, values
 
     @cached_property
-    def _found(self) -> dict[str, list[int]]:
-        return dict(zip(self._names, self._values.tolist(), strict=True))
+    def _found(self) -> dict[str, T]:
+        return dict(zip(self._names, np.asarray(self._values).tolist(), strict=True))
 
-    def __getitem__(self, name: str) -> Sequence[int]:
+    def __getitem__(self, name: str) -> T:
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:

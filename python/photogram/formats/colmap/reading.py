@@ -14,7 +14,7 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model, Pose
 from photogram.formats.colmap.files import read_model
 from photogram.formats.images import Y_DOWN
-from photogram.formats.names import NAMES, Colours, renamed
+from photogram.formats.names import NAMES, NamedValues, renamed
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.rigging import FrameOf, Rig
@@ -73,7 +73,7 @@ def _project(model: Model, path: Path) -> Project:
     return block.project(
         details={
             "image numbers": dict(zip(images.names, images.numbers.tolist(), strict=True)),
-            "colours": Colours(block.point_ids, model.points.colours),
+            "colours": NamedValues(block.point_ids, model.points.colours),
         }
     )
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.builder import BlockBuilder
+from photogram.formats.names import NamedValues
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import (
     ASSUMED,
@@ -259,26 +259,6 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     return _Given(table, names, values, held, check_sd, observed, vegetated)
 
 
-class _PointRows(Mapping[str, int]):
-    """The row of each point by name, in a dictionary made on demand."""
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = names
-
-    @cached_property
-    def _rows(self) -> dict[str, int]:
-        return dict(zip(self._names, range(len(self._names)), strict=True))
-
-    def __getitem__(self, name: str) -> int:
-        return self._rows[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-
 @dataclass(frozen=True)
 class _Points:
     names: list[str]
@@ -327,5 +307,5 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
         observed = control.observed
         starts[rows] = np.where(np.isnan(control.positions), starts[rows], control.positions)
     complete = len(rows_of_names) == len(names)
-    places = rows_of_names if complete else _PointRows(names)
+    places = rows_of_names if complete else NamedValues(names, range(len(names)))
     return _Points(names, places, rows, starts, positions, sd, check_sd, observed)
