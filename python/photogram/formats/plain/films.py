@@ -202,16 +202,16 @@ class _Reader:
 
     def _film(self, photo: ScannedPhoto, mirrored: bool, start: Floats) -> Film:
         kind, machine = self.kinds[photo.film], photo.machine
-        held = np.array(kind.sd_size) == 0
-        roll = kind.roll if held[0] else None
-        size, bend = [0.0 if held[0] else float(kind.roll.position[0]), 0.0, 0.0], None
+        fixed = np.array(kind.sd_size) == 0
+        roll = kind.roll if fixed[0] else None
+        size, bend = [0.0 if fixed[0] else float(kind.roll.position[0]), 0.0, 0.0], None
         if kind.model == "conformal":
-            held[1:] = True
+            fixed[1:] = True
         if kind.model in ("bilinear", "projective"):
             bend = FilmBend(photo.name, np.zeros(2), np.array(kind.sd_bend))
         return Film(
             FilmPlacement(photo.name, start),
-            FilmSize(photo.name, size, np.where(held, 0.0, np.inf)),
+            FilmSize(photo.name, size, np.where(fixed, 0.0, np.inf)),
             machine.scanner,
             machine.readings,
             bend=bend,
@@ -224,7 +224,7 @@ class _Reader:
 
     def fitted(self, scans: Sequence[Scan]) -> list[Scan]:
         """Return fixed films, fitted to their marks only, with fixed scanners."""
-        held: dict[int, Machine] = {}
+        scanners: dict[int, Machine] = {}
         found = []
         for photo, scan in zip(self.photos, scans, strict=True):
             kind, film, machine = self.kinds[photo.film], scan.film, photo.machine
@@ -244,7 +244,7 @@ class _Reader:
                 mirrored=film.mirrored,
                 reseau=None if reseau is None else reseau(photo.name),
             )
-            fixed = held.setdefault(id(machine), machine.held())
+            fixed = scanners.setdefault(id(machine), machine.held())
             film = replace(
                 film,
                 placement=FilmPlacement(photo.name, fit.film[:3], 0.0),

@@ -278,8 +278,8 @@ def _needed(
 
 def film_cells(film: Film, roll: Roll | None, sd: Mapping[str, float | None]) -> dict[str, Any]:
     """Return the row of a film on a roll, with standard deviations of its size, m, b1 and b2."""
-    held = film.size.deviations == 0
-    conformal = film.bend is None and bool(held[1:].all())
+    fixed = film.size.deviations == 0
+    conformal = film.bend is None and bool(fixed[1:].all())
     bend = "projective" if film.projective else "bilinear"
     model = "conformal" if conformal else "affine" if film.bend is None else bend
     cells: dict[str, Any] = {} if roll is None else {"film": roll.name}
