@@ -118,12 +118,12 @@ class Reliability:
     @property
     def detectable(self) -> Floats:
         """(M,) minimal detectable error of each single row; infinite without redundancy."""
-        return minimal_detectable_error(self.sd, self.redundancy, self._delta)
+        return minimal_detectable_error(self.sd, _shown(self.redundancy), self._delta)
 
     @property
     def external(self) -> Floats:
         """(M,) largest effect of an undetected error on any function, in its sd."""
-        return largest_effect(self.redundancy, self._delta)
+        return largest_effect(_shown(self.redundancy), self._delta)
 
     @property
     def group_detectable(self) -> Floats:
@@ -152,7 +152,7 @@ class Reliability:
         return self._own_effects(list(range(len(self.suspects))), np.arange(len(self.sd)))
 
     def _own_effects(self, groups: list[int], rows: Indices) -> Floats:
-        errors = minimal_detectable_error(1.0, self.redundancy[rows], self._delta)
+        errors = minimal_detectable_error(1.0, _shown(self.redundancy[rows]), self._delta)
         return np.asarray(self.trial.core.effects(groups)[:, :3] * errors[:, np.newaxis])
 
     def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
@@ -286,6 +286,11 @@ class Reliability:
         """Return report lines: the largest undetected effect of every type."""
         table = written(self.observations())
         return [table.note, *table_text(table)]
+
+
+def _shown(redundancy: Floats) -> Floats:
+    """Return redundancy numbers; zero if only rounding error."""
+    return np.where(redundancy < 1e-9, 0.0, np.minimum(redundancy, 1.0))
 
 
 REMOVED = 0.1  # Weight factor below which an observation counts as removed

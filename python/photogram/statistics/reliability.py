@@ -30,7 +30,7 @@ TESTABLE = 0.01
 With less redundancy, the unknowns absorb a gross error, and the test value repeats the one of another
 observation."""
 
-ROUNDING = 1e-9  # Redundancy numbers below this are rounding errors of zero
+ROUNDING = 1e-10  # Redundancy numbers below this are rounding errors of zero
 
 
 def standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
