@@ -4,7 +4,8 @@
 //! factorisation are unchanged and include the cofactors of excluded observations.
 
 use std::borrow::Cow;
-use std::ops::ControlFlow;
+use std::collections::BTreeSet;
+use std::ops::{ControlFlow, Range};
 
 use super::equations::ObservationEquations;
 use super::group_test::{leverage_odds, may_correlate};
@@ -13,12 +14,14 @@ use super::options::Phase;
 use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
+use super::walk::Buffers;
 use crate::normals::{
-    Cofactors, Equations, FactorOptions, InvertOptions, Layout, LayoutError, LocalCofactors, Prior,
-    SelectedInverse, TieRows,
+    Cofactors, FactorOptions, Function, InvertOptions, Layout, LayoutError, LocalCofactors, Prior,
+    SelectedInverse,
 };
 use crate::sorting::sort_by;
 use crate::{Threads, parallel};
+use faer::Mat;
 use nalgebra::DMatrix;
 
 /// Problem at adjusted values, with all cofactors inside the pattern of its normal equations.
@@ -36,13 +39,28 @@ pub struct Leverages {
     linearized: Option<Linearized>,
 }
 
-/// Cofactors of the equations a of a tie, included or excluded.
+/// Cofactors of some equations a, included or excluded.
 #[derive(Debug, Clone)]
-pub struct TieCofactors {
+pub struct RowCofactors {
     /// Leverage matrix a Q a^T, row by row.
     pub equations: Vec<f64>,
-    /// Q a^T for each block of the tie, one vector over its unknowns per equation; None for the local block.
+    /// Q a^T for each block of the equations, one vector over its unknowns per equation; None for the local block.
     pub blocks: Vec<(Option<usize>, Vec<f64>)>,
+}
+
+impl RowCofactors {
+    /// Selects some equations of a local block.
+    pub fn of_local(all: &LocalCofactors, rows: Range<usize>) -> Self {
+        let count = all.rows();
+        let some = |values: &[f64]| {
+            let width = values.len() / count;
+            values[rows.start * width..rows.end * width].to_vec()
+        };
+        let equations = rows.clone().flat_map(|i| all.equations[i * count..][rows.clone()].iter().copied());
+        let others = all.others.iter().map(|(block, values)| (Some(*block), some(values)));
+        let blocks = std::iter::once((None, some(&all.local))).chain(others).collect();
+        Self { equations: equations.collect(), blocks }
+    }
 }
 
 impl Leverages {
@@ -241,72 +259,64 @@ impl Leverages {
         Ok(threads.install(|| parallel::map(found.len(), 1, |k| shown(&found[k]))))
     }
 
-    /// Returns the cofactors of the equations of some ties, for given standard deviations.
-    ///
-    /// # Errors
-    /// The problem has another layout.
-    pub fn of_ties(
+    /// Returns the equations of some ties as functions of the unknowns, for given standard deviations.
+    pub fn rows_of_ties(
         &self,
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         ties: &[usize],
         threads: &Threads,
-    ) -> Result<Vec<TieCofactors>, AdjustError> {
-        if ties.is_empty() {
-            return Ok(vec![]);
-        }
+    ) -> Vec<Vec<Function>> {
         let (_, asked, _) = self.equations(problem, observation_sd, threads);
-        ties.iter().map(|&tie| Ok(self.of_tie(problem, &asked, tie)?)).collect()
+        let mut buffers = Buffers::default();
+        let mut of_tie = |&tie: &usize| {
+            let mut rows = vec![];
+            asked.each_row_of_tie(&mut buffers, tie, |row| rows.push(row.taken().collect()));
+            rows
+        };
+        ties.iter().map(&mut of_tie).collect()
     }
 
-    fn of_tie(
-        &self,
-        problem: &AnyProblem<'_>,
-        asked: &ObservationEquations<'_>,
-        tie: usize,
-    ) -> Result<TieCofactors, LayoutError> {
-        let layout = problem.layout();
-        let (each, width) = (&layout.ties()[tie], layout.tie_columns(tie).count());
-        let (mut constant, mut coefficients) = (vec![0.0; each.rows], vec![0.0; each.rows * width]);
-        asked.write_tie(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
-        let mut first = 0;
-        let place = |&block: &u32| {
-            let own = (Some(block as usize), first, layout.retained_dim(block as usize));
-            first += own.2;
-            own
-        };
-        let mut blocks: Vec<(Option<usize>, usize, usize)> = each.retained.iter().map(place).collect();
-        blocks.extend(each.local.map(|_| (None, 0, width)));
-        let cofactors = |pair: (Option<usize>, Option<usize>)| match (pair, each.local) {
-            ((Some(row), Some(column)), _) => self.selected.block(row, column),
-            (_, local) => {
-                let first = local.map_or(0, |local| local as usize * width * width);
-                Ok(self.cofactors.local[first..][..width * width].to_vec())
+    /// Returns the cofactors of functions of one local block, or of retained blocks.
+    ///
+    /// # Errors
+    /// Pairs of retained blocks outside the pattern of the normal equations.
+    pub fn of_rows(&self, layout: &Layout, rows: &[Function]) -> Result<RowCofactors, LayoutError> {
+        let unknowns = || rows.iter().flatten().map(|&(unknown, _)| unknown);
+        let dim = layout.local_dim();
+        let (blocks, q): (Vec<_>, _) = match unknowns().find(|unknown| layout.all_locals().contains(unknown))
+        {
+            Some(unknown) => {
+                let local = unknown / dim;
+                let own = &self.cofactors.local[local * dim * dim..];
+                (vec![(None, layout.local_range(local))], Mat::from_fn(dim, dim, |i, j| own[i * dim + j]))
+            }
+            None => {
+                let all: BTreeSet<usize> = unknowns().map(|unknown| layout.retained_with(unknown)).collect();
+                let ranges = all.iter().map(|&block| (Some(block), layout.retained_range(block)));
+                (ranges.collect(), self.selected.over(all.iter().copied())?)
             }
         };
-        let mut along = vec![0.0; each.rows * width];
-        for &(row_block, to, _) in &blocks {
-            for &(column_block, from, count) in &blocks {
-                let values = cofactors((row_block, column_block))?;
-                for (k, row) in values.chunks_exact(count.max(1)).enumerate() {
-                    for equation in 0..each.rows {
-                        let own = &coefficients[equation * width + from..][..count];
-                        along[equation * width + to + k] +=
-                            row.iter().zip(own).map(|(q, a)| q * a).sum::<f64>();
-                    }
-                }
+        let columns: Vec<usize> = blocks.iter().flat_map(|(_, range)| range.clone()).collect();
+        let mut a = Mat::<f64>::zeros(rows.len(), columns.len());
+        for (i, row) in rows.iter().enumerate() {
+            for &(unknown, value) in row {
+                columns.binary_search(&unknown).into_iter().for_each(|column| a[(i, column)] = value);
             }
         }
-        let row = |values: &'_ [f64], i: usize| values[i * width..(i + 1) * width].to_vec();
-        let product = |i: usize, j: usize| -> f64 {
-            row(&along, i).iter().zip(row(&coefficients, j)).map(|(x, y)| x * y).sum()
+        let along = &a * q;
+        let leverages = &along * a.transpose();
+        let mut columns = 0..columns.len();
+        let mut of_block = |(block, range): (Option<usize>, Range<usize>)| {
+            let own: Vec<usize> = columns.by_ref().take(range.len()).collect();
+            (
+                block,
+                (0..rows.len()).flat_map(|i| own.iter().map(move |&k| (i, k))).map(|at| along[at]).collect(),
+            )
         };
-        let of_block = |&(block, first, count): &(Option<usize>, usize, usize)| {
-            (block, (0..each.rows).flat_map(|i| along[i * width + first..][..count].to_vec()).collect())
-        };
-        Ok(TieCofactors {
-            equations: (0..each.rows * each.rows).map(|k| product(k / each.rows, k % each.rows)).collect(),
-            blocks: blocks.iter().map(of_block).collect(),
+        Ok(RowCofactors {
+            blocks: blocks.into_iter().map(&mut of_block).collect(),
+            equations: (0..rows.len().pow(2)).map(|k| leverages[(k / rows.len(), k % rows.len())]).collect(),
         })
     }
 

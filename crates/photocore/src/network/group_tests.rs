@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::NetworkError;
-use super::suspects::{Home, Row, Suspect};
+use super::suspects::{Home, Row, Suspect, Suspects};
 use super::trial::Trial;
-use crate::adjustment::{Few, GroupTest, Leverages, Terms};
-use crate::normals::GroupCofactors;
+use crate::adjustment::{Few, GroupTest, Leverages, Terms, weighted};
+use crate::normals::{Function, GroupCofactors};
 use crate::{Threads, parallel};
 
 /// Tests of all groups; rows and square blocks are concatenated group by group.
@@ -47,9 +47,10 @@ struct Part<'a> {
 }
 
 impl Tests {
-    /// Returns tests of `count` inactive groups.
-    fn unknown(count: usize, row_starts: &[usize], block_starts: &[usize]) -> Self {
-        let (rows, blocks) = (row_starts[count], block_starts[count]);
+    /// Returns tests of inactive groups.
+    fn unknown(suspects: &Suspects) -> Self {
+        let count = suspects.len();
+        let (rows, blocks) = (suspects.row_starts()[count], suspects.block_starts()[count]);
         let nothing = |count: usize| vec![f64::NAN; count];
         Self {
             active: vec![false; count],
@@ -65,7 +66,8 @@ impl Tests {
     }
 
     /// Splits the tests into chunks of [`TOGETHER`] groups.
-    fn parts<'a>(&'a mut self, row_starts: &[usize], block_starts: &[usize]) -> Vec<Part<'a>> {
+    fn parts<'a>(&'a mut self, suspects: &Suspects) -> Vec<Part<'a>> {
+        let (row_starts, block_starts) = (suspects.row_starts(), suspects.block_starts());
         let Self { active, rank, statistic, least, shared, residual, cofactors, error, error_sd } = self;
         let of_suspects = [statistic, least, shared].map(|all| all.chunks_mut(TOGETHER));
         let [mut statistic, mut least, mut shared] = of_suspects;
@@ -127,8 +129,8 @@ impl Trial {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
-        let mut all = Tests::unknown(self.suspects.all.len(), self.suspects.row_starts(), &self.block_starts);
-        let parts = all.parts(self.suspects.row_starts(), &self.block_starts);
+        let mut all = Tests::unknown(&self.suspects);
+        let parts = all.parts(&self.suspects);
         let fill = |_, (suspects, mut part): (&[Suspect], Part<'_>)| {
             for suspect in suspects {
                 let size = suspect.rows.len();
@@ -149,7 +151,7 @@ impl Trial {
                 _ => tests.cofactors[first + k * (size + 1)],
             })
         };
-        self.suspects.row_starts().windows(2).zip(&self.block_starts).flat_map(of).collect()
+        self.suspects.row_starts().windows(2).zip(self.suspects.block_starts()).flat_map(of).collect()
     }
 
     /// Tests a group; None if all its rows are excluded.
@@ -168,7 +170,7 @@ impl Trial {
         if taking.is_empty() {
             return None;
         }
-        let (residual, leverages, by_point) = self.leverages(suspect, found, groups, terms, &taking);
+        let (residual, leverages, by_point) = self.leverages(suspect, found, groups, terms, &taking)?;
         let left = |leverages: &[f64]| -> Vec<f64> {
             let count = taking.len();
             (0..count * count).map(|k| f64::from(u8::from(k / count == k % count)) - leverages[k]).collect()
@@ -247,47 +249,47 @@ impl Trial {
         groups: &GroupCofactors,
         terms: &Terms<'_>,
         taking: &[usize],
-    ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    ) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
         let problem = &self.assembled.problem;
-        let residual = |&k: &usize| match suspect.rows[k].0 {
-            Row::Equation(equation) => found.residuals[equation] / self.observation_sd[equation],
-            Row::Unknown(unknown) => terms.row(unknown).1,
-        };
+        let (size, count) = (suspect.rows.len(), taking.len());
+        let residual = |&k: &usize| misclosure(suspect.rows[k].0, &self.observation_sd, found, terms);
         let residuals = taking.iter().map(residual).collect();
-        let count = taking.len();
-        let (leverages, by_point) = match suspect.home {
-            Home::Tie(tie) => {
-                let block = &found.cofactors.ties[problem.layout().tie_block(tie)];
-                (sub(block, suspect.rows.len(), taking), vec![0.0; count * count])
+        if let Home::Tie(tie) = suspect.home {
+            let block = &found.cofactors.ties[problem.layout().tie_block(tie)];
+            return Some((residuals, sub(block, size, taking), vec![0.0; count * count]));
+        }
+        let rows = self.term_rows(suspect, terms).ok()?;
+        let leverages = sub(&found.of_rows(problem.layout(), &rows).ok()?.equations, size, taking);
+        let by_point = match suspect.home {
+            Home::Point(place) if self.is_tested_whole(place) => {
+                let all: Vec<f64> = taking.iter().flat_map(|&k| rows[k].iter().map(|own| own.1)).collect();
+                let rows = DMatrix::from_row_slice(count, 3, &all);
+                let own = DMatrix::from_row_slice(3, 3, &groups.alone[9 * place..9 * place + 9]);
+                (&rows * own * rows.transpose()).as_slice().to_vec()
             }
-            Home::Group { .. } | Home::Point(_) | Home::Block(_) => {
-                let rows = self.term_rows(suspect, taking, terms);
-                let q = self.cofactors_at(found, suspect.home);
-                let alone = match suspect.home {
-                    Home::Point(place) if self.is_tested_whole(place) => {
-                        let own = DMatrix::from_row_slice(3, 3, &groups.alone[9 * place..9 * place + 9]);
-                        &rows * own * rows.transpose()
-                    }
-                    _ => DMatrix::zeros(count, count),
-                };
-                let leverages = &rows * q * rows.transpose();
-                (leverages.transpose().as_slice().to_vec(), alone.transpose().as_slice().to_vec())
-            }
+            _ => vec![0.0; count * count],
         };
-        (residuals, leverages, by_point)
+        Some((residuals, leverages, by_point))
     }
 
-    /// Returns the whitened equations of some rows of a group by the parameters of its block.
-    pub(super) fn term_rows(&self, suspect: &Suspect, some: &[usize], terms: &Terms<'_>) -> DMatrix<f64> {
+    /// Returns the whitened equations of the parameters of a group, over all parameters of its block; zero for excluded rows.
+    pub(super) fn term_rows(
+        &self,
+        suspect: &Suspect,
+        terms: &Terms<'_>,
+    ) -> Result<Vec<Function>, NetworkError> {
+        let (found, sd) = (self.found()?, &self.assembled.problem.sd);
         let range = self.unknowns_at(suspect.home);
-        let mut rows = DMatrix::zeros(some.len(), range.len());
-        for (i, &k) in some.iter().enumerate() {
-            if let Row::Unknown(unknown) = suspect.rows[k].0 {
+        let of = |&(row, _): &(Row, usize)| {
+            let mut function: Function = range.clone().map(|unknown| (unknown, 0.0)).collect();
+            if let Row::Unknown(unknown) = row {
                 let (row, _) = terms.row(unknown);
-                row.into_iter().for_each(|(column, value)| rows[(i, column - range.start)] = value);
+                let free = row.into_iter().filter(|(i, _)| sd[*i] != 0.0 && !found.held.contains(i));
+                free.for_each(|(i, value)| function[i - range.start].1 = value);
             }
-        }
-        rows
+            function
+        };
+        Ok(suspect.rows.iter().map(of).collect())
     }
 
     pub(super) fn unknowns_at(&self, home: Home) -> std::ops::Range<usize> {
@@ -314,6 +316,14 @@ impl Trial {
             Home::Group { .. } | Home::Tie(_) => &[],
         };
         DMatrix::from_row_slice(width, width, values)
+    }
+}
+
+/// Returns the misclosure of a row, divided by its standard deviation.
+pub(super) fn misclosure(row: Row, observation_sd: &[f64], found: &Leverages, terms: &Terms<'_>) -> f64 {
+    match row {
+        Row::Equation(equation) => weighted(found.residuals[equation], observation_sd[equation]),
+        Row::Unknown(unknown) => terms.row(unknown).1,
     }
 }
 

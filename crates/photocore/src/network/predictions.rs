@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::error::NetworkError;
-use super::group_tests::{in_units, sub};
+use super::group_tests::{in_units, misclosure, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::adjustment::{Leverages, Terms, TieCofactors, weighted};
+use crate::adjustment::{Leverages, RowCofactors, Terms};
 use crate::normals::{LocalCofactors, dot};
 use crate::{Threads, parallel};
 
@@ -39,12 +39,6 @@ pub struct OnPoint {
     pub cofactors: Vec<f64>,
 }
 
-/// Cofactors near some groups: observations of local points, and ties.
-pub(super) struct Around {
-    pub(super) points: HashMap<usize, LocalCofactors>,
-    pub(super) ties: HashMap<usize, TieCofactors>,
-}
-
 impl Trial {
     /// Tests excluded rows against their prediction by the others (Cook and Weisberg 1982): d^T C^-1 d, with d observed minus predicted and
     /// its cofactors C = S + a Q a^T. None without excluded rows, or if the parameters of the group are excluded.
@@ -57,44 +51,39 @@ impl Trial {
         threads: &Threads,
     ) -> Result<Vec<Option<Prediction>>, NetworkError> {
         let found = self.found()?;
-        let problem = &self.assembled.problem;
-        let around = self.around(suspects, &self.observation_sd, found, threads)?;
         let terms = self.terms(&self.sd, &found.values);
-        let predict = |&index: &usize| {
+        let near = self.near(suspects, &self.observation_sd, &terms, threads)?;
+        let predict = |(&index, near): (&usize, &RowCofactors)| {
             let suspect = &self.suspects.all[index];
-            let out: Vec<usize> =
-                (0..suspect.rows.len()).filter(|&k| !self.is_in(suspect.rows[k].0)).collect();
+            let size = suspect.rows.len();
+            let out: Vec<usize> = (0..size).filter(|&k| !self.is_in(suspect.rows[k].0)).collect();
             if out.is_empty() || self.is_gone(suspect) {
                 return None;
             }
-            let leverages = match suspect.home {
-                Home::Group { group, point } => {
-                    let own = around.points.get(&point)?;
-                    let first = 2 * (group - problem.layout().groups_of(point).start);
-                    let rows: Vec<usize> = out.iter().map(|&k| first + k).collect();
-                    sub(&own.equations, own.rows(), &rows)
-                }
-                Home::Tie(tie) => sub(&around.ties.get(&tie)?.equations, suspect.rows.len(), &out),
-                Home::Point(_) | Home::Block(_) => {
-                    let rows = self.term_rows(suspect, &out, &terms);
-                    let leverages = &rows * self.cofactors_at(found, suspect.home) * rows.transpose();
-                    leverages.transpose().as_slice().to_vec()
-                }
-            };
-            self.prediction(suspect, &out, &leverages, found, &terms)
+            let count = out.len();
+            let leverages = DMatrix::from_row_slice(count, count, &sub(&near.equations, size, &out));
+            let c = DMatrix::identity(count, count) + leverages;
+            let rows: Vec<(Row, usize)> = out.iter().map(|&k| suspect.rows[k]).collect();
+            let misclosures = rows.iter().map(|row| misclosure(row.0, &self.observation_sd, found, &terms));
+            let d = DVector::from_iterator(count, misclosures);
+            let statistic = d.dot(&c.clone().cholesky()?.solve(&d));
+            let (error, error_sd) = in_units(&self.units(suspect, &rows), d.as_slice(), c.as_slice());
+            Some(Prediction { statistic, rows: out, error, error_sd })
         };
-        Ok(suspects.iter().map(predict).collect())
+        Ok(suspects.iter().zip(&near).map(predict).collect())
     }
 
-    /// Returns the cofactors of all objects of some groups.
-    pub(super) fn around(
+    /// Returns the cofactors of the equations of some groups, for given standard deviations.
+    pub(super) fn near(
         &self,
         suspects: &[usize],
         observation_sd: &[f64],
-        found: &Leverages,
+        terms: &Terms<'_>,
         threads: &Threads,
-    ) -> Result<Around, NetworkError> {
-        let problem = &self.assembled.problem;
+    ) -> Result<Vec<RowCofactors>, NetworkError> {
+        let (found, problem) = (self.found()?, &self.assembled.problem);
+        let layout = problem.layout();
+        let failed = |error| NetworkError::new(error, &self.assembled);
         let (mut places, mut ties) = (vec![], vec![]);
         for &index in suspects {
             match self.suspects.all[index].home {
@@ -105,35 +94,24 @@ impl Trial {
         }
         places.sort_unstable();
         places.dedup();
-        let named = |error| NetworkError::new(error, &self.assembled);
         let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], threads);
-        let of_ties = found.of_ties(problem, observation_sd, &ties, threads);
-        Ok(Around {
-            points: places.into_iter().zip(of_points.map_err(named)?).collect(),
-            ties: ties.into_iter().zip(of_ties.map_err(named)?).collect(),
-        })
-    }
-
-    fn prediction(
-        &self,
-        suspect: &Suspect,
-        out: &[usize],
-        leverages: &[f64],
-        found: &Leverages,
-        terms: &Terms<'_>,
-    ) -> Option<Prediction> {
-        let count = out.len();
-        let c = DMatrix::identity(count, count) + DMatrix::from_row_slice(count, count, leverages);
-        let residual = |&k: &usize| match suspect.rows[k].0 {
-            Row::Equation(equation) => found.residuals[equation] / self.observation_sd[equation],
-            Row::Unknown(unknown) => terms.row(unknown).1,
+        let of_points: HashMap<usize, LocalCofactors> =
+            places.into_iter().zip(of_points.map_err(failed)?).collect();
+        let mut of_ties = found.rows_of_ties(problem, observation_sd, &ties, threads).into_iter();
+        let mut of = |&index: &usize| {
+            let suspect = &self.suspects.all[index];
+            let size = suspect.rows.len();
+            let rows = match suspect.home {
+                Home::Group { group, point } => {
+                    let first = size * (group - layout.groups_of(point).start);
+                    return Ok(RowCofactors::of_local(&of_points[&point], first..first + size));
+                }
+                Home::Tie(_) => of_ties.next().unwrap_or_default(),
+                Home::Point(_) | Home::Block(_) => self.term_rows(suspect, terms)?,
+            };
+            found.of_rows(layout, &rows).map_err(|error| failed(error.into()))
         };
-        let d = DVector::from_iterator(count, out.iter().map(residual));
-        let statistic = d.dot(&c.clone().cholesky()?.solve(&d));
-        let rows: Vec<(Row, usize)> = out.iter().map(|&k| suspect.rows[k]).collect();
-        let units = self.units(suspect, &rows);
-        let (error, error_sd) = in_units(&units, d.as_slice(), c.as_slice());
-        Some(Prediction { statistic, rows: out.to_vec(), error, error_sd })
+        suspects.iter().map(&mut of).collect()
     }
 
     /// Returns true if the parameters of a group are excluded with it: fixed now, but not in the input.
@@ -185,7 +163,7 @@ impl Trial {
                 let identity = |k: usize| f64::from(u8::from(k / count == k % count));
                 let cofactors =
                     leverages.iter().enumerate().map(|(k, leverage)| identity(k) - leverage).collect();
-                OnPoint { suspects: self.on_place[*place].clone(), residual, cofactors }
+                OnPoint { suspects: self.on_place(*place).to_vec(), residual, cofactors }
             })
         };
         Ok(threads.install(|| parallel::map(all.len(), AT_LEAST, of)))
@@ -211,10 +189,15 @@ impl Trial {
                 let (rows, observed) = self.rows_at(place, &self.observation_sd, found, &terms);
                 let cofactors = sub(&own, own.len().isqrt(), &rows);
                 let residual = cofactors.chunks_exact(rows.len()).map(|row| dot(row, &observed)).collect();
-                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
+                OnPoint { suspects: self.on_place(place).to_vec(), residual, cofactors }
             })
         };
         Ok(points.iter().map(of).collect())
+    }
+
+    /// Returns the test groups of a local point.
+    fn on_place(&self, place: usize) -> &[usize] {
+        self.suspects.on_point(self.assembled.points[place])
     }
 
     /// Returns the index of a point in the model, unless it has additional observations.
@@ -230,10 +213,10 @@ impl Trial {
 
     /// Returns the equations of observed coordinates of a local point.
     fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<f64> {
-        let mut own = self.on_place[place].iter().map(|&index| &self.suspects.all[index]);
+        let mut own = self.on_place(place).iter().map(|&index| &self.suspects.all[index]);
         let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
-        let all: Vec<usize> = (0..suspect.rows.len()).collect();
-        self.term_rows(suspect, &all, terms).transpose().as_slice().to_vec()
+        let rows = self.term_rows(suspect, terms).unwrap_or_default();
+        rows.into_iter().flatten().map(|(_, coefficient)| coefficient).collect()
     }
 
     /// Returns the equation index of each row of the groups at a local point, and its whitened misclosure.
@@ -247,7 +230,7 @@ impl Trial {
         let problem = &self.assembled.problem;
         let groups = problem.layout().groups_of(place);
         let (mut rows, mut off) = (vec![], vec![]);
-        for &index in &self.on_place[place] {
+        for &index in self.on_place(place) {
             let suspect = &self.suspects.all[index];
             let first = match suspect.home {
                 Home::Group { group, .. } => 2 * (group - groups.start),
@@ -255,10 +238,7 @@ impl Trial {
             };
             for (k, &(row, _)) in suspect.rows.iter().enumerate() {
                 rows.push(first + k);
-                off.push(match row {
-                    Row::Equation(equation) => weighted(found.residuals[equation], observation_sd[equation]),
-                    Row::Unknown(unknown) => terms.row(unknown).1,
-                });
+                off.push(misclosure(row, observation_sd, found, terms));
             }
         }
         (rows, off)

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::covariance::{Covariances, Of};
 use super::error::NetworkError;
-use super::model::{Bundle, Owner};
+use super::model::Owner;
 use super::predictions::{AT_LEAST, OnPoint};
 use super::suspects::{Home, Suspects};
 use super::trial::Trial;
@@ -23,24 +23,11 @@ use crate::{Threads, parallel};
 /// Number of right-hand sides per batch.
 const TOGETHER: usize = 16;
 
-/// Owner of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum UnknownOf {
-    /// Photo: one of its six pose parameters, then a parameter of its own camera.
-    Photo(usize),
-    /// Shared camera.
-    Camera(usize),
-    /// Shared parameter.
-    Common(usize),
-    /// Point: one of its coordinates.
-    Point(usize),
-}
-
 /// Parameter that an error changes most, in its standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moved {
     /// Owner of the parameter.
-    pub of: UnknownOf,
+    pub of: Of,
     /// Number of the parameter there.
     pub component: usize,
     /// Change by an error of one standard deviation, in the unit of the parameter.
@@ -157,11 +144,7 @@ impl Trial {
     /// Returns, for each photo that steps by a rotation vector, the index of its angles and the matrix from steps to angles.
     fn turns(&self) -> Result<Vec<(usize, Matrix3)>, NetworkError> {
         let (values, model) = (&self.found()?.values, &self.assembled.problem.model);
-        let turn = |photo: usize| {
-            let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
-            let first = model.of_block(photo).start + 3;
-            Some((first, numbers.by_step([values[first], values[first + 1], values[first + 2]])?))
-        };
+        let turn = |photo| Some((model.of_block(photo).start + 3, self.to_angles(photo, values)?));
         Ok((0..model.cameras.len()).filter_map(turn).collect())
     }
 
@@ -188,19 +171,19 @@ impl Trial {
     }
 
     /// Returns the owner of a parameter, and its number there.
-    fn unknown(&self, unknown: usize) -> (UnknownOf, usize) {
+    fn unknown(&self, unknown: usize) -> (Of, usize) {
         let (model, points) = (&self.assembled.problem.model, &self.assembled.points);
         let stations = model.of_stations();
         if let Some((owner, number)) = model.owner(unknown) {
             let of = match owner {
-                Owner::Photo(photo) => UnknownOf::Photo(photo),
-                Owner::Camera(camera) => UnknownOf::Camera(camera),
-                Owner::Common(common) => UnknownOf::Common(common),
+                Owner::Photo(photo) => Of::Photo(photo),
+                Owner::Camera(camera) => Of::Camera(camera),
+                Owner::Common(common) => Of::Common(common),
             };
             return (of, number);
         }
         let among = if unknown < stations.start { unknown } else { unknown - stations.len() };
-        (UnknownOf::Point(points[among / 3]), among % 3)
+        (Of::Point(points[among / 3]), among % 3)
     }
 }
 
@@ -216,93 +199,44 @@ impl Trial {
     /// # Errors
     /// Effects before any adjustment.
     pub fn effects(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<[f64; 9]>, NetworkError> {
-        let found = self.found()?;
-        let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
-        let around = self.around(suspects, &problem.observation_sd, found, threads)?;
+        let (found, problem) = (self.found()?, &self.assembled.problem);
+        let model = &problem.model;
         let terms = self.terms(&problem.sd, &found.values);
+        let near = self.near(suspects, &problem.observation_sd, &terms, threads)?;
+        let is_point = |block: Option<usize>| block.is_none_or(|block| block >= model.stations());
+        let is_photo = |block: Option<usize>| block.is_some_and(|block| block < model.cameras.len());
         let mut all = Vec::new();
-        for &index in suspects {
+        for (&index, own) in suspects.iter().zip(&near) {
             let suspect = &self.suspects.all[index];
             let rows = suspect.rows.len();
-            match suspect.home {
-                Home::Group { group, point } => {
-                    let Some(own) = around.points.get(&point) else { continue };
-                    let first = 2 * (group - problem.layout().groups_of(point).start);
-                    let photo = model.carrier(model.images[group].photo);
-                    let other = own.others.iter().find(|other| other.0 == photo);
-                    for row in first..first + rows {
-                        let mut effect = [f64::NAN; 9];
-                        effect[..3].copy_from_slice(&own.local[3 * row..3 * row + 3]);
-                        if let Some((_, values)) = other {
-                            let width = values.len() / own.rows();
-                            effect[3..].copy_from_slice(&values[row * width..][..6]);
-                        }
-                        all.push(effect);
-                    }
+            let carrier = match suspect.home {
+                Home::Group { group, .. } => Some(model.carrier(model.images[group].photo)),
+                _ => None,
+            };
+            let of = |is: &dyn Fn(Option<usize>) -> bool| own.blocks.iter().find(|(block, _)| is(*block));
+            let photo = of(&|block| is_photo(block) && carrier.is_none_or(|carrier| block == Some(carrier)));
+            let to_angles = photo.and_then(|(block, _)| self.to_angles((*block)?, &found.values));
+            for row in 0..rows {
+                let mut effect = [f64::NAN; 9];
+                for (block, to, count) in [(of(&is_point), 0, 3), (photo, 3, 6)] {
+                    let Some((_, values)) = block else { continue };
+                    let width = values.len() / rows;
+                    effect[to..to + count].copy_from_slice(&values[row * width..][..count]);
                 }
-                Home::Tie(tie) => {
-                    let Some(own) = around.ties.get(&tie) else { continue };
-                    let stations = model.stations();
-                    let point = own.blocks.iter().find(|block| block.0.is_none_or(|block| block >= stations));
-                    let is_photo = |block: usize| block < model.cameras.len();
-                    let photo = own.blocks.iter().find(|block| block.0.is_some_and(is_photo));
-                    for row in 0..rows {
-                        let mut effect = [f64::NAN; 9];
-                        for (block, to, count) in [(point, 0, 3), (photo, 3, 6)] {
-                            let Some((_, values)) = block else { continue };
-                            let width = values.len() / rows;
-                            effect[to..to + count].copy_from_slice(&values[row * width..][..count]);
-                        }
-                        all.push(effect);
-                    }
-                }
-                home => {
-                    let some: Vec<usize> = (0..rows).collect();
-                    let a = self.term_rows(suspect, &some, &terms);
-                    let along = a * self.cofactors_at(found, home);
-                    for row in 0..rows {
-                        let mut effect = [f64::NAN; 9];
-                        match home {
-                            Home::Point(_) => (0..3).for_each(|k| effect[k] = along[(row, k)]),
-                            Home::Block(block) if block < model.cameras.len() => {
-                                (0..6).for_each(|k| effect[3 + k] = along[(row, k)]);
-                            }
-                            _ => {}
-                        }
-                        all.push(effect);
-                    }
-                }
+                to_angles.iter().for_each(|to_angles| turned(&mut effect[6..], to_angles));
+                all.push(effect);
             }
         }
-        self.to_angles(suspects, &found.values, &mut all);
         Ok(all)
     }
 
-    /// Converts rotation vector steps to changes of the angles of a photo.
-    fn to_angles(&self, suspects: &[usize], values: &[f64], effects: &mut [[f64; 9]]) {
+    /// Returns the matrix from rotation vector steps of a photo to changes of its angles; None if it has other steps.
+    fn to_angles(&self, photo: usize, values: &[f64]) -> Option<Matrix3> {
         let model = &self.assembled.problem.model;
-        let mut rest = effects;
-        for &index in suspects {
-            let suspect = &self.suspects.all[index];
-            let (own, others) = rest.split_at_mut(suspect.rows.len());
-            rest = others;
-            let photo = match suspect.home {
-                Home::Group { group, .. } => Some(model.carrier(model.images[group].photo)),
-                Home::Block(block) if block < model.cameras.len() => Some(block),
-                Home::Tie(tie) => model.photo_of_tie(tie),
-                _ => None,
-            };
-            let turning = photo.and_then(|photo| Some((photo, model.turning_sense(photo)?)));
-            let Some((photo, sense)) = turning else { continue };
-            let first = model.of_block(photo).start + 3;
-            let angles = [values[first], values[first + 1], values[first + 2]];
-            let inverse = AttitudeNumbers::OmegaPhiKappa(sense).by_step(angles);
-            let inverse = inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
-            for effect in own {
-                let turned = inverse * nalgebra::Vector3::new(effect[6], effect[7], effect[8]);
-                effect[6..].copy_from_slice(turned.as_slice());
-            }
-        }
+        let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
+        let first = model.of_block(photo).start + 3;
+        let angles = [values[first], values[first + 1], values[first + 2]];
+        Some(numbers.by_step(angles).unwrap_or_else(|| Matrix3::repeat(f64::NAN)))
     }
 
     /// Returns pairs of observations of one point with a correlation of their tests above `limit`: their errors are inseparable.
@@ -324,10 +258,7 @@ impl Trial {
 
     fn pairs_on(&self, own: &OnPoint, limit: f64) -> Vec<(usize, usize, f64)> {
         let count = own.residual.len();
-        let mut starts = vec![0];
-        own.suspects.iter().for_each(|&index| {
-            starts.push(starts[starts.len() - 1] + self.suspects.all[index].rows.len());
-        });
+        let starts = self.suspects.starts_among(&own.suspects);
         let block = |i: usize, j: usize| -> Vec<f64> {
             let rows = starts[i]..starts[i + 1];
             rows.flat_map(|row| own.cofactors[row * count..][starts[j]..starts[j + 1]].to_vec()).collect()
@@ -359,15 +290,4 @@ impl Trial {
 fn from_identity(cofactors: &[f64]) -> impl Iterator<Item = f64> {
     let next = cofactors.len().isqrt() + 1;
     cofactors.iter().enumerate().map(move |(k, value)| f64::from(u8::from(k % next == 0)) - value)
-}
-
-impl Bundle {
-    /// Returns the first photo whose block is part of a tie.
-    fn photo_of_tie(&self, tie: usize) -> Option<usize> {
-        let is_photo = |&block: &usize| block < self.cameras.len();
-        match tie.checked_sub(self.tied_images()) {
-            None => Some(self.main_block(self.point_images.start[self.locals] + tie)).filter(is_photo),
-            Some(observation) => self.observations[observation].blocks.iter().copied().find(is_photo),
-        }
-    }
 }

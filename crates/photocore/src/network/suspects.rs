@@ -71,6 +71,10 @@ pub(super) enum Home {
 pub(super) struct Suspect {
     pub subject: Subject,
     pub home: Home,
+    /// Point of an image, or of its control.
+    pub point: Option<usize>,
+    /// Photo of an image, or of its position or attitude.
+    pub photo: Option<usize>,
     /// Rows, each with its component.
     pub rows: SmallVec<[(Row, usize); 3]>,
 }
@@ -81,7 +85,39 @@ pub(super) struct Suspect {
 pub struct Suspects {
     pub(super) all: Vec<Suspect>,
     row_starts: Vec<usize>,
+    block_starts: Vec<usize>,
     deviations: Vec<f64>,
+    by_point: Lists,
+    by_photo: Lists,
+}
+
+/// Groups in the order of some objects.
+#[derive(Debug)]
+struct Lists {
+    starts: Vec<usize>,
+    groups: Vec<usize>,
+}
+
+impl Lists {
+    fn new(objects: impl Iterator<Item = Option<usize>> + Clone) -> Self {
+        let count = objects.clone().flatten().max().map_or(0, |last| last + 1);
+        let mut starts = vec![0; count + 1];
+        objects.clone().flatten().for_each(|object| starts[object + 1] += 1);
+        (0..count).for_each(|k| starts[k + 1] += starts[k]);
+        let (mut next, mut groups) = (starts.clone(), vec![0; starts[count]]);
+        for (group, object) in objects.enumerate() {
+            if let Some(object) = object {
+                groups[next[object]] = group;
+                next[object] += 1;
+            }
+        }
+        Self { starts, groups }
+    }
+
+    fn of(&self, object: usize) -> &[usize] {
+        let range = self.starts.get(object..object + 2).map_or(0..0, |ends| ends[0]..ends[1]);
+        &self.groups[range]
+    }
 }
 
 impl Suspects {
@@ -92,18 +128,73 @@ impl Suspects {
         all.extend(of_photos(assembled));
         all.extend(observations(assembled));
         all.extend(of_blocks(assembled, camera_of_photo));
-        let mut row_starts = vec![0];
-        row_starts.extend(all.iter().scan(0, |rows, suspect| {
-            *rows += suspect.rows.len();
-            Some(*rows)
-        }));
         let problem = &assembled.problem;
         let own = |suspect: &Suspect, row| {
             deviation(&problem.model, suspect, row, (&problem.observation_sd, &problem.sd))
         };
         let deviations =
             all.iter().flat_map(|suspect| suspect.rows.iter().map(|&row| own(suspect, row))).collect();
-        Self { all, row_starts, deviations }
+        Self::of_rows(all, deviations)
+    }
+
+    fn of_rows(all: Vec<Suspect>, deviations: Vec<f64>) -> Self {
+        let sizes = || all.iter().map(|suspect| suspect.rows.len());
+        Self {
+            row_starts: starts(sizes()),
+            block_starts: starts(sizes().map(|size| size.pow(2))),
+            deviations,
+            by_point: Lists::new(all.iter().map(|suspect| suspect.point)),
+            by_photo: Lists::new(all.iter().map(|suspect| suspect.photo)),
+            all,
+        }
+    }
+
+    /// Returns observations of unit weight, each a group, without points and photos.
+    #[cfg(test)]
+    pub(super) fn of_single_rows(count: usize, subject: fn(usize) -> Subject) -> Self {
+        let suspect = |row| Suspect {
+            subject: subject(row),
+            home: Home::Tie(row),
+            point: None,
+            photo: None,
+            rows: SmallVec::from_iter([(Row::Equation(row), 0)]),
+        };
+        Self::of_rows((0..count).map(suspect).collect(), vec![1.0; count])
+    }
+
+    /// Returns the number of groups.
+    pub(super) fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Returns the rows of a group among all rows.
+    pub(super) fn rows(&self, group: usize) -> Range<usize> {
+        self.row_starts[group]..self.row_starts[group + 1]
+    }
+
+    /// Returns the start of the square block of each group, and the end of the last one.
+    pub(super) fn block_starts(&self) -> &[usize] {
+        &self.block_starts
+    }
+
+    /// Returns the first row of each of some groups among their rows, and the number of these at the end.
+    pub(super) fn starts_among(&self, groups: &[usize]) -> Vec<usize> {
+        starts(groups.iter().map(|&group| self.rows(group).len()))
+    }
+
+    /// Returns the groups of a point: its images and its control.
+    pub(super) fn on_point(&self, point: usize) -> &[usize] {
+        self.by_point.of(point)
+    }
+
+    /// Returns the groups of a photo: its images, its position and its attitude.
+    pub(super) fn on_photo(&self, photo: usize) -> &[usize] {
+        self.by_photo.of(photo)
+    }
+
+    /// Returns the number of photos with groups.
+    pub(super) fn photo_count(&self) -> usize {
+        self.by_photo.starts.len() - 1
     }
 
     /// Returns the object of each group.
@@ -134,6 +225,15 @@ impl Suspects {
         };
         self.all[some].iter().flat_map(move |suspect| suspect.rows.iter().map(number))
     }
+}
+
+/// Returns the sums of sizes before each of them, and of all.
+fn starts(sizes: impl Iterator<Item = usize>) -> Vec<usize> {
+    let ends = sizes.scan(0, |sum, size| {
+        *sum += size;
+        Some(*sum)
+    });
+    std::iter::once(0).chain(ends).collect()
 }
 
 /// Returns the standard deviation of a row of a group, given the standard deviations of equations and parameters.
@@ -207,8 +307,13 @@ fn images(assembled: &Assembled, count: usize) -> Vec<Suspect> {
             None => Home::Group { group: place, point },
             Some(tie) => Home::Tie(tie),
         };
-        let rows = (0..2).map(|k| (Row::Equation(first + k), k)).collect();
-        Some(Suspect { subject: Subject::Image(image), home, rows })
+        Some(Suspect {
+            subject: Subject::Image(image),
+            home,
+            point: Some(assembled.points[point]),
+            photo: Some(model.images[place].photo),
+            rows: (0..2).map(|k| (Row::Equation(first + k), k)).collect(),
+        })
     };
     of_image.into_iter().enumerate().filter_map(suspect).collect()
 }
@@ -229,7 +334,13 @@ fn observations(assembled: &Assembled) -> Vec<Suspect> {
     let of = |(i, tied): (usize, &super::observations::TiedObservation)| {
         let tie = model.tied_images() + i;
         let rows = layout.tie_rows(tie).enumerate().map(|(k, row)| (Row::Equation(first + row), k)).collect();
-        Suspect { subject: Subject::Observation(tied.index), home: Home::Tie(tie), rows }
+        Suspect {
+            subject: Subject::Observation(tied.index),
+            home: Home::Tie(tie),
+            point: None,
+            photo: None,
+            rows,
+        }
     };
     let mut order: Vec<usize> = (0..model.observations.len()).collect();
     order.sort_by_key(|&i| model.observations[i].index);
@@ -242,5 +353,10 @@ fn weighted(assembled: &Assembled, subject: Subject, home: Home, unknowns: Range
         assembled.problem.is_weighted(unknown).then_some((Row::Unknown(unknown), k))
     };
     let rows: SmallVec<[(Row, usize); 3]> = unknowns.enumerate().filter_map(of).collect();
-    (!rows.is_empty()).then_some(Suspect { subject, home, rows })
+    let (point, photo) = match subject {
+        Subject::Control(point) => (Some(point), None),
+        Subject::Position(photo) | Subject::Attitude(photo) => (None, Some(photo)),
+        _ => (None, None),
+    };
+    (!rows.is_empty()).then_some(Suspect { subject, home, point, photo, rows })
 }

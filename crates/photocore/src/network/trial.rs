@@ -1,5 +1,6 @@
 //! Outlier detection: repeated adjustments without some observations, with a single symbolic analysis.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -18,15 +19,11 @@ pub struct Trial {
     pub(super) assembled: Assembled,
     options: adjustment::Options,
     pub(super) suspects: Arc<Suspects>,
-    /// Start of the square block of each test group, and the end of the last one.
-    pub(super) block_starts: Vec<usize>,
     /// Given standard deviations of the equations and parameters.
     pub(super) observation_sd: Vec<f64>,
     pub(super) sd: Vec<f64>,
     /// Index of each active point in the model.
     pub(super) place: Vec<Option<usize>>,
-    /// Test groups of each local point.
-    pub(super) on_place: Vec<Vec<usize>>,
     pub(super) camera_of_photo: Vec<usize>,
     /// Parameters fixed as a minimal datum at the end of the adjustment.
     pub(super) held: Vec<usize>,
@@ -47,14 +44,20 @@ pub struct Converged {
 }
 
 /// Excluded observations, points and photos.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Out<'a> {
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Excluded {
     /// Whether each row is excluded, with the rows of all test groups concatenated.
-    pub rows: &'a [bool],
+    pub rows: Vec<bool>,
     /// Points excluded with all their images and observed coordinates.
-    pub points: &'a [usize],
+    pub points: BTreeSet<usize>,
     /// Photos excluded with all their images and observed pose components.
-    pub photos: &'a [usize],
+    pub photos: BTreeSet<usize>,
+}
+
+impl Excluded {
+    pub(super) fn set(&mut self, rows: impl IntoIterator<Item = usize>, is_excluded: bool) {
+        rows.into_iter().for_each(|row| self.rows[row] = is_excluded);
+    }
 }
 
 /// Result of a trial.
@@ -126,20 +129,7 @@ impl Trial {
     ) -> Self {
         let camera = |photo: usize| network.photos[photo].camera;
         let suspects = Suspects::new(&assembled, network.images.len(), &camera);
-        let mut block_starts = vec![0];
-        for suspect in &suspects.all {
-            block_starts.push(block_starts[block_starts.len() - 1] + suspect.rows.len().pow(2));
-        }
         let place = assembled.places(network.points.len());
-        let locals = assembled.problem.model.locals;
-        let mut on_place: Vec<Vec<usize>> = vec![vec![]; locals];
-        for (index, suspect) in suspects.all.iter().enumerate() {
-            match suspect.home {
-                Home::Group { point, .. } => on_place[point].push(index),
-                Home::Point(place) if place < locals => on_place[place].push(index),
-                _ => {}
-            }
-        }
         let mut own = *options;
         if let Method::Full(_) = own.method {
             own.method = Method::default();
@@ -150,9 +140,7 @@ impl Trial {
             options: own,
             assembled,
             suspects: Arc::new(suspects),
-            block_starts,
             place,
-            on_place,
             camera_of_photo: network.photos.iter().map(|photo| photo.camera).collect(),
             held,
             stands: found.is_some(),
@@ -173,7 +161,7 @@ impl Trial {
         let found = match self.found.take_if(|_| self.stands) {
             Some(found) => found,
             None => {
-                self.take_out(Out::default());
+                self.take_out(&Excluded::default());
                 let problem = &self.assembled.problem;
                 Leverages::at(problem, problem.initial.clone(), self.held.clone(), threads, watch)
                     .map_err(|error| NetworkError::new(error, &self.assembled))?
@@ -190,7 +178,7 @@ impl Trial {
     /// Parameters that are undetermined without them; an interruption, insufficient memory. The last values remain.
     pub fn adjust(
         &mut self,
-        out: Out<'_>,
+        out: &Excluded,
         tolerance: Option<f64>,
         threads: &Threads,
         watch: Watch<'_>,
@@ -299,12 +287,12 @@ impl Trial {
     }
 
     /// Sets the weights of excluded rows to zero; excluded points and photos are fixed.
-    fn take_out(&mut self, out: Out<'_>) {
+    fn take_out(&mut self, out: &Excluded) {
         let Assembled { problem, .. } = &mut self.assembled;
         problem.observation_sd.clone_from(&self.observation_sd);
         problem.sd.clone_from(&self.sd);
         let rows = self.suspects.all.iter().flat_map(|suspect| suspect.rows.iter());
-        for (&(row, _), _) in rows.zip(out.rows).filter(|(_, out)| **out) {
+        for (&(row, _), _) in rows.zip(&out.rows).filter(|(_, out)| **out) {
             match row {
                 Row::Equation(equation) => problem.observation_sd[equation] = f64::INFINITY,
                 Row::Unknown(unknown) => problem.sd[unknown] = f64::INFINITY,
@@ -316,7 +304,7 @@ impl Trial {
             let images = 2 * model.point_images.start[place]..2 * model.point_images.start[place + 1];
             problem.observation_sd[images].fill(f64::INFINITY);
         }
-        for &photo in out.photos {
+        for &photo in &out.photos {
             let model = &problem.model;
             problem.sd[model.of_block(photo)].fill(0.0);
             for image in (0..model.images.len()).filter(|&image| model.images[image].photo == photo) {

@@ -95,7 +95,7 @@ impl System {
         let coupling = factor.solve(formed_local.transpose() * formed_others);
         let by_local = factor.solve(a.transpose());
         let c = &b - &a * &coupling;
-        let others = self.inverse_over(selected, &blocks, b.ncols())? * c.transpose();
+        let others = selected.over(blocks.keys().copied())? * c.transpose();
         let alone = &a * &by_local;
         let found = &c * &others + &alone;
         let own = by_local - coupling * &others;
@@ -127,7 +127,7 @@ impl System {
         let mut others: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         for (first, group) in (0..).step_by(rows).zip(groups) {
             let Own { others: b, blocks, .. } = self.own_equations(asked, local, group..group + 1, &[]);
-            let along = self.inverse_over(selected, &blocks, b.ncols())? * b.transpose();
+            let along = selected.over(blocks.keys().copied())? * b.transpose();
             let found = &b * &along;
             for (i, j) in (0..rows * rows).map(|k| (k / rows, k % rows)) {
                 equations[(first + i) * count + first + j] = found[(i, j)];
@@ -154,27 +154,6 @@ impl System {
             taken.filter(|&(_, value)| value != 0.0).collect()
         };
         (0..others.nrows()).map(function).collect()
-    }
-
-    /// Returns the inverse over some blocks, with the given offsets.
-    fn inverse_over(
-        &self,
-        selected: &SelectedInverse,
-        blocks: &BTreeMap<usize, usize>,
-        order: usize,
-    ) -> Result<Mat<f64>, LayoutError> {
-        let mut q = Mat::<f64>::zeros(order, order);
-        for (&row, &first) in blocks {
-            for (&column, &left) in blocks.range(row..) {
-                let values = selected.block(row, column)?;
-                let width = self.layout.retained_dim(column);
-                for (k, &value) in values.iter().enumerate() {
-                    let (i, j) = (first + k / width, left + k % width);
-                    (q[(i, j)], q[(j, i)]) = (value, value);
-                }
-            }
-        }
-        Ok(q)
     }
 
     /// Gathers the equations of some groups of a local block, and additional equations of its unknowns.

@@ -4,6 +4,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use faer::Mat;
+
 use super::layout::LayoutError;
 use super::symbolic::Symbolic;
 use crate::parallel::lock;
@@ -98,5 +100,29 @@ impl SelectedInverse {
         };
         let columns = symbolic.dim(q);
         Ok((0..symbolic.dim(p) * columns).map(|k| value(k / columns, k % columns)).collect())
+    }
+
+    /// Returns the inverse over some blocks, one after the other.
+    ///
+    /// # Errors
+    /// [`LayoutError::Block`] if a pair of them is outside the pattern.
+    pub fn over(&self, blocks: impl Iterator<Item = usize> + Clone) -> Result<Mat<f64>, LayoutError> {
+        let width = |block: usize| self.panels.symbolic.dim(self.panels.symbolic.position(block));
+        let order = blocks.clone().map(width).sum();
+        let (mut q, mut first) = (Mat::<f64>::zeros(order, order), 0);
+        let mut others = blocks.clone();
+        for row in blocks {
+            let mut left = first;
+            for column in others.clone() {
+                for (k, value) in self.block(row, column)?.into_iter().enumerate() {
+                    let (i, j) = (first + k / width(column), left + k % width(column));
+                    (q[(i, j)], q[(j, i)]) = (value, value);
+                }
+                left += width(column);
+            }
+            others.next();
+            first += width(row);
+        }
+        Ok(q)
     }
 }

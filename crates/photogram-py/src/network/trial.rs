@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use photocore::network::hypotheses::{About, Facts, Hypotheses, Hypothesis};
-use photocore::network::{Moved, Network, Options, Out, Outcome, Trial, UnknownOf};
+use photocore::network::{Excluded, Moved, Network, Of, Options, Outcome, Trial};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -169,10 +169,13 @@ impl NetworkTrial {
         tolerance: Option<f64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<OutcomeRow> {
-        let rows: Vec<bool> = rows.as_array().iter().copied().collect();
+        let out = Excluded {
+            rows: rows.as_array().iter().copied().collect(),
+            points: points.into_iter().collect(),
+            photos: photos.into_iter().collect(),
+        };
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
-        let out = Out { rows: &rows, points: &points, photos: &photos };
-        let found = watched(py, workers, progress, |pool, watch| trial.adjust(out, tolerance, pool, watch))?;
+        let found = watched(py, workers, progress, |pool, watch| trial.adjust(&out, tolerance, pool, watch))?;
         found.map(outcome_row).map_err(|error| refused(&error))
     }
 
@@ -251,10 +254,10 @@ impl NetworkTrial {
         let found = watched(py, self.workers(), None, |pool, _| self.trial.most_moved(&suspects, pool))?;
         let row = |moved: Moved| {
             let (kind, index) = match moved.of {
-                UnknownOf::Photo(index) => ("photo", index),
-                UnknownOf::Camera(index) => ("camera", index),
-                UnknownOf::Common(index) => ("unknown", index),
-                UnknownOf::Point(index) => ("point", index),
+                Of::Photo(index) | Of::PhotoStep(index) => ("photo", index),
+                Of::Camera(index) => ("camera", index),
+                Of::Common(index) => ("unknown", index),
+                Of::Point(index) => ("point", index),
             };
             (kind, index, moved.component, moved.effect, moved.in_sd)
         };

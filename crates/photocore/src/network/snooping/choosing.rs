@@ -60,7 +60,7 @@ impl Choosing<'_> {
     ) -> Result<(Vec<Chosen>, BTreeSet<usize>), NetworkError> {
         let mut blocks = network.on_gone_points(points)?;
         blocks.retain(|own| !own.suspects.is_empty());
-        let tested = blocks.iter().filter_map(|own| self.groups.points[own.suspects[0]]).collect();
+        let tested = blocks.iter().filter_map(|own| self.groups.point(own.suspects[0])).collect();
         let with_own = |own: OnPoint| {
             let test = GroupTest::new(&own.residual, &own.cofactors, None);
             let (sum, freedom) = (self.unit.sum + test.statistic, self.unit.freedom + test.rank as f64);
@@ -151,12 +151,12 @@ impl Choosing<'_> {
     /// Selects on the point of each candidate, or a candidate without a point itself.
     fn on_points(&self, network: &mut dyn Tried, candidates: &[usize]) -> Result<Vec<Chosen>, NetworkError> {
         let mut seen = BTreeSet::new();
-        let of_point = |&group: &usize| self.groups.points[group].is_none_or(|point| seen.insert(point));
+        let of_point = |&group: &usize| self.groups.point(group).is_none_or(|point| seen.insert(point));
         let first: Vec<usize> = candidates.iter().copied().filter(of_point).collect();
-        let points: Vec<usize> = first.iter().filter_map(|&group| self.groups.points[group]).collect();
+        let points: Vec<usize> = first.iter().filter_map(|&group| self.groups.point(group)).collect();
         let mut on_points = network.on_points(&points)?.into_iter();
         let blocks = first.into_iter().map(|group| {
-            let of_point = self.groups.points[group].and_then(|_| on_points.next());
+            let of_point = self.groups.point(group).and_then(|_| on_points.next());
             let block = of_point.filter(|own| !own.suspects.is_empty()).map(|own| self.in_use(own));
             (block.unwrap_or_else(|| self.block_of(group)), self.unit)
         });
@@ -165,7 +165,7 @@ impl Choosing<'_> {
 
     fn block_of(&self, group: usize) -> OnPoint {
         let size = self.groups.rows(group).len();
-        let cofactors = &self.tests.cofactors[self.groups.block_starts[group]..][..size * size];
+        let cofactors = &self.tests.cofactors[self.groups.table.block_starts()[group]..][..size * size];
         let residual = self.tests.residual[self.groups.rows(group)].iter();
         let residual = residual.map(|value| if value.is_nan() { 0.0 } else { *value }).collect();
         OnPoint { suspects: vec![group], residual, cofactors: cofactors.to_vec() }

@@ -64,11 +64,7 @@ pub(super) struct Conditional<'a> {
 
 impl<'a> Conditional<'a> {
     pub fn new(block: OnPoint, groups: &'a Groups, scales: &'a [f64], unit: UnitWeight) -> Self {
-        let mut starts = vec![0];
-        starts.extend(block.suspects.iter().scan(0, |rows, &group| {
-            *rows += groups.rows(group).len();
-            Some(*rows)
-        }));
+        let starts = groups.table.starts_among(&block.suspects);
         let mut new = Self { block, starts, groups, scales, unit, values: vec![] };
         new.test_all();
         new

@@ -12,8 +12,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::super::NetworkError;
 use super::super::group_tests::Tests;
 use super::super::predictions::Prediction;
+use super::super::trial::Excluded;
 use super::choosing::Choosing;
-use super::groups::{Excluded, Groups};
+use super::groups::Groups;
 use super::log::{Consequence, Remark, Removal};
 use super::state::Snooping;
 use super::tried::Tried;
@@ -30,9 +31,9 @@ pub struct Consensus {
 impl Groups {
     /// Returns the exclusions by a consensus, and points with too few other rays.
     pub(super) fn excluded_by(&self, consensus: &Consensus) -> Excluded {
-        let mut out = Excluded { rows: vec![false; self.row_starts[self.len()]], ..Excluded::default() };
+        let mut out = self.none_excluded();
         out.photos.clone_from(&consensus.photos);
-        let of_photos = consensus.photos.iter().flat_map(|&photo| self.on_photo(photo)).copied();
+        let of_photos = consensus.photos.iter().flat_map(|&photo| self.table.on_photo(photo)).copied();
         let groups: Vec<usize> = consensus.images.iter().copied().chain(of_photos).collect();
         self.put_aside(&mut out, &groups);
         out
@@ -45,7 +46,7 @@ impl Groups {
             groups.iter().filter_map(|&group| self.consequences(out, group).0).collect();
         for &point in &points {
             out.points.insert(point);
-            self.on_point(point).iter().for_each(|&group| out.set(self.rows(group), true));
+            self.table.on_point(point).iter().for_each(|&group| out.set(self.rows(group), true));
         }
         points.into_iter().collect()
     }
@@ -62,18 +63,18 @@ impl Snooping {
         is_adjusted: bool,
     ) -> Result<(), NetworkError> {
         let (first, tests, start) = (self.standing, self.tests.clone(), self.out.clone());
-        let mut out = Excluded { rows: vec![false; start.rows.len()], ..Excluded::default() };
+        let mut out = self.groups.none_excluded();
         let consequences: BTreeMap<usize, Vec<Consequence>> =
             consensus.photos.iter().map(|&photo| (photo, self.exclude_all_of(&mut out, photo))).collect();
         let whole = out.clone();
         let mut images = consensus.images.clone();
-        images.retain(|&group| !out.rows[self.groups.row_starts[group]]);
+        images.retain(|&group| !out.rows[self.groups.rows(group).start]);
         let points = self.groups.put_aside(&mut out, &images);
         if self.adjust(network, out)?.is_err() {
             return self.adjust_again(network, start);
         }
         let mut on_others = images.clone();
-        on_others.retain(|&group| !self.groups.points[group].is_some_and(|point| points.contains(&point)));
+        on_others.retain(|&group| !self.groups.point(group).is_some_and(|point| points.contains(&point)));
         let mut entries = self.contradicting(network, &on_others)?;
         let agreeing = on_others.len() - entries.len();
         let choosing = Choosing { tests: &tests, ..self.choosing(self.removable(), 0, false) };
@@ -113,7 +114,7 @@ impl Snooping {
     ) -> Result<Vec<usize>, NetworkError> {
         let mut first_on: BTreeMap<usize, usize> = BTreeMap::new();
         for &group in images {
-            if let Some(point) = self.groups.points[group].filter(|point| points.contains(point))
+            if let Some(point) = self.groups.point(group).filter(|point| points.contains(point))
                 && self.groups.rows(group).all(|row| !self.out.rows[row])
             {
                 first_on.entry(point).or_insert(group);

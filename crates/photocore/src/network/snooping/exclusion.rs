@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::super::NetworkError;
 use super::super::group_tests::Tests;
+use super::super::trial::Excluded;
 use super::conditional::Chosen;
-use super::groups::Excluded;
 use super::log::{Consequence, Kept, Removal};
 use super::state::Snooping;
 use super::tried::{Lost, Tried, unless_lost};
@@ -74,7 +74,7 @@ impl Snooping {
                 }
                 Err(Lost { points, .. }) if !points.is_empty() => {
                     let is_lost = |entry: &Removal| {
-                        self.groups.points[entry.group].is_some_and(|point| points.contains(&point))
+                        self.groups.point(entry.group).is_some_and(|point| points.contains(&point))
                     };
                     pending.iter_mut().filter(|entry| is_lost(entry)).for_each(|entry| {
                         entry.consequences.push(Consequence::PointUndetermined);
@@ -102,7 +102,7 @@ impl Snooping {
 
     fn concerns(&self, entry: &Removal, lost: &Lost) -> bool {
         let photos =
-            self.groups.affected_photos(entry.group).into_iter().chain(self.groups.photos[entry.group]);
+            self.groups.affected_photos(entry.group).into_iter().chain(self.groups.photo(entry.group));
         photos.into_iter().any(|photo| lost.photos.contains(&photo))
     }
 
@@ -121,7 +121,7 @@ impl Snooping {
             return Removal { kept: Some(Kept::PhotoUndetermined), ..entry };
         }
         let is_undetermined = entry.consequences.contains(&Consequence::PointUndetermined);
-        let own = self.groups.points[entry.group].filter(|_| is_undetermined);
+        let own = self.groups.point(entry.group).filter(|_| is_undetermined);
         let mut points: Vec<usize> = point.into_iter().chain(own).collect();
         points.sort_unstable();
         for point in points {
@@ -141,7 +141,7 @@ impl Snooping {
     /// Excludes all observations of a point; returns a consequence for each group.
     pub(super) fn exclude_point(&self, out: &mut Excluded, point: usize) -> Vec<Consequence> {
         let mut consequences = vec![];
-        for &group in self.groups.on_point(point) {
+        for &group in self.groups.table.on_point(point) {
             if self.groups.rows(group).any(|row| !out.rows[row]) {
                 out.set(self.groups.rows(group), true);
                 consequences.push(Consequence::SingleRay(group));
@@ -154,7 +154,11 @@ impl Snooping {
     pub(super) fn entries(&self, choices: &[Chosen], round: usize) -> Vec<Removal> {
         let entry = |own: &Chosen| {
             let in_units = |values: &[f64]| {
-                own.rows.iter().zip(values).map(|(&row, value)| value * self.groups.deviations[row]).collect()
+                own.rows
+                    .iter()
+                    .zip(values)
+                    .map(|(&row, value)| value * self.groups.table.deviations()[row])
+                    .collect()
             };
             Removal {
                 round,

@@ -1,6 +1,6 @@
 //! Log of data snooping: all exclusions and their reasons.
 
-use super::groups::Excluded;
+use super::super::trial::Excluded;
 use crate::adjustment::Status;
 
 /// State of a network without the excluded observations.

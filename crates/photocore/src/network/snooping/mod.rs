@@ -40,7 +40,6 @@ mod whole_photos;
 mod tests;
 
 pub use consensus::Consensus;
-pub use groups::Excluded;
 pub use log::{Consequence, Kept, Log, Predicted, Remark, Removal, Rival, Round, Standing};
 pub use settings::{ControlParts, Settings};
 pub use state::Snooping;

@@ -116,10 +116,10 @@ impl Snooping {
         };
         let candidates: Vec<usize> = (0..self.groups.len()).filter(is_suspicious).collect();
         let points: BTreeSet<usize> =
-            candidates.iter().filter_map(|&group| self.groups.points[group]).collect();
+            candidates.iter().filter_map(|&group| self.groups.point(group)).collect();
         let (choices, tested) = self.on_points_aside(network, &points, &candidates, &first)?;
         let is_untested =
-            |group: &&usize| !self.groups.points[**group].is_some_and(|point| tested.contains(&point));
+            |group: &&usize| !self.groups.point(**group).is_some_and(|point| tested.contains(&point));
         let untested = candidates.iter().filter(is_untested);
         let mut entries: Vec<_> = untested.map(|&group| self.untested_entry(group, &first)).collect();
         entries.extend(self.entries(&choices, 0));
@@ -177,7 +177,7 @@ impl Snooping {
     ) -> Result<(Vec<Chosen>, BTreeSet<usize>), NetworkError> {
         let mut out = self.out.clone();
         out.points.extend(points);
-        let on_points = points.iter().flat_map(|&point| self.groups.on_point(point));
+        let on_points = points.iter().flat_map(|&point| self.groups.table.on_point(point));
         on_points.chain(candidates).for_each(|&group| out.set(self.groups.rows(group), true));
         if self.adjust(network, out)?.is_err() {
             // Photos are not determined without them: groups without weight are excluded, and tested separately.

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use super::super::NetworkError;
 use super::super::group_tests::Tests;
 use super::super::predictions::Prediction;
+use super::super::trial::Excluded;
 use super::choosing::Choosing;
-use super::groups::{Excluded, Groups};
+use super::groups::Groups;
 use super::log::{Remark, Removal, Round, Standing};
 use super::settings::Settings;
 use super::tried::Tried;
@@ -48,8 +49,7 @@ impl Snooping {
         settings: Settings,
         out: Option<Excluded>,
     ) -> Result<Self, NetworkError> {
-        let rows = vec![false; groups.row_starts[groups.len()]];
-        let out = out.unwrap_or_else(|| Excluded { rows, ..Excluded::default() });
+        let out = out.unwrap_or_else(|| groups.none_excluded());
         let tolerance = if groups.is_small { settings.exact } else { settings.rough };
         let standing = network.adjust(&out, tolerance)?;
         let mut new = Self {
@@ -114,7 +114,7 @@ impl Snooping {
     /// Returns the redundancy number of a row of a group; zero if it is excluded.
     pub(super) fn redundancy(&self, group: usize, k: usize) -> f64 {
         let rows = self.groups.rows(group);
-        let place = self.groups.block_starts[group] + k * (rows.len() + 1);
+        let place = self.groups.table.block_starts()[group] + k * (rows.len() + 1);
         if self.tests.residual[rows.start + k].is_nan() { 0.0 } else { self.tests.cofactors[place] }
     }
 }

@@ -2,9 +2,8 @@
 
 use super::super::group_tests::Tests;
 use super::super::predictions::{OnPoint, Prediction};
-use super::super::trial::{Out, Trial};
+use super::super::trial::{Excluded, Trial};
 use super::super::{Combination, NetworkError, Outcome};
-use super::groups::Excluded;
 use super::log::Standing;
 use crate::Threads;
 use crate::adjustment::{Loss, Watch};
@@ -46,11 +45,8 @@ pub(super) struct Running<'a> {
 
 impl Tried for Running<'_> {
     fn adjust(&mut self, out: &Excluded, tolerance: f64) -> Result<Standing, NetworkError> {
-        let (points, photos): (Vec<usize>, Vec<usize>) =
-            (out.points.iter().copied().collect(), out.photos.iter().copied().collect());
-        let own = Out { rows: &out.rows, points: &points, photos: &photos };
         let Outcome { status, sum_of_squares, degrees_of_freedom, collapsed, .. } =
-            self.trial.adjust(own, Some(tolerance), self.threads, self.watch)?;
+            self.trial.adjust(out, Some(tolerance), self.threads, self.watch)?;
         if collapsed.is_empty() {
             return Ok(Standing { status, sum_of_squares, degrees_of_freedom });
         }
@@ -74,7 +70,7 @@ impl Tried for Running<'_> {
     }
 
     fn responses(&mut self) -> Result<Vec<f64>, NetworkError> {
-        let all: Vec<usize> = (0..self.trial.suspects().subjects().count()).collect();
+        let all: Vec<usize> = (0..self.trial.suspects().len()).collect();
         self.trial.responses(&all, self.threads)
     }
 

@@ -1,7 +1,7 @@
 //! Exclusion of whole photos: photos of another exposure, or with exchanged names of many points.
 
 use super::super::NetworkError;
-use super::groups::Excluded;
+use super::super::trial::Excluded;
 use super::log::{Consequence, Removal};
 use super::state::Snooping;
 use super::tried::Tried;
@@ -27,7 +27,7 @@ impl Snooping {
     pub(super) fn exclude_bad_photos(&mut self, network: &mut dyn Tried) -> Result<(), NetworkError> {
         for _ in 0..MAX_PHOTOS {
             let medians: Vec<f64> =
-                (0..self.groups.photo_count()).map(|photo| self.median_of(photo)).collect();
+                (0..self.groups.table.photo_count()).map(|photo| self.median_of(photo)).collect();
             let mut known: Vec<f64> = medians.iter().copied().filter(|median| !median.is_nan()).collect();
             let usual = middle(&mut known);
             let larger =
@@ -53,15 +53,20 @@ impl Snooping {
         network: &mut dyn Tried,
         round: usize,
     ) -> Result<Vec<usize>, NetworkError> {
-        let mut counts = vec![0; self.groups.photo_count()];
+        let mut counts = vec![0; self.groups.table.photo_count()];
         for entry in self.removals.iter().filter(|entry| entry.is_out() && self.groups.is_image(entry.group))
         {
-            self.groups.photos[entry.group].into_iter().for_each(|photo| counts[photo] += 1);
+            self.groups.photo(entry.group).into_iter().for_each(|photo| counts[photo] += 1);
         }
         let mut added = vec![];
         for (photo, &count) in counts.iter().enumerate().filter(|(_, count)| **count >= LEAST) {
-            let images =
-                self.groups.on_photo(photo).iter().filter(|&&group| self.groups.is_image(group)).count();
+            let images = self
+                .groups
+                .table
+                .on_photo(photo)
+                .iter()
+                .filter(|&&group| self.groups.is_image(group))
+                .count();
             if !self.out.photos.contains(&photo) && count as f64 > SHARE * images as f64 {
                 added.extend(self.exclude_photo(
                     network,
@@ -98,7 +103,7 @@ impl Snooping {
 
     /// Excludes a photo with all its observations; returns dependent exclusions.
     pub(super) fn exclude_all_of(&self, out: &mut Excluded, photo: usize) -> Vec<Consequence> {
-        let own = self.groups.on_photo(photo);
+        let own = self.groups.table.on_photo(photo);
         own.iter().for_each(|&group| out.set(self.groups.rows(group), true));
         out.photos.insert(photo);
         let mut consequences = vec![];
@@ -122,7 +127,7 @@ impl Snooping {
         consequences: Vec<Consequence>,
     ) -> usize {
         let groups = &self.groups;
-        let own = groups.on_photo(photo);
+        let own = groups.table.on_photo(photo);
         let rows = own.iter().map(|&group| groups.rows(group).len()).sum();
         let (statistic, dimension) =
             change.map_or((f64::NAN, rows), |(sum, freedom)| (sum, usize::try_from(freedom).unwrap_or(0)));
@@ -142,7 +147,7 @@ impl Snooping {
 
     /// Returns the test values of the images of a photo, in standard deviations.
     fn test_values_of(&self, photo: usize) -> Vec<f64> {
-        let images = self.groups.on_photo(photo).iter().copied();
+        let images = self.groups.table.on_photo(photo).iter().copied();
         images
             .filter(|&group| self.groups.is_image(group) && self.is_testable(group))
             .map(|group| (self.tests.statistic[group] / self.tests.rank[group] as f64).sqrt())
@@ -162,7 +167,7 @@ impl Snooping {
         photo: usize,
         median: f64,
     ) -> Result<bool, NetworkError> {
-        let own = self.groups.on_photo(photo).iter().copied();
+        let own = self.groups.table.on_photo(photo).iter().copied();
         let poses: Vec<usize> =
             own.filter(|&group| !self.groups.is_image(group) && self.tests.active[group]).collect();
         if poses.is_empty() {

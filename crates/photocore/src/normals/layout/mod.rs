@@ -354,6 +354,11 @@ impl Layout {
         self.retained_offset[j]..self.retained_offset[j + 1]
     }
 
+    /// Returns the retained block of an unknown.
+    pub fn retained_with(&self, unknown: usize) -> usize {
+        self.retained_offset.partition_point(|&first| first <= unknown) - 1
+    }
+
     /// Range of all retained blocks in the vector of unknowns.
     pub fn all_retained(&self) -> Range<usize> {
         self.retained_offset[0]..self.retained_offset[self.retained()]
