@@ -8,9 +8,20 @@ import pytest
 from scipy.stats import kstest
 
 from photogram import adjust
+from photogram.network import Attitude, rotation_matrix
 from test_hypotheses import GOLDEN, block_of
 
 RUNS = 150
+ATTITUDE_SD = 1e-4  # Radians, of observed attitudes
+CATALOGUE = frozenset(
+    {
+        *("control-point", "control-heights", "control-shift", "control-set", "control-scale"),
+        *("control-rotation", "gnss-heights", "gnss-shift", "gnss-set", "gnss-drift", "time-offset"),
+        *("lever-arm", "boresight", "camera-f", "camera-point", "camera-term", "readout-time", "scale"),
+        *("bending", "observation"),
+    }
+)
+"""Codes of all hypotheses that the golden network with observed attitudes permits."""
 
 
 def surveyed(rng, photos, points):
@@ -28,6 +39,7 @@ def surveyed(rng, photos, points):
     found = adjust(block)
     xy, gnss, places = block.image_xy - found.residuals, found.photo_positions, found.point_positions
     control = np.where(np.isfinite(block.point_positions), places, np.nan)
+    attitudes = rotation_matrix(found.photo_attitudes)
     length = float(np.linalg.norm(np.diff(places[pair], axis=0)))
 
     def noise(of, kind):
@@ -35,12 +47,19 @@ def surveyed(rng, photos, points):
 
     for _ in range(RUNS):
         values = [*(gnss + noise(gnss, "gnss")), length + noise(length, "distance")]
+        turns = rotation_matrix(ATTITUDE_SD * rng.normal(size=(len(attitudes), 3)))
         yield block.replace(
             image_xy=xy + noise(xy, "image"),
             point_positions=control + noise(control, "control"),
             observations=[
-                dataclasses.replace(each, **{"position" if each.photos else "length": value})
-                for each, value in zip(block.observations, values, strict=False)
+                *(
+                    dataclasses.replace(each, **{"position" if each.photos else "length": value})
+                    for each, value in zip(block.observations, values, strict=False)
+                ),
+                *(
+                    Attitude(name, matrix.T @ turn, ATTITUDE_SD)
+                    for name, matrix, turn in zip(block.photo_ids, attitudes, turns, strict=True)
+                ),
             ],
         )
 
@@ -53,9 +72,12 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
         omega, freedom = result.sum_and_freedom
         trial = result._trial()
         trial.stand()
-        facts = {name: [] for name in ("times", "position_sets", "control_sets", "checks")}
+        count = len(block.photo_ids)
         tested = trial.core.hypotheses(
-            **facts,
+            times=np.arange(float(count)).tolist(),
+            position_sets=(2 * np.arange(count) // count).tolist(),
+            control_sets=[row % 2 for row in range(len(block.point_ids))],
+            checks=[],
             velocities=np.array(GOLDEN["velocity"])[:photos],
             readouts=[[0.0, 1 / GOLDEN["camera"]["height"], -0.5]],
             widths=[float(GOLDEN["camera"]["width"])],
@@ -67,7 +89,9 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
         )
         for place in np.flatnonzero((tested["rank"] > 0) & (tested["redundancy"] > 1e-6)).tolist():
             found[tested["code"][place], place].append(tested["probability"][place])
-    assert len({code for code, _ in found}) > 10
+    codes = {code for code, _ in found}
+    assert codes <= CATALOGUE
+    assert len(codes) >= (len(CATALOGUE) if photos > 10 else 15), CATALOGUE - codes
     assert (freedom < 50) is (photos < 10)
     least = min(kstest(values, "uniform").pvalue for values in found.values())
     assert least > 0.01 / len(found), (least, len(found))
