@@ -432,7 +432,9 @@ impl Linearized {
             }
         }
         let columns = rights.transpose();
-        let solved = threads.install(|| self.factor.solve_reduced(layout, columns.as_slice()));
+        let some = columns.as_slice().chunks((columns.nrows() * SOLVED).max(1)).collect();
+        let solve = |rights: &[f64]| self.factor.solve_reduced(layout, rights);
+        let solved = threads.install(|| parallel::map_each(some, &solve)).concat();
         let effects = DMatrix::from_vec(columns.nrows(), count, solved);
         let taken = sums.taken + rights * &effects;
         let redundancy = &sums.squares - (&taken + taken.transpose()) / 2.0;
@@ -456,33 +458,38 @@ impl Linearized {
         let (first, count) = (problem.layout().all_locals().end, errors.ncols());
         // An error per row: its elements follow each other.
         let (effects, errors) = (effects.transpose(), errors.transpose());
-        let change = |local: usize| {
+        let changes = |some: Range<usize>| -> Vec<DMatrix<f64>> {
             let (mut rows, mut buffers) = (LocalRows::default(), Buffers::default());
-            extended.write(&mut buffers, local, &mut rows);
-            let inverse = extended.inverse(local, &rows);
-            let width = rows.width;
-            let mut right = DMatrix::zeros(width, count);
             let mut left = DVector::zeros(count);
-            for (_, own, others, partials) in rows.rows() {
-                left.fill(0.0);
-                for &(unknown, value) in others {
-                    left.axpy(-value, &effects.column(unknown - first), 1.0);
+            let change = |&local: &usize| {
+                extended.write(&mut buffers, local, &mut rows);
+                let inverse = extended.inverse(local, &rows);
+                let width = rows.width;
+                let mut right = DMatrix::zeros(count, width);
+                for (_, own, others, partials) in rows.rows() {
+                    left.fill(0.0);
+                    for &(unknown, value) in others {
+                        left.axpy(-value, &effects.column(unknown - first), 1.0);
+                    }
+                    for &(parameter, partial) in partials {
+                        left.axpy(partial, &errors.column(parameter), 1.0);
+                    }
+                    own.iter()
+                        .enumerate()
+                        .for_each(|(k, value)| right.column_mut(k).axpy(*value, &left, 1.0));
                 }
-                for &(parameter, partial) in partials {
-                    left.axpy(partial, &errors.column(parameter), 1.0);
-                }
-                for (k, value) in own.iter().enumerate() {
-                    right.row_mut(k).iter_mut().zip(left.iter()).for_each(|(sum, left)| *sum += value * left);
-                }
-            }
-            DMatrix::from_row_slice(width, width, &inverse) * right
+                DMatrix::from_row_slice(width, width, &inverse) * right.transpose()
+            };
+            locals[some].iter().map(change).collect()
         };
-        threads.install(|| parallel::map(locals.len(), AT_LEAST, |k| change(locals[k])))
+        threads.install(|| parallel::by_parts(locals.len(), AT_LEAST, &changes))
     }
 }
 
 /// Local blocks that a thread takes at least.
 const AT_LEAST: usize = 32;
+/// Parameters that are solved for together, for any number of threads: the rounding of products depends on it.
+const SOLVED: usize = 32;
 /// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
 const PARTS: usize = 64;
 

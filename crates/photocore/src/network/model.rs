@@ -10,7 +10,7 @@ use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, InBlock, PlacedCommon};
 use super::input::{Image, Minimum, Point, Screens};
 use super::mounts::{AT_PHOTO, Mounts};
-use super::neighbourhood::PointImages;
+use super::neighbourhood::ByPoint;
 use super::observations::{
     CommonSite, LOCAL, Linear, PhotoSite, PointSite, TiedModel, TiedObservation, Touches,
 };
@@ -55,7 +55,7 @@ pub struct Bundle {
     /// Image observations, sorted by point: first the groups of local points, then ties.
     pub images: Vec<Image>,
     /// Range of the images of each point, and their indices in the network.
-    pub point_images: PointImages,
+    pub point_images: ByPoint,
     /// Number of images of each photo.
     pub images_on: Vec<usize>,
     /// Photos with steps by a rotation vector about their own axes: those without a fixed angle.

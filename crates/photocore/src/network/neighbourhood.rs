@@ -13,14 +13,29 @@ pub(super) const TOGETHER: usize = 1024;
 /// Number of cells of the curve along each axis.
 const CELLS: f64 = (1_u32 << 20) as f64;
 
-/// Images of the active points, sorted by point: `order[start[i]..start[i + 1]]` lists the images of point i.
+/// Images of the active points, or their test groups, sorted by point: `order[start[i]..start[i + 1]]` lists those of point i.
 #[derive(Debug, Default)]
-pub(super) struct PointImages {
+pub(super) struct ByPoint {
     pub start: Vec<usize>,
     pub order: Vec<usize>,
 }
 
-impl PointImages {
+impl ByPoint {
+    /// Sorts pairs of a point below `count` and an image or group, which remain in their order at each point.
+    pub fn new(count: usize, pairs: impl Iterator<Item = (usize, usize)> + Clone) -> Self {
+        let mut start = vec![0; count + 1];
+        pairs.clone().for_each(|(point, _)| start[point + 1] += 1);
+        for point in 0..count {
+            start[point + 1] += start[point];
+        }
+        let (mut next, mut order) = (start.clone(), vec![0; start[count]]);
+        pairs.for_each(|(point, index)| {
+            order[next[point]] = index;
+            next[point] += 1;
+        });
+        Self { start, order }
+    }
+
     pub fn of(&self, i: usize) -> &[usize] {
         &self.order[self.start[i]..self.start[i + 1]]
     }
@@ -29,7 +44,7 @@ impl PointImages {
 impl Network {
     /// Returns the points along a Morton curve through the mean positions of their photos; `images_of` lists the images of each point.
     /// Points with equal positions remain in their order.
-    pub(super) fn along_curve(&self, images_of: &PointImages) -> Vec<usize> {
+    pub(super) fn along_curve(&self, images_of: &ByPoint) -> Vec<usize> {
         let centres: Vec<Vector3> = self.photos.iter().map(|photo| self.centre(&photo.pose)).collect();
         let lowest = centres.iter().fold(Vector3::repeat(f64::INFINITY), |low, centre| low.inf(centre));
         let extent = centres.iter().flat_map(|centre| (centre - lowest).data.0[0]).fold(0.0, f64::max);

@@ -2,7 +2,7 @@
 
 use super::error::NetworkError;
 use super::input::{Network, State};
-use super::neighbourhood::{PointImages, TOGETHER};
+use super::neighbourhood::{ByPoint, TOGETHER};
 use super::observations::Touches;
 use super::surroundings::Surroundings;
 use crate::parallel;
@@ -113,7 +113,7 @@ impl Network {
         }
         let locals = points.len();
         points.extend(tied);
-        let mut images = PointImages { start: vec![0], order: Vec::with_capacity(self.images.len()) };
+        let mut images = ByPoint { start: vec![0], order: Vec::with_capacity(self.images.len()) };
         for &point in &points {
             images.order.extend(all.of(point));
             images.start.push(images.order.len());
@@ -170,19 +170,9 @@ impl Network {
     }
 
     /// Returns the images of every point, without images on excluded photos.
-    fn point_images(&self, loose: &[bool]) -> PointImages {
-        let mut start = vec![0; self.points.len() + 1];
-        let taken = |image: &super::Image| !loose[image.photo];
-        self.images.iter().filter(|image| taken(image)).for_each(|image| start[image.point + 1] += 1);
-        for point in 0..self.points.len() {
-            start[point + 1] += start[point];
-        }
-        let (mut next, mut order) = (start.clone(), vec![0; start[self.points.len()]]);
-        for (index, image) in self.images.iter().enumerate().filter(|(_, image)| taken(image)) {
-            order[next[image.point]] = index;
-            next[image.point] += 1;
-        }
-        PointImages { start, order }
+    fn point_images(&self, loose: &[bool]) -> ByPoint {
+        let taken = self.images.iter().enumerate().filter(|(_, image)| !loose[image.photo]);
+        ByPoint::new(self.points.len(), taken.map(|(index, image)| (image.point, index)))
     }
 }
 
@@ -191,7 +181,7 @@ pub(super) struct Selected {
     pub points: Vec<usize>,
     /// Number of points that no observation connects with other objects, which are the first ones.
     pub locals: usize,
-    pub images: PointImages,
+    pub images: ByPoint,
     pub observations: Vec<usize>,
     pub dropped: Vec<Dropped>,
     /// Photos whose images are excluded, ascending: they are fixed.
