@@ -30,6 +30,8 @@ def timed(what: str, work: Callable[[], Made]) -> Made:
 def main(size: str) -> None:
     """Simulate and adjust a block, write its result and read it."""
     strips, photos = (int(number) for number in size.split("x"))
+    # The first verdict of a process imports its modules.
+    adjust(simulate(strips=2, photos_per_strip=4).block).verdict  # noqa: B018
     block = timed("simulated", lambda: simulate(strips=strips, photos_per_strip=photos).block)
     print(f"{len(block.photo_ids)} photos, {len(block.point_ids)} points, {len(block.image_xy)} image points")
     result = timed("adjusted", lambda: adjust(block, covariance="verdict"))
