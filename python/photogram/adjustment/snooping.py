@@ -153,7 +153,7 @@ def _snoop_block(
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
         parts = trial, tests, facts, point_axes(block), standing.sum_and_freedom, MAX_BIAS_RATIO
         found = hypotheses(*parts, known=options.is_known)
-        return found.common_errors() if found.common_is_harmful else []
+        return found.common_errors()
 
     try:
         trial = block_trial(block, None, core, threads, parts=options.parts)

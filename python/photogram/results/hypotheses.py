@@ -229,12 +229,8 @@ class Hypotheses:
         ]
 
     def explained(self, rivals: float = -math.inf) -> float:
-        """Return the decrease of the sum of squares with the most likely of these errors.
-
-        0 without any, and for a term of distortion, which is part of a lens model.
-        """
-        rows = [row for row in self.common(rivals)[:1] if self.code[row] != "camera-term"]
-        return max((float(self.statistic[row]) for row in rows), default=0.0)
+        """Return the decrease of the sum of squares with the most likely of these errors, 0 without any."""
+        return max((float(self.statistic[row]) for row in self.common(rivals)[:1]), default=0.0)
 
     def _size(self, row: int) -> str:
         """Return the estimate of a set with its standard deviation; the largest of several."""

@@ -415,6 +415,8 @@ def block_facts(block: Block, places: Floats) -> Facts:
     if 1 < len(strips) <= MOST_SETS:
         facts["position_sets"] = sets.tolist()
     control = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
+    if len(control):
+        facts["centre"] = block.point_positions[control].mean(axis=0).tolist()
     _, kinds, sizes = np.unique(block.point_sd[control], axis=0, return_inverse=True, return_counts=True)
     if 1 < len(sizes) <= MOST_SETS and (sizes > 1).all():
         control_sets: list[int | None] = [None] * len(block.point_sd)

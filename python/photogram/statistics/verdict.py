@@ -244,8 +244,13 @@ def _common_error(e: Evidence) -> Phrase | None:
     """Return common errors of sets, unless hints or a lens pattern explain better."""
     if not e.found.common or "hint" in e.codes or e.lens:
         return None
-    code = "verdict.common-error" if e.found.common_is_harmful else "verdict.common-error.look"
+    code = "verdict.common-error" if _is_grave(e) else "verdict.common-error.look"
     return Phrase(code, {"errors": list(e.found.common)})
+
+
+def _is_grave(e: Evidence) -> bool:
+    """Whether a common error moves points, or its pattern shows that the model is wrong."""
+    return e.found.common_is_harmful or e.pattern
 
 
 def _remedy(e: Evidence) -> Phrase | str:
@@ -378,7 +383,8 @@ def _has_far_groups(e: Evidence) -> bool:
 
 def _model(e: Evidence) -> Phrase | None:
     wrong = [each.sentence for each in e.found.systematic if each.significant and each.large]
-    if not wrong:
+    # A lens includes the parameters of the common error that explains its pattern.
+    if not wrong or ("common-error" in e.codes and e.found.common_fall):
         return None
     remedy: Phrase | str = ""
     if e.lens_first and e.found.calibrate and not e.found.spoiled:
@@ -494,7 +500,7 @@ RULES = (
         EXIT_NOT_USABLE,
         ("correct-common",),
         warning=True,
-        grave=lambda e: e.found.common_is_harmful,
+        grave=_is_grave,
     ),
     Rule(
         "unsupported",
