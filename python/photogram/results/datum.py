@@ -264,7 +264,8 @@ def _agreement(result: Result, found: CheckPoints) -> Agreement:
             joint = result.covariance(("point", found.names[some])) / result.covariance_scale
         except AdjustmentError:  # not enough memory, or singular by rounding: single tests remain
             return alone
-    return replace(alone, together=asked(found.differences[some], joint, survey[some]).together)
+    every = asked(found.differences[some], joint, survey[some])
+    return replace(alone, together=every.together, joint=every.joint if len(survey) <= MOST else None)
 
 
 def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
+from photogram.statistics.distributions import log_chi_square
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase, phrase
 
@@ -99,6 +100,7 @@ class Hypotheses:
     points: int  # number of adjusted points
     axes: Sequence[Axis]  # of the points
     times: str  # Unit of errors of times
+    relative: Set[int]  # Rows of errors that only check points test
     single_odds: float  # Largest log odds of an error of a single observation, images among them
     excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
 
@@ -220,7 +222,7 @@ class Hypotheses:
         found = self.common(rivals)
         return [
             phrase(
-                "common.error" if row == found[0] else "common.alternative",
+                f"common.{'error' if row == found[0] else 'alternative'}{'.checks' * (row in self.relative)}",
                 named=self.name(row),
                 size=self._size(row),
                 odds=math.exp(self.log_odds[found[0]] - self.log_odds[row]),
@@ -342,14 +344,23 @@ def hypotheses(
     images = (suspects.kinds == 0) & tests.active
     adjusted = np.flatnonzero(np.bincount(suspects.points[images]))
     drawn = sampled(adjusted, DRAWN)
-    core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
-    core.pop("check_sd", None)
-    timed = core.pop("timed", False)
+    core = {**NO_FACTS, **facts}
+    timed, agreement, places = (core.pop(name, None) for name in ("timed", "agreement", "check_places"))
     checks = len(core["checks"])
     core["checks"] = [*core["checks"], *drawn.tolist()]
     found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
+    effects, relative = {}, set[int]()
+    for row, (*sizes, changes) in found["effects"].items():
+        of_checks, of_points = np.split(changes, [checks])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = np.zeros(0) if agreement is None else np.abs(of_checks) / agreement.sd
+        detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
+        effects[row] = Effect(detected, of_points, *sizes)
+        if known and row < len(found["sets"]) and agreement is not None and agreement.joint is not None:
+            if _with_checks(found, row, of_checks, places, core["centre"], agreement.joint):
+                relative.add(row)
     statistic, estimate = found["statistic"], found["estimate"]
     kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
     numbers = Counter(kinds)
@@ -365,15 +376,9 @@ def hypotheses(
 
     odds = _log_odds(change(statistic), k, np.maximum(found["observations"], k + 1), count)
     odds -= np.nansum(np.square(estimate / found["plausible"]), axis=1) / 2
-    effects = {}
-    for row, (*sizes, changes) in found["effects"].items():
-        of_checks, of_points = np.split(changes, [checks])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = np.zeros(0) if check_sd is None else np.abs(of_checks) / check_sd
-        detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
-        effects[row] = Effect(detected, of_points, *sizes)
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
+    of_checks = -math.inf if agreement is None else largest_odds([agreement.points])
     sets = len(found["sets"])
     same = ("index", "component", "probability", "estimate", "redundancy", "mdb", "bias_to_noise", "sets")
     return Hypotheses(
@@ -391,8 +396,60 @@ def hypotheses(
         axes=axes,
         times="s" if timed else "exposures",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
-        single_odds=float(np.nanmax(odds[sets:], initial=of_images)),
+        relative=relative,
+        single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, of_checks))),
     )
+
+
+def _with_checks(
+    found: Facts,
+    row: int,
+    changes: Floats,
+    places: Floats,
+    centre: ArrayLike | None,
+    joint: tuple[Indices, Floats, Floats],
+) -> bool:
+    """Test a set with check points as further observations; return whether only these test it.
+
+    Differences D of check points with the covariance C are independent of the residuals. If the parameters
+    change them by G, D adds G' C^-1 D to the score and G' C^-1 G to the redundancy. G is known for one
+    parameter, from the (c, 3) `changes` by its error, and for the datum: a shift, scale or rotation.
+    """
+    own, (flat, differences, covariance) = found["sets"][row], joint
+    hidden = found["rank"][row] == 0
+    if hidden and found["code"][row] in DATUM:
+        from_centre = places - (0.0 if centre is None else np.asarray(centre))
+        moves = [_similar(name, from_centre) for name in own["parameters"]]
+    elif len(own["parameters"]) == 1 and own["error"] is not None:
+        moves = [changes / own["error"][0]]
+    else:
+        return False
+    g = np.column_stack([move.ravel()[flat] for move in moves])
+    k = len(moves)
+    if not np.isfinite(g).all():
+        return False
+    weighted = np.linalg.solve(covariance, g)
+    redundancy, score = g.T @ weighted, weighted.T @ differences
+    if not hidden:
+        redundancy += 1.0 / np.reshape(own["cofactors"], (k, k))
+        score += np.asarray(own["estimate"]) / own["cofactors"]
+    cofactors = np.linalg.pinv(redundancy, hermitian=True)
+    estimate = cofactors @ score
+    statistic = float(score @ estimate)
+    found["statistic"][row], found["rank"][row] = statistic, k
+    found["estimate"][row, :k], found["observations"][row] = estimate, found["observations"][row] + len(flat)
+    found["probability"][row] = math.exp(float(log_chi_square(statistic, float(k))))
+    own["estimate"], own["cofactors"] = estimate.tolist(), cofactors.ravel().tolist()
+    return hidden
+
+
+def _similar(parameter: str, places: Floats) -> Floats:
+    """Return the changes of places by a shift, a scale or a rotation."""
+    if parameter == "scale":
+        return places
+    if parameter in "XYZ":
+        return np.broadcast_to(np.eye(3)["XYZ".index(parameter)], places.shape)
+    return np.cross(np.eye(3)[("omega", "phi", "kappa").index(parameter)], places)
 
 
 def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:
@@ -411,8 +468,9 @@ def largest_odds(tests: Iterable[Tested]) -> float:
     """Return the largest log odds of an error that tests of single values have."""
     found = [-math.inf]
     for each in tests:
-        values = np.square(each.values) if each.statistic == "w" else np.asarray(each.values)
         k = np.asarray(each.dimension, dtype=np.float64)
+        values = np.square(each.values) if each.statistic == "w" else np.asarray(each.values)
+        values = values * k if each.statistic == "F" else values
         odds = _log_odds(values, k, k + 1, max(int(np.count_nonzero(~np.isnan(values))), 1))
         found.append(float(np.nanmax(odds, initial=-math.inf)))
     return max(found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import MISSING
 from functools import cached_property
 from os import PathLike
@@ -273,15 +274,27 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         computed = bool(finite_rows(self.redundancy)[self.used_images].all())
         if not (computed and self.converged and self.degrees_of_freedom > 0):
             return None
-        from photogram.results.network_trial import LostSupportError
+        from photogram.results.network_trial import LostSupportError, Out
+        from photogram.results.reliability import Reliability
         from photogram.results.reliability_summary import reliability_summary
 
+        weight = "known" if self.KNOWN else "unknown"
         try:
-            found = self.reliability(unit_weight="known" if self.KNOWN else "unknown")
+            found = self.reliability(unit_weight=weight)
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
             # Other results remain valid; a network that is singular by rounding has a message already.
             return None
-        errors = self._evaluated(found, self._hypothesis_facts())
+        facts = self._hypothesis_facts()
+        errors, lost = self._evaluated(found, facts), found.downweighted
+        if lost is not None and (lost.removed.excessive or lost.unsupported):
+            # A common error may be the reason: the loss removes observations that have it.
+            trial, options = self._trial(), {"level": found.level, "power": found.power}
+            trial.out = Out(np.zeros(len(trial.deviations), dtype=bool))
+            with suppress(LostSupportError, _photocore.BlockError, _photocore.CollectionError):
+                all_ = Reliability(trial, self.covariances, unit_weight=weight, **options)
+                # Check points were compared with the robust solution.
+                whole = self._evaluated(all_, facts | {"agreement": None})
+                errors = whole if whole.common() else errors
         return reliability_summary(found, errors, heights=self.geographic)
 
     def _evaluated(self, found: Reliability, facts: Facts) -> Hypotheses:

@@ -225,9 +225,9 @@ class Result(OnFilm, AdjustedNetwork):
         from photogram.results.network_trial import block_facts
 
         checks = self.check_points
-        sd = None if checks.agreement is None else np.hypot(checks.sd, checks.given_sd)
         facts = block_facts(self.block, self.photo_positions)
-        return {**facts, "checks": checks.rows.tolist(), "check_sd": sd}
+        places = self.point_positions[checks.rows]
+        return {**facts, "checks": checks.rows.tolist(), "check_places": places, "agreement": checks.agreement}
 
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
         """Return the given block with adjusted values of free unknowns.

@@ -52,20 +52,22 @@ def agreement(
         chosen = rows[point]
         covariance = (scale * own[point] + given[point])[np.ix_(chosen, chosen)]
         found[point], dimension[point] = quadratic(differences[point, chosen], covariance)
-    together = None
+    together = joint = None
     if not alone and rows.any():
         whole = scale * cofactors
         for point in range(count):
             place = slice(point * width, (point + 1) * width)
             whole[place, place] += given[point]
-        flat = rows.ravel()
-        omega, rank = quadratic(differences.ravel()[flat], whole[np.ix_(flat, flat)])
+        flat = np.flatnonzero(rows)
+        joint = flat, differences.ravel()[flat], whole[np.ix_(flat, flat)]
+        omega, rank = quadratic(*joint[1:])
         together = global_test(omega, rank, level, second)
+        joint = joint if rank == len(flat) else None
     if math.isinf(second):
         points = Tested(Phrase("test.checks"), found, name, "T", dimension)
     else:
         points = Tested(Phrase("test.checks"), found / dimension, name, "F", dimension, second)
-    return Agreement(points, together, sd, apart)
+    return Agreement(points, together, sd, apart, joint)
 
 
 def _blocks(matrix: Floats, width: int) -> Floats:

@@ -126,6 +126,8 @@ class Agreement:
     sd: Floats  # (n, k) standard deviations of the differences: roots of C_ii
     # Fields of the difference of the point at an index, given its (k,) standard deviations
     apart: Callable[[tuple[int, ...], Floats], Mapping[str, Any]]
+    # All known values: their indices, their differences and the covariance of these; None if not tested together
+    joint: tuple[Indices, Floats, Floats] | None = None
 
     def difference(self, place: tuple[int, ...]) -> Phrase:
         """Return the name of the point at an index, and its difference."""

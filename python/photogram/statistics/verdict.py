@@ -249,8 +249,9 @@ def _common_error(e: Evidence) -> Phrase | None:
 
 
 def _is_grave(e: Evidence) -> bool:
-    """Whether a common error moves points, or its pattern shows that the model is wrong."""
-    return e.found.common_is_harmful or e.pattern
+    """Whether a common error moves points, or causes that the result is refused."""
+    removed = e.found.snooped is not None and e.found.snooped.excessive
+    return bool(e.found.common_is_harmful or e.pattern or removed or e.disagreement(WITHHELD))
 
 
 def _remedy(e: Evidence) -> Phrase | str:
