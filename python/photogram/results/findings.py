@@ -62,7 +62,8 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=type_factors(tests, result.given.image_unit) if rejected and result.KNOWN else [],
+        types=type_factors(tests, result.given.image_unit, images=rejected) if result.KNOWN else [],
+        odds=math.inf if summary is None else summary.hypotheses.odds(rivals),
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
@@ -78,10 +79,10 @@ def network_findings(
     )
 
 
-def type_factors(tests: Tests, unit: str) -> list[TypeFactor]:
-    """Return the sums of squares and redundancy numbers of all observed types; `unit` is that of images."""
+def type_factors(tests: Tests, unit: str, *, images: bool = True) -> list[TypeFactor]:
+    """Return the sums of squares and redundancy numbers of observed types; `unit` is that of `images`."""
     found = []
-    for each in tests.normal:
+    for each in tests.normal if images else tests.normal[1:]:
         for kind, components in each.groups.items():
             observed = each.observed[:, components]
             values = each.residuals, each.sd, each.redundancy, each.values

@@ -21,7 +21,7 @@ from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, Netw
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
 from photogram.statistics.distributions import log_chi_square
-from photogram.statistics.findings import Tested
+from photogram.statistics.findings import ALTERNATIVES, Tested
 from photogram.words import Phrase, phrase
 
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
@@ -30,7 +30,6 @@ EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise
 DRAWN = 300  # Largest number of points whose changes are stored for plots
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
-ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 OF_CAMERAS = frozenset({"camera-f", "camera-point", "camera-term", "readout-time"})
 EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
 ABSURD = 5.0  # Standard deviations of plausible sizes beyond which an error has no plausible size
@@ -216,6 +215,10 @@ class Hypotheses:
         if not plausible:
             level, least = level / sum(not each["plausible"] for each in self.sets), UNKNOWN_PART
         return bool(self.probability[row] < level and self.statistic[row] >= least * self.excess)
+
+    def odds(self, rivals: float = -math.inf) -> float:
+        """Return the largest log odds of these errors, and of single ones."""
+        return max(self.single_odds, rivals, *self.log_odds[self.common(rivals)[:1]])
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first."""

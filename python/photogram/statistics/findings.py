@@ -172,6 +172,14 @@ class TypeFactor:
         """Factor of the standard deviations: the root of q / r."""
         return math.sqrt(self.squares / self.redundancy)
 
+    @property
+    def log_odds(self) -> float:
+        """Log odds of this factor against none; minus infinity if it is small, or only a few values show it."""
+        if self.redundancy < 1.0 or not min(self.factor, self.median) > NOMINAL:
+            return -math.inf
+        gain = self._log_likelihood(self.factor) - self._log_likelihood(1.0)
+        return gain - math.log(self.redundancy) / 2
+
     def opposes(self, factor: float) -> bool:
         """Whether a common factor of all standard deviations makes those of this type wrong.
 
@@ -202,6 +210,7 @@ MOST: Mapping[Text, float] = {
     IMAGES: 0.05,
     CONTROL_POINTS: 1 / 3,
 }  # Largest removable shares
+ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 EVIDENCE = 2.0  # Difference of log likelihoods that decides: 1.92 at the ends of a 95 percent interval
 NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least
 MOST_OTHERS = 0.05  # Of all other types; one observation of each may be removed
@@ -263,7 +272,8 @@ class Findings:
     changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
-    types: Sequence[TypeFactor] = ()  # All types of observations, if the global test rejects
+    types: Sequence[TypeFactor] = ()  # All types of observations; images if the global test rejects
+    odds: float = math.inf  # Largest log odds of an error in common, or of a single one
     # Detected common errors of sets of observations, and whether they forbid the use
     common: Sequence[Text] = ()
     common_is_harmful: bool = False

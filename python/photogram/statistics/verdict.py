@@ -17,7 +17,7 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
-from photogram.statistics.findings import IMAGES, Findings, Text
+from photogram.statistics.findings import ALTERNATIVES, IMAGES, Findings, Text, TypeFactor
 from photogram.statistics.limits import NOTABLE_FACTOR
 from photogram.words import Phrase
 
@@ -227,7 +227,7 @@ def _gross_errors(e: Evidence) -> Phrase | None:
             if e.single
             else Phrase(code, fields)
         )
-    if not e.gross or e.lens or "common-error" in e.codes:
+    if not e.gross or e.lens or {"common-error", "weights-of-types"} & set(e.codes):
         return None
     # Data snooping leaves gross errors if nothing else determines their points or photos.
     snooped = e.found.snooped is not None and not e.found.snooped.kept
@@ -242,7 +242,7 @@ def _gross_errors(e: Evidence) -> Phrase | None:
 
 def _common_error(e: Evidence) -> Phrase | None:
     """Return common errors of sets, unless hints or a lens pattern explain better."""
-    if not e.found.common or "hint" in e.codes or e.lens:
+    if not e.found.common or e.lens or {"hint", "weights-of-types"} & set(e.codes):
         return None
     code = "verdict.common-error" if _is_grave(e) else "verdict.common-error.look"
     return Phrase(code, {"errors": list(e.found.common)})
@@ -333,13 +333,27 @@ def _common_factor(far: bool, e: Evidence) -> Phrase | None:
     return Phrase(f"verdict.weights{scaled}", {"factor": e.interval()})
 
 
+def _wrong_type(e: Evidence) -> Phrase | None:
+    """Return types whose standard deviations alone are too small: this explains more than errors of values."""
+    wrong = [each for each in e.found.types if each.log_odds > e.found.odds + math.log(ALTERNATIVES)]
+    wrong = [each for each in wrong if not each.factor < WRONG_ALIKE * e.factor]
+    return Phrase("verdict.weights-of-types.alone", {"types": list(map(_needed, wrong))}) if wrong else None
+
+
+def _needed(each: TypeFactor) -> Phrase:
+    """Return the factor of standard deviations that a type needs."""
+    fields = {"kind": each.group, "factor": each.factor}
+    sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor, "unit": each.unit}
+    return Phrase(f"part.type{'.sd' if sd else ''}", fields | sd)
+
+
 def _types(e: Evidence) -> Phrase | None:
     """Return the types that a common factor of all standard deviations makes wrong.
 
     The factor of all residuals, which scales the covariances, is that of the types with most redundancy.
     """
     f = e.factor
-    if not e.found.scaled or e.gross or e.pattern or e.found.intersected or not (e.high or e.low):
+    if "weights-of-types" in e.codes or not e.found.scaled or e.gross or e.pattern or e.found.intersected or not (e.high or e.low):
         return None
     if 1 / WRONG_ALIKE <= f <= WRONG_ALIKE or (
         e.high and e.robust is not None and e.robust < f / NOTABLE_FACTOR
@@ -350,9 +364,7 @@ def _types(e: Evidence) -> Phrase | None:
         if each.opposes(f):
             others.append(each.group)
         elif each.redundancy >= 1.0:
-            fields = {"kind": each.group, "factor": each.factor}
-            sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor, "unit": each.unit}
-            causes.append(Phrase(f"part.type{'.sd' if sd else ''}", fields | sd))
+            causes.append(_needed(each))
     return (
         Phrase("verdict.weights-of-types", {"types": causes, "others": others}) if others and causes else None
     )
@@ -495,6 +507,7 @@ RULES = (
         EXIT_NOT_USABLE,
         ("before-and-after", "cause-of-change"),
     ),
+    Rule("weights-of-types", _wrong_type, EXIT_NOT_USABLE, ("sd-of-types",)),
     Rule(
         "common-error",
         _common_error,
