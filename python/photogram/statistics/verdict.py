@@ -335,6 +335,8 @@ def _common_factor(far: bool, e: Evidence) -> Phrase | None:
 
 def _wrong_type(e: Evidence) -> Phrase | None:
     """Return types whose standard deviations alone are too small: this explains more than errors of values."""
+    if e.pattern:
+        return None
     wrong = [each for each in e.found.types if each.log_odds > e.found.odds + math.log(ALTERNATIVES)]
     wrong = [each for each in wrong if not each.factor < WRONG_ALIKE * e.factor]
     return Phrase("verdict.weights-of-types.alone", {"types": list(map(_needed, wrong))}) if wrong else None
