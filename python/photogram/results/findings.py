@@ -53,7 +53,7 @@ def network_findings(
     rejected = test is not None and (test.rejected_high or test.rejected_low)
     assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
-    rivals = largest_odds(fixed)
+    rivals, known = largest_odds(fixed), result.KNOWN and summary is not None
     return Findings(
         status=result.status,
         observations=[
@@ -62,8 +62,8 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=type_factors(tests, result.given.image_unit, images=rejected) if result.KNOWN else [],
-        odds=math.inf if summary is None else summary.hypotheses.odds(rivals),
+        types=type_factors(tests, result.given.image_unit, images=rejected) if known else [],
+        odds=-math.inf if summary is None else summary.hypotheses.odds(rivals),
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
@@ -73,7 +73,6 @@ def network_findings(
         remarks=[*unseen(result), *assumptions],
         unchecked=[] if summary is None else summary.hypotheses.unchecked(),
         common=[] if summary is None else summary.hypotheses.common_errors(rivals),
-        common_fall=0.0 if summary is None else summary.hypotheses.explained(rivals),
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )

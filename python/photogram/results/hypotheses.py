@@ -233,10 +233,6 @@ class Hypotheses:
             for row in found
         ]
 
-    def explained(self, rivals: float = -math.inf) -> float:
-        """Return the decrease of the sum of squares with the most likely of these errors, 0 without any."""
-        return max((float(self.statistic[row]) for row in self.common(rivals)[:1]), default=0.0)
-
     def _size(self, row: int) -> str:
         """Return the estimate of a set with its standard deviation; the largest of several."""
         estimate, parameters = self.sets[row]["estimate"], self.sets[row]["parameters"]
@@ -361,9 +357,9 @@ def hypotheses(
             ratios = np.zeros(0) if agreement is None else np.abs(of_checks) / agreement.sd
         detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
         effects[row] = Effect(detected, of_points, *sizes)
-        if known and row < len(found["sets"]) and agreement is not None and agreement.joint is not None:
-            if _with_checks(found, row, of_checks, places, core["centre"], agreement.joint):
-                relative.add(row)
+        tested = known and row < len(found["sets"]) and agreement is not None and agreement.joint is not None
+        if tested and _with_checks(found, row, of_checks, places, core["centre"], agreement.joint):
+            relative.add(row)
     statistic, estimate = found["statistic"], found["estimate"]
     kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
     numbers = Counter(kinds)

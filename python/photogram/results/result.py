@@ -226,8 +226,8 @@ class Result(OnFilm, AdjustedNetwork):
 
         checks = self.check_points
         facts = block_facts(self.block, self.photo_positions)
-        places = self.point_positions[checks.rows]
-        return {**facts, "checks": checks.rows.tolist(), "check_places": places, "agreement": checks.agreement}
+        facts |= {"check_places": self.point_positions[checks.rows], "agreement": checks.agreement}
+        return facts | {"checks": checks.rows.tolist()}
 
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
         """Return the given block with adjusted values of free unknowns.

@@ -233,7 +233,7 @@ class Evidence:
         if not fall or not self.high or self.test is None or self.found.exchanged:
             return False
         # An error in common with fewer parameters explains the same residuals better.
-        if fall < self.found.common_fall + LENS_PARAMETERS * math.log(max(self.number, 2)):
+        if fall < 2 * self.found.odds + LENS_PARAMETERS * math.log(max(self.number, 2)):
             return False
         too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
         return fall > EXPLAINED * too_much and single < SINGLE * too_much

@@ -126,7 +126,7 @@ class Agreement:
     sd: Floats  # (n, k) standard deviations of the differences: roots of C_ii
     # Fields of the difference of the point at an index, given its (k,) standard deviations
     apart: Callable[[tuple[int, ...], Floats], Mapping[str, Any]]
-    # All known values: their indices, their differences and the covariance of these; None if not tested together
+    # Indices and differences of all known values, with their covariance; None if not tested together
     joint: tuple[Indices, Floats, Floats] | None = None
 
     def difference(self, place: tuple[int, ...]) -> Phrase:
@@ -174,7 +174,7 @@ class TypeFactor:
 
     @property
     def log_odds(self) -> float:
-        """Log odds of this factor against none; minus infinity if it is small, or only a few values show it."""
+        """Log odds of this factor against none; minus infinity if it is small or of few values."""
         if self.redundancy < 1.0 or not min(self.factor, self.median) > NOMINAL:
             return -math.inf
         gain = self._log_likelihood(self.factor) - self._log_likelihood(1.0)
@@ -273,11 +273,10 @@ class Findings:
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
     types: Sequence[TypeFactor] = ()  # All types of observations; images if the global test rejects
-    odds: float = math.inf  # Largest log odds of an error in common, or of a single one
+    odds: float = -math.inf  # Largest log odds of an error in common, or of a single one
     # Detected common errors of sets of observations, and whether they forbid the use
     common: Sequence[Text] = ()
     common_is_harmful: bool = False
-    common_fall: float = 0.0  # Decrease of the weighted sum of squares with the most likely of them
     # Undetectable errors that affect many points, the worst first
     unchecked: Sequence[Text] = ()
     snooped: Removed | None = None

@@ -7,7 +7,6 @@ probability, level and number of tests.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -16,22 +15,15 @@ import numpy as np
 
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.statistics import weight_rules
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
-from photogram.statistics.findings import ALTERNATIVES, IMAGES, Findings, Text, TypeFactor
-from photogram.statistics.limits import NOTABLE_FACTOR
+from photogram.statistics.findings import IMAGES, Findings, Text
 from photogram.words import Phrase
 
 EXIT_NOT_CONVERGED, EXIT_NOT_USABLE = 3, 4
 """Exit codes of a command: values that are not results; results that must not be used."""
 
-WRONG_ALIKE = 1.5
-"""Limit of the median factor, and of the ratio of the mean-square and the median factor.
-
-If the median factor is larger and the ratio smaller, all residuals are too large, not a few."""
-
 _GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)  # Exit codes, the worst last
-
-LARGEST_FACTOR = 3.0  # Largest factor of standard deviations that weights explain
 
 _LISTED = ("lines", "next", "outliers", "rivals", "hints")  # Members of a verdict that list messages
 
@@ -234,7 +226,12 @@ def _gross_errors(e: Evidence) -> Phrase | None:
     if "disputed" in e.codes or (not e.found.robust and (not e.rejected or snooped)):
         return None
     # A few gross errors increase s but not the median; a wrong model increases all residuals.
-    if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
+    if (
+        e.pattern
+        and e.robust is not None
+        and e.robust > weight_rules.WRONG_ALIKE
+        and e.factor <= weight_rules.WRONG_ALIKE * e.robust
+    ):
         return None
     suspects = [*e.found.exchanged, Phrase("part.tests", {"tests": e.named(e.gross)})]
     return Phrase("verdict.gross-errors", {"suspects": suspects, "remedy": _remedy(e)})
@@ -313,93 +310,10 @@ def _suspect_checks(e: Evidence) -> Phrase | None:
     return Phrase("verdict.look-at-check-points", {"points": points}) if points else None
 
 
-def _intersected(e: Evidence) -> Phrase | None:
-    if not e.high or e.gross or not e.found.intersected:
-        return None
-    return Phrase("verdict.intersection", {"factor": e.interval()})
-
-
-def _common_factor(far: bool, e: Evidence) -> Phrase | None:
-    """Return an implausible common factor of sd (`far`), or a smaller one."""
-    if not e.high or e.gross or e.pattern or e.found.intersected or _is_far(e) is not far:
-        return None
-    if "weights-of-types" in e.codes:
-        return None
-    if any(each.significant for each in e.found.components):
-        return None
-    if e.robust is not None and e.robust < e.factor / NOTABLE_FACTOR:
-        return None
-    scaled = ".scaled" if e.found.scaled and not far else ""
-    return Phrase(f"verdict.weights{scaled}", {"factor": e.interval()})
-
-
-def _wrong_type(e: Evidence) -> Phrase | None:
-    """Return types whose standard deviations alone are too small: this explains more than errors of values."""
-    if e.pattern:
-        return None
-    wrong = [each for each in e.found.types if each.log_odds > e.found.odds + math.log(ALTERNATIVES)]
-    wrong = [each for each in wrong if not each.factor < WRONG_ALIKE * e.factor]
-    return Phrase("verdict.weights-of-types.alone", {"types": list(map(_needed, wrong))}) if wrong else None
-
-
-def _needed(each: TypeFactor) -> Phrase:
-    """Return the factor of standard deviations that a type needs."""
-    fields = {"kind": each.group, "factor": each.factor}
-    sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor, "unit": each.unit}
-    return Phrase(f"part.type{'.sd' if sd else ''}", fields | sd)
-
-
-def _types(e: Evidence) -> Phrase | None:
-    """Return the types that a common factor of all standard deviations makes wrong.
-
-    The factor of all residuals, which scales the covariances, is that of the types with most redundancy.
-    """
-    f = e.factor
-    if "weights-of-types" in e.codes or not e.found.scaled or e.gross or e.pattern or e.found.intersected or not (e.high or e.low):
-        return None
-    if 1 / WRONG_ALIKE <= f <= WRONG_ALIKE or (
-        e.high and e.robust is not None and e.robust < f / NOTABLE_FACTOR
-    ):
-        return None
-    causes, others = [], []
-    for each in e.found.types:
-        if each.opposes(f):
-            others.append(each.group)
-        elif each.redundancy >= 1.0:
-            causes.append(_needed(each))
-    return (
-        Phrase("verdict.weights-of-types", {"types": causes, "others": others}) if others and causes else None
-    )
-
-
-def _is_far(e: Evidence) -> bool:
-    """Whether the factor of standard deviations is implausibly large."""
-    return e.factor > LARGEST_FACTOR
-
-
-def _components(e: Evidence) -> Phrase | None:
-    groups = [
-        Phrase(
-            "part.group",
-            {"group": each.group, "factor": each.factor, "low": each.interval[0], "high": each.interval[1]},
-        )
-        for each in e.found.components
-        if each.significant
-    ]
-    return Phrase("verdict.weights-of-groups", {"groups": groups}) if groups else None
-
-
-def _has_far_groups(e: Evidence) -> bool:
-    return any(
-        each.significant and not 1 / LARGEST_FACTOR <= each.factor <= LARGEST_FACTOR
-        for each in e.found.components
-    )
-
-
 def _model(e: Evidence) -> Phrase | None:
     wrong = [each.sentence for each in e.found.systematic if each.significant and each.large]
     # A lens includes the parameters of the common error that explains its pattern.
-    if not wrong or ("common-error" in e.codes and e.found.common_fall):
+    if not wrong or "common-error" in e.codes:
         return None
     remedy: Phrase | str = ""
     if e.lens_first and e.found.calibrate and not e.found.spoiled:
@@ -428,12 +342,6 @@ def _look_at(e: Evidence) -> Phrase | None:
     if e.test is None:
         return Phrase("verdict.look-at.untested", {**fields, "reason": e.found.untested})
     return Phrase("verdict.look-at", fields)
-
-
-def _too_low(e: Evidence) -> Phrase | None:
-    if not e.low or "weights-of-types" in e.codes:
-        return None
-    return Phrase("verdict.weights-pessimistic", {"factor": 1 / e.factor})
 
 
 def _accepted(e: Evidence) -> Phrase | None:
@@ -509,7 +417,7 @@ RULES = (
         EXIT_NOT_USABLE,
         ("before-and-after", "cause-of-change"),
     ),
-    Rule("weights-of-types", _wrong_type, EXIT_NOT_USABLE, ("sd-of-types",)),
+    Rule("weights-of-types", weight_rules.wrong_type, EXIT_NOT_USABLE, ("sd-of-types",)),
     Rule(
         "common-error",
         _common_error,
@@ -535,17 +443,24 @@ RULES = (
     Rule("set-aside", partial(_set_aside, False), 0, ("look-at-images",), warning=True, also=True),
     Rule("check-points", _checks, EXIT_NOT_USABLE, ("wrong-checks", "cause-first")),
     Rule("look-at-check-points", _suspect_checks, 0, ("look-at-checks",), warning=True),
-    Rule("intersection", _intersected, EXIT_NOT_USABLE, ("adjust-photos",), warning=True, grave=_is_far),
-    Rule("weights-of-types", _types, EXIT_NOT_USABLE, ("sd-of-types",)),
-    Rule("weights", partial(_common_factor, True), EXIT_NOT_USABLE, ("scaled", "larger-sd")),
-    Rule("weights", partial(_common_factor, False), 0, ("scaled", "larger-sd"), warning=True),
+    Rule(
+        "intersection",
+        weight_rules.intersected,
+        EXIT_NOT_USABLE,
+        ("adjust-photos",),
+        warning=True,
+        grave=weight_rules.is_far,
+    ),
+    Rule("weights-of-types", weight_rules.types_with_common_factor, EXIT_NOT_USABLE, ("sd-of-types",)),
+    Rule("weights", partial(weight_rules.common_factor, True), EXIT_NOT_USABLE, ("scaled", "larger-sd")),
+    Rule("weights", partial(weight_rules.common_factor, False), 0, ("scaled", "larger-sd"), warning=True),
     Rule(
         "weights-of-groups",
-        _components,
+        weight_rules.components,
         EXIT_NOT_USABLE,
         ("sd-of-groups",),
         warning=True,
-        grave=_has_far_groups,
+        grave=weight_rules.has_far_groups,
     ),
     Rule("uncontrolled", _uncontrolled, 0, ("measure-more",), warning=True),
     Rule(
@@ -554,11 +469,11 @@ RULES = (
         EXIT_NOT_USABLE,
         ("largest-tests", "take-out"),
         warning=True,
-        grave=_is_far,
+        grave=weight_rules.is_far,
     ),
     Rule("not-accurate-enough", lambda e: e.found.shortfall, EXIT_NOT_USABLE, ("more-views",)),
     Rule("look-at", _look_at, 0, ("look-at",), warning=True, also=True),
-    Rule("weights-pessimistic", _too_low, 0, ("scaled", "smaller-sd")),
+    Rule("weights-pessimistic", weight_rules.too_low, 0, ("scaled", "smaller-sd")),
     Rule(
         "accepted-not-checked",
         _listing("accepted-not-checked", "errors", "unchecked"),

@@ -16,7 +16,7 @@ from photogram.arguments.types import Bools
 from photogram.errors import AdjustmentError, InputError, PhotogramError, message_of
 from photogram.messages import Message
 from photogram.show.angles import ARCSEC
-from photogram.statistics.verdict import LARGEST_FACTOR
+from photogram.statistics.weight_rules import LARGEST_FACTOR
 from photogram.stellar.blind import ATTITUDE_ERROR, FIELD_ERROR, locate
 from photogram.stellar.camera_tables import correlation_remarks
 from photogram.stellar.comparison import stood_still

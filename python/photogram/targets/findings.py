@@ -15,7 +15,8 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import KNOTTED
 from photogram.statistics.findings import Findings, Systematic
-from photogram.statistics.verdict import LARGEST_FACTOR, verdict
+from photogram.statistics.verdict import verdict
+from photogram.statistics.weight_rules import LARGEST_FACTOR
 from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.housing import middle_of
