@@ -135,7 +135,7 @@ BLOCKS = {
     "too optimistic": (lambda b: b.replace(image_sd=b.image_sd / 2), "weights"),
     "far too optimistic": (lambda b: b.replace(image_sd=b.image_sd / 9), None),
     "too pessimistic": (lambda b: b.replace(image_sd=3 * b.image_sd), "weights-of-types"),
-    "lens": (lambda _: lens_unknown(), "model"),
+    "lens": (lambda _: lens_unknown(), "common-error"),
     "waves": (lambda _: waves(), "model"),
     "mirrored": (lambda b: b.replace(image_xy=b.image_xy * [1.0, -1.0]), None),
     "few": (few, None),

@@ -39,7 +39,7 @@ def common_factor(far: bool, e: Evidence) -> Phrase | None:
 
 def wrong_type(e: Evidence) -> Phrase | None:
     """Return types whose standard deviations, too small, explain more than errors of values."""
-    if e.pattern:
+    if e.pattern or e.found.robust:
         return None
     wrong = [each for each in e.found.types if each.log_odds > e.found.odds + math.log(ALTERNATIVES)]
     wrong = [each for each in wrong if not each.factor < WRONG_ALIKE * e.factor]
