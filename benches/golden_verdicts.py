@@ -1,7 +1,7 @@
-"""Verdicts on public data sets and examples: python benches/golden_verdicts.py [DATA]
+"""Verdicts on public data sets: python benches/golden_verdicts.py [DATA].
 
-DATA is the folder of data sets (default: ../shared/data). Each project that `photogram.formats.read` detects is
-adjusted as it is. The output is one line for each: folder, code, exit code and headline.
+DATA is the folder of data sets (default: ../shared/data). Each project that `photogram.formats.read` detects
+is adjusted as it is. The output is one line for each: folder, code, exit code and headline.
 """
 
 from __future__ import annotations
