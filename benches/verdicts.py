@@ -190,6 +190,16 @@ def _control(rows: slice | int, offset: list[float]) -> Mistake:
     return make
 
 
+def _similar(change: Callable[[np.ndarray, float], np.ndarray]) -> Mistake:
+    """Return a change of all control about its centre."""
+
+    def make(survey: Survey, size: float) -> Survey:
+        centre = survey.coordinates.mean(axis=0)
+        return replace(survey, coordinates=centre + change(survey.coordinates - centre, size))
+
+    return make
+
+
 def _gnss(change: Callable[[Survey, float], np.ndarray]) -> Mistake:
     def make(survey: Survey, size: float) -> Survey:
         assert survey.gnss is not None
@@ -273,6 +283,16 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
         lambda s: len(s.control) > 0,
         _control(slice(None), [0.6, 0.6, 0.5]),
     ),
+    "control scale": (
+        "control-scale",
+        lambda s: len(s.control) > 2,
+        _similar(lambda own, d: own * (1 + d)),
+    ),
+    "control rotated": (
+        "control-rotation",
+        lambda s: len(s.control) > 2,
+        _similar(lambda own, d: own @ rotation(0.5 * d, 0.5 * d, 0.7 * d).T),
+    ),
     "GNSS shifted": (
         "gnss-shift",
         lambda s: s.gnss is not None,
@@ -309,6 +329,11 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
     "radial distortion": ("camera-term", lambda s: True, _images(_radial)),
     "rolling shutter": ("readout-time", lambda s: s.kind == "aerial", _images(_readout)),
     "one image": ("image X", lambda s: True, _images(_one_image)),
+    "GNSS more accurate": (
+        "",
+        lambda s: s.gnss is not None,
+        lambda s, _: replace(s, gnss_sd=s.gnss_sd / 10),
+    ),
     "images less accurate": ("", lambda s: True, lambda s, _: replace(s, image_sd=s.noise * 10)),
     "images more accurate": ("", lambda s: True, lambda s, _: replace(s, image_sd=s.noise / 10)),
     "all photos twice": ("", lambda s: True, _twice),
@@ -328,10 +353,18 @@ def surveys(rng: np.random.Generator, count: int) -> Iterator[Survey]:
             yield aerial(rng, strips, length, int(rng.choice([3, 4, 5, 7, 10])), bool(k % 2))
 
 
-GIVEN = {"camera-f": 36.0, "camera-point": 20.0, "camera-term": 10.0, "readout-time": 0.05, "image X": 5.0}
+GIVEN = {
+    "control-scale": 0.002,
+    "control-rotation": 0.005,
+    "camera-f": 36.0,
+    "camera-point": 20.0,
+    "camera-term": 10.0,
+    "readout-time": 0.05,
+    "image X": 5.0,
+}
 """Sizes of errors that have no minimal detectable bias, in pixels or exposures."""
 
-ACCURACY = "images less accurate", "images more accurate"
+ACCURACY = "images less accurate", "images more accurate", "GNSS more accurate"
 """Mistakes of given standard deviations: those of the result must not be wrong by more than 1.5."""
 
 
@@ -361,7 +394,10 @@ def sharpened(clean: Result, wrong: Result) -> float:
 
 
 def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
-    """Whether the headline names the true cause, or inseparable ones with it; None if it names none."""
+    """Whether the headline names the true cause, or inseparable ones with it; None if the result is usable.
+
+    A lens model includes the terms of distortion.
+    """
     code = result.verdict.code
     fields = result.verdict.message.fields
     if code == "common-error" and result.reliability_summary:
@@ -374,7 +410,9 @@ def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
         return first == true or largest[true] > largest[first] - 2 * math.log(20)
     if code == "gross-errors" and hypothesis.startswith("control-point"):
         return f"control point {point}" in str(fields["suspects"][0])
-    return None
+    if hypothesis.partition(" ")[0] in ("observation", "position", "image", "control-point"):
+        return None  # Errors of single observations other than these are not common errors.
+    return None if result.verdict.usable else code == "model" and hypothesis == "camera-term"
 
 
 def main() -> None:
