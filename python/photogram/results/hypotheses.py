@@ -218,7 +218,7 @@ class Hypotheses:
 
     def odds(self, rivals: float = -math.inf) -> float:
         """Return the largest log odds of these errors, and of single ones."""
-        return max(self.single_odds, rivals, *self.log_odds[self.common(rivals)[:1]])
+        return float(max(self.single_odds, rivals, *self.log_odds[self.common(rivals)[:1]]))
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first."""
@@ -377,7 +377,7 @@ def hypotheses(
     odds -= np.nansum(np.square(estimate / found["plausible"]), axis=1) / 2
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
-    of_checks = -math.inf if agreement is None else largest_odds([agreement.points])
+    checked = -math.inf if agreement is None else largest_odds([agreement.points])
     sets = len(found["sets"])
     same = ("index", "component", "probability", "estimate", "redundancy", "mdb", "bias_to_noise", "sets")
     return Hypotheses(
@@ -396,7 +396,7 @@ def hypotheses(
         times="s" if timed else "exposures",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         relative=relative,
-        single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, of_checks))),
+        single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, checked))),
     )
 
 
@@ -415,7 +415,7 @@ def _with_checks(
     parameter, from the (c, 3) `changes` by its error, and for the datum: a shift, scale or rotation.
     """
     own, (flat, differences, covariance) = found["sets"][row], joint
-    hidden = found["rank"][row] == 0
+    hidden = bool(found["rank"][row] == 0)
     if hidden and found["code"][row] in DATUM:
         from_centre = places - (0.0 if centre is None else np.asarray(centre))
         moves = [_similar(name, from_centre) for name in own["parameters"]]

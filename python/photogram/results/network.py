@@ -288,10 +288,10 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         errors, lost = self._evaluated(found, facts), found.downweighted
         if lost is not None and (lost.removed.excessive or lost.unsupported):
             # A common error may be the reason: the loss removes observations that have it.
-            trial, options = self._trial(), {"level": found.level, "power": found.power}
+            trial, level, power = self._trial(), found.level, found.power
             trial.out = Out(np.zeros(len(trial.deviations), dtype=bool))
             with suppress(LostSupportError, _photocore.BlockError, _photocore.CollectionError):
-                all_ = Reliability(trial, self.covariances, unit_weight=weight, **options)
+                all_ = Reliability(trial, self.covariances, level=level, power=power, unit_weight=weight)
                 # Check points were compared with the robust solution.
                 whole = self._evaluated(all_, facts | {"agreement": None})
                 errors = whole if whole.common() else errors
