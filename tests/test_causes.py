@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from photogram import adjust, simulate, snoop
+from photogram import Position, adjust, simulate, snoop
 from photogram.statistics.findings import Removed
 
 
@@ -84,3 +84,49 @@ def test_attitudes_are_not_removed_one_by_one(block, common):
 def test_a_removed_share_of_every_type_is_limited():
     few, more = (Removed([{"name": "a"}], {"observations": (number, 12)}) for number in (1, 2))
     assert (few.excessive, more.excessive) == ([], ["observations"])
+
+
+def named_causes(result):
+    """Return the codes of the common errors in the headline."""
+    return [each.fields["named"].code for each in result.verdict.message.fields["errors"]]
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "size"),
+    [
+        (lambda own, centre: np.add(own, [0.0, 0.0, 5.0]), "control-heights", 5.0),
+        (lambda own, centre: np.add(own, [4.0, -3.0, 0.0]), "control-shift", 4.0),
+        (lambda own, centre: centre + 1.005 * (own - centre), "control-scale", 0.005),
+    ],
+)
+def test_check_points_decide_how_all_control_is_wrong(change, code, size):
+    """Without other observations of the datum, residuals show none of these errors."""
+    block = simulate(strips=3, photos_per_strip=5, control_sd=0.2, check_points=5, seed=11).block
+
+    def changed(positions, rows):
+        positions[rows] = change(positions[rows], positions[rows].mean(axis=0))
+
+    result = adjust(with_control(block, changed))
+    every, (first, *_) = result._hypotheses(), named_causes(result)
+    row = every.common()[0]
+    assert (result.verdict.code, result.verdict.exit) == ("common-error", 4)
+    assert first == f"hypothesis.{code}"
+    assert row in every.relative
+    found, sd = every.sets[row]["estimate"][0], np.sqrt(every.sets[row]["cofactors"][0])
+    assert abs(found - size) < 4 * sd
+    # The joint test of these differences is the same sum of squares, apart from the noise.
+    together = result.check_points.agreement.together
+    assert every.statistic[row] == pytest.approx(together.weighted_sum_of_squares, rel=0.2)
+
+
+def test_too_small_standard_deviations_of_positions_are_named_before_single_positions():
+    rng = np.random.default_rng(3)
+    block = simulate(strips=3, photos_per_strip=8, control_sd=0.2, check_points=0, seed=12).block
+    places = adjust(block).photo_positions
+    observed = places + rng.normal(size=places.shape)
+    gnss = [Position(name, own, 0.1) for name, own in zip(block.photo_ids, observed, strict=True)]
+    found = adjust(block.replace(observations=[*block.observations, *gnss])).verdict
+    assert (found.code, found.exit) == ("weights-of-types", 4)
+    (wrong,) = found.message.fields["types"]
+    # The first step of the estimation: wrong positions are also in the residuals of images.
+    assert 4 < wrong.fields["factor"] < 10
