@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::{ObservationEquations, Row};
 use super::group_test::Few;
 use super::linearized::Linearized;
+use super::loss::Reweighting;
 use super::problem::AnyProblem;
 use super::terms::Terms;
 use super::walk::Buffers;
@@ -96,7 +97,7 @@ pub struct Additional {
 
 /// The equations of a local block.
 #[derive(Default)]
-struct LocalRows {
+pub(super) struct LocalRows {
     /// Number of unknowns of the block.
     width: usize,
     /// Of each equation: observed minus computed; the coefficients of the unknowns of the block.
@@ -112,7 +113,7 @@ struct LocalRows {
 }
 
 /// A problem at given values with additional parameters.
-struct Extended<'a> {
+pub(super) struct Extended<'a> {
     equations: ObservationEquations<'a>,
     terms: Terms<'a>,
     fixed: Vec<bool>,
@@ -120,6 +121,16 @@ struct Extended<'a> {
 }
 
 impl LocalRows {
+    /// Number of unknowns of the block.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Coefficients of the unknowns of the block in each equation.
+    pub fn own(&self) -> &[f64] {
+        &self.own
+    }
+
     fn clear(&mut self, width: usize) {
         self.width = width;
         self.constants.clear();
@@ -161,9 +172,26 @@ impl LocalRows {
     }
 }
 
-impl Extended<'_> {
+impl<'a> Extended<'a> {
+    /// Evaluates a problem at given values with some unknowns constrained.
+    pub fn new(
+        problem: &'a AnyProblem<'a>,
+        reweighting: Option<Reweighting>,
+        (values, held): (&'a [f64], &[usize]),
+        parameters: &'a dyn AdditionalParameters,
+        threads: &Threads,
+    ) -> Self {
+        let equations = ObservationEquations::new(problem, reweighting, values, held, threads);
+        Self {
+            equations: equations.with_fixed_columns(),
+            terms: problem.terms(values),
+            fixed: problem.fixed(held),
+            parameters,
+        }
+    }
+
     /// Writes the equations of a local block: its groups, its ties and its unknowns as observations.
-    fn write(&self, buffers: &mut Buffers, local: usize, rows: &mut LocalRows) {
+    pub fn write(&self, buffers: &mut Buffers, local: usize, rows: &mut LocalRows) {
         let problem = self.equations.problem();
         let layout = problem.layout();
         let range = layout.local_range(local);
@@ -194,7 +222,7 @@ impl Extended<'_> {
     }
 
     /// The inverse of the normal matrix of a local block; zero if it has none.
-    fn inverse(&self, local: usize, rows: &LocalRows) -> Few {
+    pub fn inverse(&self, local: usize, rows: &LocalRows) -> Few {
         match rows.width {
             // Points: with a constant size, loops are unrolled.
             3 => self.inverse_of::<3>(local, rows),
@@ -381,13 +409,7 @@ impl Linearized {
         parameters: &'a dyn AdditionalParameters,
         threads: &Threads,
     ) -> Extended<'a> {
-        let equations = self.equations(problem, threads).with_fixed_columns();
-        Extended {
-            equations,
-            terms: problem.terms(&self.values),
-            fixed: problem.fixed(&self.held),
-            parameters,
-        }
+        Extended::new(problem, self.reweighting, (&self.values, &self.held), parameters, threads)
     }
 
     /// Tests additional parameters against the residuals at these values.

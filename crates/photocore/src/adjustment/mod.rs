@@ -61,6 +61,7 @@
 
 mod acceleration;
 mod additional;
+mod alone;
 mod damped;
 mod datum;
 mod distributions;
@@ -88,6 +89,7 @@ mod trust_region;
 mod walk;
 
 pub use additional::{Additional, AdditionalParameters, Equation, EquationOf, Shared};
+pub use alone::Alone;
 pub use damped::step_rules;
 pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
 pub use distributions::{

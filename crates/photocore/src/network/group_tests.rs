@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::error::NetworkError;
 use super::suspects::{Home, Row, Suspect, Suspects};
 use super::trial::Trial;
-use crate::adjustment::{Few, GroupTest, Leverages, Terms, weighted};
-use crate::normals::{Function, GroupCofactors};
+use crate::adjustment::{Alone, Few, GroupTest, Leverages, Terms, weighted};
+use crate::normals::Function;
 use crate::{Threads, parallel};
 
 /// Tests of all groups; rows and square blocks are concatenated group by group.
@@ -127,14 +127,15 @@ impl Trial {
     /// Tests before any adjustment.
     pub fn tests(&self, shared: bool, threads: &Threads) -> Result<Tests, NetworkError> {
         let found = self.found()?;
-        let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
+        let groups = found.cofactors.groups.as_deref().ok_or(NetworkError::State)?;
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
+        let alone = shared.then(|| found.alone(&self.assembled.problem, threads));
         let mut all = Tests::unknown(&self.suspects);
         let parts = all.parts(&self.suspects);
         let fill = |_, (suspects, mut part): (&[Suspect], Part<'_>)| {
             for suspect in suspects {
                 let size = suspect.rows.len();
-                part.put(size, self.test(suspect, (found, groups), &terms, shared));
+                part.put(size, self.test(suspect, (found, groups), &terms, alone.as_ref()));
             }
         };
         let parts = self.suspects.all.chunks(TOGETHER).zip(parts).collect();
@@ -158,25 +159,25 @@ impl Trial {
     pub(super) fn test(
         &self,
         suspect: &Suspect,
-        (found, groups): (&Leverages, &GroupCofactors),
+        (found, groups): (&Leverages, &[f64]),
         terms: &Terms<'_>,
-        shared: bool,
+        alone: Option<&Alone>,
     ) -> Option<Tested> {
         if let Home::Group { group, point } = suspect.home {
-            return self.image_test((group, point), (found, groups), shared);
+            return self.image_test((group, point), (found, groups), alone);
         }
         let size = suspect.rows.len();
         let taking: Vec<usize> = (0..size).filter(|&k| self.is_in(suspect.rows[k].0)).collect();
         if taking.is_empty() {
             return None;
         }
-        let (residual, leverages, by_point) = self.leverages(suspect, found, groups, terms, &taking)?;
+        let (residual, leverages, by_point) = self.leverages(suspect, found, terms, &taking, alone)?;
         let left = |leverages: &[f64]| -> Vec<f64> {
             let count = taking.len();
             (0..count * count).map(|k| f64::from(u8::from(k / count == k % count)) - leverages[k]).collect()
         };
         let cofactors = left(&leverages);
-        let known = shared.then(|| left(&by_point));
+        let known = alone.map(|_| left(&by_point));
         let test = GroupTest::new(&residual, &cofactors, known.as_deref());
         let rows: Vec<(Row, usize)> = taking.iter().map(|&k| suspect.rows[k]).collect();
         let units = self.units(suspect, &rows);
@@ -214,8 +215,8 @@ impl Trial {
     fn image_test(
         &self,
         (group, place): (usize, usize),
-        (found, groups): (&Leverages, &GroupCofactors),
-        shared: bool,
+        (found, groups): (&Leverages, &[f64]),
+        alone: Option<&Alone>,
     ) -> Option<Tested> {
         let rows = 2 * group..2 * group + 2;
         if self.assembled.problem.observation_sd[rows.clone()].iter().any(|sd| sd.is_infinite()) {
@@ -225,9 +226,9 @@ impl Trial {
         let residual = [v[0] / sd[0], v[1] / sd[1]];
         let block = 4 * group..4 * group + 4;
         let left = |leverages: &[f64]| [1.0 - leverages[0], -leverages[1], -leverages[2], 1.0 - leverages[3]];
-        let cofactors = left(&groups.leverages[block.clone()]);
-        let by_point = if self.is_tested_whole(place) { &groups.by_local[block] } else { &[0.0; 4] };
-        let known = shared.then(|| left(by_point));
+        let cofactors = left(&groups[block.clone()]);
+        let known = alone
+            .map(|alone| left(if self.is_tested_whole(place) { &alone.groups[block] } else { &[0.0; 4] }));
         let test = GroupTest::new(&residual, &cofactors, known.as_ref().map(|own| &own[..]));
         let of = |k: usize| (test.error[k] * sd[k], test.cofactors[3 * k].sqrt() * sd[k]);
         let [first, second] = [of(0), of(1)];
@@ -246,9 +247,9 @@ impl Trial {
         &self,
         suspect: &Suspect,
         found: &Leverages,
-        groups: &GroupCofactors,
         terms: &Terms<'_>,
         taking: &[usize],
+        alone: Option<&Alone>,
     ) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
         let problem = &self.assembled.problem;
         let (size, count) = (suspect.rows.len(), taking.len());
@@ -260,11 +261,11 @@ impl Trial {
         }
         let rows = self.term_rows(suspect, terms).ok()?;
         let leverages = sub(&found.of_rows(problem.layout(), &rows).ok()?.equations, size, taking);
-        let by_point = match suspect.home {
-            Home::Point(place) if self.is_tested_whole(place) => {
+        let by_point = match (suspect.home, alone) {
+            (Home::Point(place), Some(alone)) if self.is_tested_whole(place) => {
                 let all: Vec<f64> = taking.iter().flat_map(|&k| rows[k].iter().map(|own| own.1)).collect();
                 let rows = DMatrix::from_row_slice(count, 3, &all);
-                let own = DMatrix::from_row_slice(3, 3, &groups.alone[9 * place..9 * place + 9]);
+                let own = DMatrix::from_row_slice(3, 3, &alone.locals[9 * place..9 * place + 9]);
                 (&rows * own * rows.transpose()).as_slice().to_vec()
             }
             _ => vec![0.0; count * count],

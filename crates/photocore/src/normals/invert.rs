@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use faer::{MatMut, MatRef};
 
-use super::cofactors::{AtNode, Cofactors, GroupCofactors};
+use super::cofactors::{AtNode, Cofactors, leverages_of_groups};
 use super::contribution::{Contribution, packed, unpack};
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
@@ -124,7 +124,7 @@ impl Walk<'_> {
         };
         let mut cofactors = Cofactors::collect(self.system, self.equations, self.control, &found, of_blocks)?;
         if self.options.by_groups {
-            cofactors.groups = Some(GroupCofactors::collect(self.system, self.control, &found)?);
+            cofactors.groups = Some(leverages_of_groups(self.system, self.control, &found)?);
         }
         let inversion_share = if inversion > 0.0 { inversion / (inversion + rest) } else { 0.0 };
         Some(Ok(Inversion { cofactors, selected, inversion_share }))

@@ -32,9 +32,7 @@ impl System {
 
     /// Extra bytes for the leverage matrices of groups: computation and result.
     pub fn memory_of_groups(&self) -> usize {
-        let (groups, rows) = (self.layout.groups(), self.layout.rows());
-        let alone = self.layout.locals() * self.layout.local_dim().pow(2);
-        2 * BYTES * (2 * groups * rows * rows + alone)
+        2 * BYTES * self.layout.groups() * self.layout.rows().pow(2)
     }
 
     /// Releases the buffers for the next formation or inversion, if other code needs memory before.

@@ -77,7 +77,7 @@ mod vectorised;
 mod watch;
 mod workspace;
 
-pub use cofactors::{Cofactors, GroupCofactors};
+pub use cofactors::Cofactors;
 pub use columns::{Chord, ReducedRights};
 pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;

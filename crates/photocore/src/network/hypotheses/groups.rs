@@ -34,13 +34,13 @@ pub(super) fn single_errors<'a>(
     criteria: &Criteria,
     threads: &Threads,
 ) -> Vec<Single<'a>> {
-    let Some(groups) = found.cofactors.groups.as_ref() else { return vec![] };
+    let Some(groups) = found.cofactors.groups.as_deref() else { return vec![] };
     let terms = trial.terms(&trial.assembled.problem.sd, &found.values);
     let is_single = |suspect: &&Suspect| !matches!(suspect.subject, Subject::Image(_));
     let suspects: Vec<&Suspect> = trial.suspects.all.iter().filter(is_single).collect();
     let part = |some: Range<usize>| -> Vec<Single<'a>> {
         let tested = suspects[some].iter().filter_map(|&suspect| {
-            let tested = trial.test(suspect, (found, groups), &terms, false)?;
+            let tested = trial.test(suspect, (found, groups), &terms, None)?;
             Some(trial.errors_of(suspect, &tested, criteria))
         });
         tested.flatten().collect()

@@ -32,22 +32,12 @@ pub struct Cofactors {
     pub ties: Vec<f64>,
     /// Blocks of the requested pairs of retained blocks, one after the other.
     pub pairs: Vec<f64>,
-    /// Leverage matrices of groups, if requested.
-    pub groups: Option<GroupCofactors>,
+    /// Leverage matrices a Q a^T of all pairs of equations in each group, row by row, if requested. The identity minus this matrix is the
+    /// cofactor matrix of residuals of unit weight.
+    pub groups: Option<Vec<f64>>,
     /// Diagonal of the normal equations of all retained unknowns before any elimination, including priors. It is the reciprocal cofactor of
     /// an unknown if all others are fixed.
     pub information: Vec<f64>,
-}
-
-/// Leverage matrices of the equations a of each group. All blocks are square, row by row, one after the other.
-#[derive(Debug, Clone)]
-pub struct GroupCofactors {
-    /// a Q a^T of all pairs of equations in a group. The identity minus this matrix is the cofactor matrix of residuals of unit weight.
-    pub leverages: Vec<f64>,
-    /// The same with only the unknowns of the local block free.
-    pub by_local: Vec<f64>,
-    /// Cofactors of each local block if all other unknowns are fixed.
-    pub alone: Vec<f64>,
 }
 
 impl Cofactors {
@@ -102,31 +92,19 @@ impl Cofactors {
     }
 }
 
-impl GroupCofactors {
-    /// Collects the results of each supernode, and last of local blocks without equations; None if memory is insufficient.
-    pub(super) fn collect(system: &System, control: &Control, found: &[AtNode]) -> Option<Self> {
-        let layout = &system.layout;
-        let (size, l) = (layout.rows() * layout.rows(), layout.local_dim());
-        let mut leverages = control.allocated(zeros(layout.groups() * size))?;
-        let mut by_local = control.allocated(zeros(layout.groups() * size))?;
-        let mut alone = control.allocated(zeros(layout.locals() * l * l))?;
-        for (index, at_node) in found.iter().enumerate() {
-            let mut blocks = at_node.alone.chunks_exact(l * l).peekable();
-            let mut pairs = at_node.leverages.chunks_exact(size).zip(at_node.by_local.chunks_exact(size));
-            for &unit in system.incidence.units_at(index) {
-                if let Some(own) = blocks.next_if(|_| !layout.is_apart(unit as usize)) {
-                    alone[unit as usize * l * l..][..l * l].copy_from_slice(own);
-                }
-                for (&group, (together, own)) in
-                    system.incidence.groups_of(layout, unit as usize).iter().zip(&mut pairs)
-                {
-                    leverages[group as usize * size..][..size].copy_from_slice(together);
-                    by_local[group as usize * size..][..size].copy_from_slice(own);
-                }
-            }
+/// Collects the leverage matrices of groups from each supernode, and last of local blocks without equations; None if memory is insufficient.
+pub(super) fn leverages_of_groups(system: &System, control: &Control, found: &[AtNode]) -> Option<Vec<f64>> {
+    let layout = &system.layout;
+    let size = layout.rows() * layout.rows();
+    let mut leverages = control.allocated(zeros(layout.groups() * size))?;
+    for (index, at_node) in found.iter().enumerate() {
+        let units = system.incidence.units_at(index).iter();
+        let groups = units.flat_map(|&unit| system.incidence.groups_of(layout, unit as usize));
+        for (&group, own) in groups.zip(at_node.leverages.chunks_exact(size.max(1))) {
+            leverages[group as usize * size..][..size].copy_from_slice(own);
         }
-        Some(Self { leverages, by_local, alone })
     }
+    Some(leverages)
 }
 
 /// Minimum number of local blocks at a supernode for several threads.
@@ -168,8 +146,6 @@ impl AtNode {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
                 all.leverages.extend(part.leverages);
-                all.by_local.extend(part.by_local);
-                all.alone.extend(part.alone);
                 all
             })
         };

@@ -14,10 +14,8 @@ pub(in crate::normals) struct AtNode {
     pub equations: Vec<f64>,
     /// Leverage matrices of the ties at this supernode, in order.
     pub ties: Vec<f64>,
-    /// See [`GroupCofactors`](super::GroupCofactors); in the order of the incidence, empty if not requested.
+    /// Leverage matrices of groups in the order of the incidence; empty if not requested.
     pub leverages: Vec<f64>,
-    pub by_local: Vec<f64>,
-    pub alone: Vec<f64>,
     /// Computing time in seconds.
     pub seconds: f64,
 }
@@ -36,7 +34,7 @@ pub(super) struct Others {
     h: Vec<f64>,
     /// H Q, row by row, followed by zeros.
     hq: Vec<f64>,
-    /// Whether to compute [`GroupCofactors`](super::GroupCofactors).
+    /// Whether to compute leverage matrices of groups.
     by_group: bool,
 }
 
@@ -171,7 +169,6 @@ impl Others {
             for i in 0..rows {
                 found.leverages[block + i * (rows + 1)] = found.equations[diagonal + i];
             }
-            self.by_local::<L>(batch, group, found);
         }
     }
 
@@ -239,7 +236,7 @@ impl Others {
         V
     }
 
-    /// Computes Q_ll of local block `t` of the batch and, if requested, N_ll^-1.
+    /// Computes Q_ll of local block `t` of the batch.
     #[inline(always)]
     fn own<S: Simd, const L: usize>(
         &self,
@@ -254,9 +251,6 @@ impl Others {
             unit[a] = 1.0;
             batch.triangles[t].forward::<L>(&mut unit, 1);
             batch.triangles[t].backward::<L>(&mut unit, 1);
-            if self.by_group {
-                found.alone.extend_from_slice(&unit);
-            }
             let hq = S::as_simd_f64s(&self.hq[a * self.stride..][..self.stride]).0;
             for b in 0..=a {
                 let h = S::as_simd_f64s(&self.h[b * self.stride..][..self.stride]).0;
@@ -270,28 +264,6 @@ impl Others {
         }
         found.local.extend_from_slice(own.as_flattened());
         own
-    }
-
-    /// Computes the leverages of a group with only local unknowns free (see [`GroupCofactors`](super::GroupCofactors)).
-    #[inline(always)]
-    fn by_local<const L: usize>(&self, batch: &Batch, group: Group<'_>, found: &mut AtNode) {
-        let Group { t, p, rows, .. } = group;
-        let along: SmallVec<[[f64; L]; 4]> = batch.local_rows::<L>(t, p, rows)[..rows]
-            .iter()
-            .map(|&(mut row)| {
-                batch.triangles[t].forward::<L>(&mut row, 1);
-                row
-            })
-            .collect();
-        let first = found.by_local.len();
-        found.by_local.resize(first + rows * rows, 0.0);
-        for i in 0..rows {
-            for j in 0..=i {
-                for at in [first + i * rows + j, first + j * rows + i] {
-                    found.by_local[at] = dot(&along[i], &along[j]);
-                }
-            }
-        }
     }
 
     /// Computes a Q b^T of all pairs of two rows of a group.
