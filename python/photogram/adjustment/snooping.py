@@ -113,22 +113,30 @@ def snoop(
     chosen = options_of(SnoopOptions, options, {name: others.pop(name) for name in names})
     if not isinstance(block, Block) and not hasattr(block, "_snoop"):
         raise kind_error("block", "a Block or a Collection", block)
-    snoop_network = partial(_snoop_block, block) if isinstance(block, Block) else block._snoop
+    snoop_network = partial(snoop_block, block) if isinstance(block, Block) else block._snoop
     return snoop_network(chosen, threads=threads, progress=progress, **others)
 
 
-def _snoop_block(
+def snoop_block(
     network: Block,
     options: SnoopOptions,
     *,
-    threads: int | None,
-    progress: Callable[[Progress], None] | None,
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    control: str = "",
+    start: Aside | None = None,
     **changes: Any,
 ) -> Snooped:
+    """Remove gross errors from a block; see :func:`snoop`.
+
+    `control` are the parts of control that may be removed alone; by default those of the options. `start`
+    excludes suspected images at first.
+    """
     for name in ("loss", "covariance", "max_bias_ratio"):
         require(name not in changes, "snoop", "not-applicable", name=name, other="data snooping")
     block = checked(network)
     check_cameras(block)
+    control = control or options.control
     chosen = AdjustOptions(**changes)
     core, inner = with_datum(block, core_options(chosen, block), chosen.constraints)
     datum = chosen.constraints
@@ -156,16 +164,16 @@ def _snoop_block(
         return found.common_errors()
 
     try:
-        trial = block_trial(block, None, core, threads, parts=options.parts)
+        trial = block_trial(block, None, core, threads, control=control)
         # Errors of fixed values resemble common errors.
-        outcome = snooped(trial, options, afresh, None if has_held else common)
+        outcome = snooped(trial, options, None if start else afresh, None if has_held else common, start)
     except (LostSupportError, _photocore.BlockError):
         # This adjustment names undetermined unknowns, or continues without some points.
         covariance = chosen.unit_variance == "redundancy"
         first = adjusted(block, covariance=covariance)
         if not first.converged and options.robust is not False:
             first = adjusted(block, covariance=covariance, loss="huber")
-        trial, outcome = _snooped_from(first, options, threads)
+        trial, outcome = _snooped_from(first, options, threads, control)
     cleaned = _without(block, trial, outcome.out)
     result = adjusted_from(cleaned, core, threads=threads, progress=progress)
     exchanged = _exchanged(block, trial, outcome, result)
@@ -238,10 +246,12 @@ def used_images(trial: NetworkTrial, out: Out, count: int) -> Bools:
     return used
 
 
-def _snooped_from(first: Result, options: SnoopOptions, threads: int | None) -> tuple[NetworkTrial, Outcome]:
+def _snooped_from(
+    first: Result, options: SnoopOptions, threads: int | None, control: str
+) -> tuple[NetworkTrial, Outcome]:
     """Snoop from an adjusted state; retry without a robust start if it fails."""
     for attempt in (options, replace(options, robust=False)):
-        trial = block_trial(first.block, first.state, first.options, threads, parts=options.parts)
+        trial = block_trial(first.block, first.state, first.options, threads, control=control)
         try:
             return trial, snooped(trial, attempt)
         except (LostSupportError, _photocore.BlockError) as error:
@@ -255,10 +265,10 @@ def block_trial(
     options: CoreOptions,
     threads: int | None = None,
     *,
-    parts: bool = True,
+    control: str = "plan and height",
 ) -> NetworkTrial:
     """Create the trial of a block for snooping, from the start or an adjusted state."""
-    return network_trial(block, core_trial(block, state, options, threads), parts=parts)
+    return network_trial(block, core_trial(block, state, options, threads), control=control)
 
 
 def core_trial(

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.adjustment.adjustment import adjust
 from photogram.diagnosis.findings import likely
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
@@ -51,31 +52,37 @@ class Adjuster:
         result = self.tried(block)
         return result if result is not None and result.converged else None
 
-    def otherwise(self, **options: Any) -> Adjuster:
-        """Return an adjuster with changed options."""
-        return Adjuster({**self.options, **options})
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A possible mistake, and the block without it."""
+
+    mistake: Phrase
+    block: Block
 
 
-def put_right(
-    first: Result | None, tried: Iterable[tuple[Phrase, Block]], adjusted: Adjuster
-) -> tuple[Phrase, Block, Judged] | None:
-    """Adjust corrected blocks; return the message on the mistake, and the block, that explain residuals.
+def best_of(
+    first: Result | None, proposals: Iterable[Proposal], adjusted: Adjuster
+) -> tuple[Proposal, Judged] | None:
+    """Adjust the blocks of proposals; return the accepted one and its likelihood.
 
     `first` is the adjustment of the unchanged block; None if that failed.
     """
     given = math.inf if first is None else first.sums_of_squares.total
-    results = [(mistake, changed, adjusted.tried(changed)) for mistake, changed in tried]
+    tried = [(each, adjusted.tried(each.block)) for each in proposals]
     left = [
         math.inf if result is None or not result.converged else result.sums_of_squares.total
-        for *_, result in results
+        for _, result in tried
     ]
-    freedom = next((result.degrees_of_freedom for *_, result in results if result is not None), 0)
+    freedom = next((result.degrees_of_freedom for _, result in tried if result is not None), 0)
     if not np.isfinite(left).any() or freedom < 1:
         return None
     # A block that cannot be adjusted counts as worse than all blocks that can.
     most = 1e6 * max(each for each in left if math.isfinite(each))
     verdict = judged(min(given, most), left, freedom, known_weight=True)
-    if verdict is None or not verdict.accepted:
-        return None
-    mistake, changed, _ = results[verdict.best[0]]
-    return likely([mistake], phrase("mistake.residuals", times=verdict.fall)), changed, verdict
+    return None if verdict is None or not verdict.accepted else (tried[verdict.best[0]][0], verdict)
+
+
+def residuals_explained(found: Proposal, verdict: Judged) -> Phrase:
+    """Return the message that a mistake explains the residuals."""
+    return likely([found.mistake], phrase("mistake.residuals", times=verdict.fall))

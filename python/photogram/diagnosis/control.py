@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram.diagnosis.editing import Edited
+from photogram.diagnosis.blunders import Edited
 from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note
 from photogram.results.result import Result
 from photogram.words import phrase

@@ -8,7 +8,6 @@ every observation.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -19,13 +18,12 @@ from photogram.arguments.arrays import argument_error
 from photogram.arguments.objects import kind_error
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosis_of
-from photogram.diagnosis.blunders import BESIDE
+from photogram.diagnosis.blunders import Edited, blunder_section, edit
 from photogram.diagnosis.control import control
-from photogram.diagnosis.control_sets import doubtful, explain, free_model
+from photogram.diagnosis.control_sets import doubtful, explain
 from photogram.diagnosis.diagnosis import Diagnosis
-from photogram.diagnosis.editing import HOPELESS, Edited, blunder_section, edit
 from photogram.diagnosis.findings import Explained, Finding, Level, Section, Words, finding, note
-from photogram.diagnosis.gross import Suspects, disproved, gross, without
+from photogram.diagnosis.gross import Suspects, gross
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
 from photogram.diagnosis.orientation import orientation, spare_explained
@@ -176,24 +174,7 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     if suspects.photos.any():
         spare_explained(upright, oriented.seen, suspects.photos)
     edited = _edited(oriented, suspects, manner, adjusted)
-    misleading: set[str] = set()
-    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
-        cleared = disproved(oriented.seen, suspects, edited.last)
-        if cleared.any():
-            suspects = replace(suspects, images=suspects.images & ~cleared)
-            block = oriented.seen
-            points = block.image_points[cleared]
-            on = block.image_photos[np.isin(block.image_points, points)]
-            misleading = {block.photo_ids[photo] for photo in on.tolist()}
-            errors.findings = without(block, errors.findings, cleared)
-            edited = _edited(oriented, suspects, manner, adjusted)
-    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
-        errors.findings = _fitting(errors.findings, edited.last.block)
-    # Names that the adjustment has explained or disproved.
-    settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
-    errors.findings = [
-        each for each in errors.findings if each.kind != "control-difference" or not settled & {*each.points}
-    ]
+    errors.findings = _judged(errors.findings, suspects, edited)
     if edited.first is not None and edited.last is not None:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
@@ -202,11 +183,15 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
         # A rolling shutter can look like errors of a lens, of control or of single observations.
         sets.findings, exact = [*rolls, *sets.findings], exact and not rolls
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
-    sections += _after_adjustment(oriented, edited, misleading, words)
+    sections += _after_adjustment(oriented, edited, words)
     if edited.last is not None and edited.last.converged:
         sets.findings += half_pixel(edited.last)
         if not any(each.level == "grave" for section in sections for each in section.findings):
-            edited.section.findings += disagreeing(edited.last)
+            found = disagreeing(edited.last)
+            # Control of which one of several points is wrong may be the reason.
+            if any(len(each.points) > 1 for own in edited.control.values() for each in own):
+                found = [replace(each, level="look") for each in found]
+            edited.section.findings += found
     if not exact:
         for section in sections:
             if section is not sets:
@@ -214,16 +199,22 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     return sections, edited.last
 
 
-def _fitting(findings: list[Finding], adjusted: Block) -> list[Finding]:
-    """Return findings; bad photos that fit after adjustment are downgraded to `look`."""
-    return [
-        replace(each, level="look")
-        if each.kind == "bad-photo"
-        and each.values.get("times_usual", math.inf) < HARDLY
-        and {*each.photos} <= {*adjusted.photo_ids}
-        else each
-        for each in findings
-    ]
+def _judged(findings: list[Finding], suspects: Suspects, edited: Edited) -> list[Finding]:
+    """Return the findings of intersection, as far as the adjustment has not explained or disproved them."""
+    if edited.last is None or not edited.is_settled:
+        return [*findings, *(edited.gross or suspects.findings)]
+    known, fitting = {*edited.control}, {*edited.last.block.photo_ids}
+    exchanged = {name for pair in edited.exchanged for name in pair}
+    found = []
+    for each in findings:
+        if each.kind == "control-difference" and (exchanged & {*each.points} or not known & {*each.points}):
+            continue
+        # Photos that fit after the adjustment had wrong initial values.
+        is_small = each.values.get("times_usual", math.inf) < HARDLY
+        if each.kind == "bad-photo" and is_small and fitting.issuperset(each.photos):
+            each = replace(each, level="look")
+        found.append(each)
+    return [*found, *edited.gross]
 
 
 def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:
@@ -251,11 +242,10 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
     """Return the type of finding and the mistake of a whole set, if any."""
     control = np.isfinite(block.point_sd).any()
     if control and doubtful(adjusted.tried(block), "control"):
-        model = free_model(block, adjusted)
-        explained = None if model is None else explain(model)
+        explained = explain(block, adjusted)
         if explained is not None:
             return "control-set", explained
-    kinds = ("control", "station", f"{BESIDE}{Position.KIND}")
+    kinds = ("control", "station", Position.KIND)
     weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
     observed = weighted or bool(block.observations.of_type(Position))
     if observed and doubtful(adjusted.tried(block), *kinds):
@@ -275,16 +265,16 @@ def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) 
     if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
         return edit(view.block.with_fixed_photos(), suspects, adjusted)
     reason = f"{manner.intersect_only}, and the stations are not adjusted ones"
-    return Edited(None, None, reason, math.nan, blunder_section(), asked=False)
+    return Edited(None, None, reason, blunder_section(), asked=False)
 
 
-def _after_adjustment(view: View, edited: Edited, misleading: Collection[str], words: Words) -> list[Section]:
+def _after_adjustment(view: View, edited: Edited, words: Words) -> list[Section]:
     result = edited.last
     if result is None or not result.converged:
         return [stations(view.block, None), key_numbers(edited, words)]
     return [
         control(edited, words),
-        stations(view.block, result, misleading),
+        stations(view.block, result, edited.misleading),
         residuals(result, edited.spread),
         two_ray_heights(result),
         key_numbers(edited, words),

@@ -1,10 +1,12 @@
-"""Gross errors at initial stations: photos, observations, names, control (Appendix H).
+"""Suspects at initial stations, by intersection: photos, observations, control (Appendix H).
 
-Coarse stations leave large residuals with a pattern; a break in the pattern indicates an error.
+Coarse stations leave large residuals with a pattern; a break in the pattern indicates an error. The
+adjustment decides about suspects (:mod:`photogram.diagnosis.blunders`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -14,45 +16,39 @@ from photogram.diagnosis.findings import Finding, Level, Section, finding, note
 from photogram.diagnosis.robust import fit, mad_sd
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
+from photogram.network.directions import without_lenses
 from photogram.network.rays import Rays, meet
-from photogram.network.subset import kept_images
-from photogram.results.exchanged_names import exchanged_names
-from photogram.results.result import Result
 from photogram.words import phrase
 
 BAD_PHOTO = 4.0  # A bad photo exceeds the median residual of the median photo by this factor,
 BAD_PHOTO_SD = 4.3
 """... and exceeds all photos by this number of robust standard deviations (of the logarithm)."""
 BREAK = 10.0  # Robust standard deviations from the pattern of the photo that are a break
-FLAGRANT = 24.0  # A break that is grave even if no single observation explains it
-CHANCE = 2.0  # A break this many times the least one is grave with three rays as well
-EXPLAINED = 0.35  # Largest part of the residuals that remains after an explanation
+EXPLAINED = 0.35  # Largest part of the residuals that remains without a wrong image
+FLAGRANT = 24.0  # A break that is grave without an adjustment
 CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
 """Control differences in robust standard deviations that are reported."""
 FEWEST_CONTROL = 4  # Control points that a comparison needs
-FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
-"""Number of gross errors, and part of its observations, above which a photo is rejected as a whole."""
 CANDIDATES = 5  # Number of photos with the largest residuals that are omitted by trial
-IMAGE_KINDS = ("gross-error", "exchanged-points", "name-used-twice")
-"""Findings on observations that the adjusted stations may disprove."""
 PARTED, FEWEST_OF_TWO = 0.1, 2
 """Largest part of the residuals, and least rays per group, if one name belongs to two points."""
-AS_WELL = 3.0  # Least ratio to the remaining residual without one ray
+AS_WELL = 3.0  # Least ratio of the remaining residual without one ray to that of two groups
 MOST_PHOTOS = 20
-MEDIAN_SIZE = 1.18  # Median length of a residual vector, in standard deviations of its components
 
 
 @dataclass(frozen=True, eq=False)
 class Suspects:
     """Observations that the adjustment may have to exclude."""
 
-    images: Bools  # (m,) gross errors
+    images: Bools  # (m,) images that break the pattern of residuals
     photos: Bools  # (P,) bad photos
     control: Bools  # (n,) control points far from the intersections of their rays
+    # Findings on these points if there is no adjustment
+    findings: Sequence[Finding] = ()
 
 
 def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
-    """Find bad photos, gross errors, exchanged names, and distant control.
+    """Find bad photos, points with gross errors, and distant control.
 
     `unit` is the printed unit of image coordinates.
     """
@@ -60,61 +56,83 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
         "Gross errors (intersection from the initial stations)",
         "Large patterned residuals are normal before the adjustment; a break in the pattern is an error.",
     )
-    rays, photos = _bad_photos(Rays.of(block, unit=unit), section)
-    findings, images = _broken(rays)
-    while (photo := _overrun(rays, findings)) is not None:
-        # One mistake is reported, not one per point.
-        photos[photo] = True
-        name, count = block.photo_ids[photo], int((rays.used & (block.image_photos == photo)).sum())
-        message = phrase("check.bad-photo.points", photo=name, n=count)
-        note(section, "grave", message, [name], values={"points": float(count)})
-        rays = rays.without(block.image_photos == photo)
-        findings, images = _broken(rays)
-    section.findings += findings
+    rays, bad = _bad_photos(Rays.of(block, unit=unit), section)
+    met = rays.intersect()
+    departure = _departures(rays, met.residuals)
+    meeting = _Meeting(rays)
+    images, findings = np.zeros(len(block.image_xy), dtype=bool), []
+    for point in np.unique(block.image_points[departure > BREAK]).tolist():
+        rows = np.flatnonzero(rays.used & (block.image_points == point))
+        before, largest = float(np.nanmax(met.sizes[rows])), float(departure[rows].max())
+        images[meeting.suspected(rows)] = True
+        photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
+        fields = {"point": block.point_ids[point], "before": before, "unit": rays.unit, "photos": photos}
+        values = {f"residual_{rays.unit}": before, "departure_sd": largest}
+        level: Level = "grave" if largest > FLAGRANT else "look"
+        message = phrase("check.gross-error.some", **fields)
+        findings.append(finding(level, message, photos, [block.point_ids[point]], values))
     control = _control(rays.without(images), section)
-    return section, Suspects(images, photos, control)
+    return section, Suspects(images, bad, control, findings)
 
 
-def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Bools:
-    """Return (m,) suspects of :func:`gross` that fit from the adjusted stations.
+class _Meeting:
+    """Intersections of some rays of a point."""
 
-    A wrong station affects the intersections of its neighbours, so that good observations seem wrong.
-    `adjusted` is a converged adjustment without the suspects. Photos missing in it are not in the return.
+    def __init__(self, rays: Rays) -> None:
+        self.rays = rays
+        self.across, self.right = rays.equations()
+
+    def at(self, own: Indices, rows: Indices) -> tuple[Floats, Bools]:
+        """Return residuals of `rows` where rays `own` meet, and whether that is in front of them."""
+        normal, constant = self.across[own].sum(axis=0), self.right[own].sum(axis=0)
+        position = meet(normal[np.newaxis], constant[np.newaxis], np.array([len(own)]))
+        residuals, in_front = self.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
+        return np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf), in_front
+
+    def largest(self, rows: Indices) -> float:
+        """Return the largest residual of rays at their intersection."""
+        return float(self.at(rows, rows)[0].max())
+
+    def without_one(self, rows: Indices) -> tuple[float, int]:
+        """Return the least of the largest residuals without one ray, and its place; infinite with two."""
+        left = [self.largest(rows[rows != row]) for row in rows.tolist()] if len(rows) > 2 else [np.inf]
+        return min(left), int(np.argmin(left))
+
+    def parted(self, rows: Indices) -> tuple[Indices, Indices, float] | None:
+        """Return two groups of rays that meet, if no single one explains the residual of all, and this."""
+        before, groups = self.largest(rows), list[tuple[float, Indices, Indices]]()
+        for pair in combinations(rows.tolist(), 2):
+            alone, in_front = self.at(np.array(pair), rows)
+            # Rays of two points may meet anywhere, even behind the cameras, with any residual.
+            near = in_front & (
+                alone < PARTED * min(before, float(alone[np.isfinite(alone)].max(initial=0.0)))
+            )
+            one, other = rows[near], rows[~near]
+            if min(len(one), len(other)) >= FEWEST_OF_TWO:
+                groups.append((max(self.largest(one), self.largest(other)), one, other))
+        left, one, other = min(groups, key=lambda each: each[0], default=(np.inf, rows, rows))
+        is_parted = left < PARTED * before and AS_WELL * left < self.without_one(rows)[0]
+        return (one, other, before) if is_parted else None
+
+    def suspected(self, rows: Indices) -> Indices:
+        """Return the image of a point without which the others intersect well; all if there is none."""
+        left, place = self.without_one(rows)
+        is_one = left < EXPLAINED * self.largest(rows) and self.parted(rows) is None
+        return rows[[place]] if is_one else rows
+
+
+def parted_rays(block: Block, points: Sequence[int]) -> Iterator[tuple[int, Indices, Indices, float]]:
+    """Yield points whose rays meet in two groups: the photos of both, and the largest residual of all.
+
+    `block` has adjusted stations.
     """
-    number = {name: index for index, name in enumerate(adjusted.block.photo_ids)}
-    index = np.array([number.get(name, -1) for name in block.photo_ids])
-    there = (index >= 0)[:, np.newaxis]
-    refined = block.replace(
-        photo_positions=np.where(there, adjusted.photo_positions[index], block.photo_positions),
-        photo_attitudes=np.where(there, adjusted.photo_attitudes[index], block.photo_attitudes),
-    )
-    gone = (index < 0)[block.image_photos]
-    _, wrong = _broken(Rays.of(refined).without(gone))
-    return suspects.images & ~wrong & ~gone
-
-
-def without(block: Block, findings: list[Finding], images: Bools) -> list[Finding]:
-    """Return findings of :func:`gross` that do not depend on given observations alone."""
-
-    def stands(finding: Finding) -> bool:
-        photos = np.isin(np.array(block.photo_ids)[block.image_photos], finding.photos)
-        own = photos & np.isin(np.array(block.point_ids)[block.image_points], finding.points)
-        return finding.kind not in IMAGE_KINDS or not own.any() or not images[own].all()
-
-    return [finding for finding in findings if stands(finding)]
-
-
-def _overrun(rays: Rays, findings: list[Finding]) -> int | None:
-    """Return the photo with too many gross errors, if any."""
-    block = rays.block
-    number = {name: index for index, name in enumerate(block.photo_ids)}
-    shares = np.zeros(len(number))
-    for error in findings:
-        for name in error.photos:
-            shares[number[name]] += len(error.points) / len(error.photos)
-    images = np.bincount(block.image_photos[rays.used], minlength=len(number))
-    overrun = (shares >= FEWEST_ERRORS) & (shares > ERRORS_OF_PHOTO * images)
-    return int(np.argmax(np.where(overrun, shares / np.maximum(images, 1), 0))) if overrun.any() else None
+    plain = without_lenses(block)
+    if not points or len(plain.image_xy) < len(block.image_xy):
+        return
+    meeting = _Meeting(Rays.of(plain))
+    for point in points:
+        if found := meeting.parted(np.flatnonzero(block.image_points == point)):
+            yield point, block.image_photos[found[0]], block.image_photos[found[1]], found[2]
 
 
 def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
@@ -176,76 +194,6 @@ def _medians(block: Block, sizes: Floats, used: Bools) -> Floats:
     return medians
 
 
-def _broken(rays: Rays) -> tuple[list[Finding], Bools]:
-    """Find observations that break the pattern of their photo, and explain each."""
-    block = rays.block
-    departure = _departures(rays, rays.intersect().residuals)
-    points = np.unique(block.image_points[departure > BREAK])
-    rows_of = _rows_of(rays, points)
-    gross = np.zeros(len(block.image_xy), dtype=bool)
-    solver = _Solver(rays)
-    findings, exchanged = _exchanged(rays, rows_of) if rows_of else ([], {})
-    for point, rows in rows_of.items():
-        if point in exchanged:
-            gross[rows[block.image_photos[rows] == exchanged[point]]] = True
-            continue
-        explained, wrong = _explained(solver, point, rows, float(departure[rows].max()))
-        findings.append(explained)
-        if explained.level == "grave":
-            gross[wrong] = True
-    return findings, gross
-
-
-def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> tuple[Finding, Indices]:
-    """Find the wrong observation of a point; return the finding and the doubtful rows."""
-    block = solver.rays.block
-    before = solver.largest(rows, solver.met(point, []))
-    left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
-    unit = solver.rays.unit
-    name, values = block.point_ids[point], {f"residual_{unit}": before, "departure_sd": departure}
-    photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
-    fields = {"point": name, "before": before, "unit": unit}
-    parted = _parted(solver, point, rows, before) if len(rows) >= 2 * FEWEST_OF_TWO else None
-    if parted is not None and min(left) > AS_WELL * parted[2]:
-        first, second = (
-            [block.photo_ids[photo] for photo in block.image_photos[group].tolist()] for group in parted[:2]
-        )
-        message = phrase("check.name-used-twice", **fields, first=first, second=second)
-        return finding("grave", message, photos, [name], values=values), rows
-    if left and min(left) < EXPLAINED * before:
-        place = int(np.argmin(left))
-        message = phrase("check.gross-error.one", **fields, photo=photos[place], after=min(left))
-        # Any two of three rays may meet by chance: a small break does not prove an error of the third.
-        proof: Level = "grave" if len(rows) > 3 or departure > CHANCE * BREAK else "look"
-        return finding(proof, message, [photos[place]], [name], values=values), rows[[place]]
-    message = phrase("check.gross-error.some", **fields, photos=photos)
-    level: Level = "grave" if departure > FLAGRANT else "look"
-    return finding(level, message, photos, [name], values=values), rows
-
-
-def _parted(
-    solver: _Solver, point: int, rows: Indices, before: float
-) -> tuple[Indices, Indices, float] | None:
-    """Return two groups of a point's rays that intersect well, and their residual."""
-    best, found = PARTED * before, None
-    for pair in combinations(rows.tolist(), 2):
-        position = solver.met(point, rows[~np.isin(rows, pair)].tolist())
-        residuals, in_front = solver.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
-        # Rays of two points may meet anywhere, even behind the cameras, with any residual.
-        sizes = np.linalg.norm(residuals, axis=1)
-        near = in_front & (sizes < PARTED * min(before, float(np.nan_to_num(sizes, nan=0.0).max())))
-        one, other = rows[near], rows[~near]
-        if min(len(one), len(other)) < FEWEST_OF_TWO:
-            continue
-        left = max(
-            solver.largest(one, solver.met(point, other.tolist())),
-            solver.largest(other, solver.met(point, one.tolist())),
-        )
-        if left < best:
-            best, found = left, (one, other, left)
-    return found
-
-
 def _departures(rays: Rays, residuals: Floats) -> Floats:
     """(m,) robust standardized distances of residuals from their photo's linear pattern."""
     block = rays.block
@@ -268,62 +216,6 @@ def _departures(rays: Rays, residuals: Floats) -> Floats:
     spread[photos] = np.maximum(spreads, usual)
     scaled: Floats = departures / np.maximum(spread[block.image_photos], smallest)
     return scaled
-
-
-def _rows_of(rays: Rays, points: Indices) -> dict[int, Indices]:
-    block = rays.block
-    rows = np.flatnonzero(rays.used & np.isin(block.image_points, points))
-    rows = rows[np.argsort(block.image_points[rows], kind="stable")]
-    bounds = np.searchsorted(block.image_points[rows], [*points.tolist(), len(block.point_ids)])
-    return {
-        point: rows[first:last]
-        for point, first, last in zip(points.tolist(), bounds, bounds[1:], strict=False)
-    }
-
-
-class _Solver:
-    """Intersections with rays omitted."""
-
-    def __init__(self, rays: Rays) -> None:
-        self.rays = rays
-        self.across, self.right = rays.equations()
-        self.normal, self.constant, self.count = rays.totals()
-
-    def largest(self, rows: Indices, position: Floats) -> float:
-        """Return the largest residual of some observations for one position, millimetres."""
-        residuals, _ = self.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
-        return float(np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf).max())
-
-    def met(self, point: int, less: list[int]) -> Floats:
-        """Return the position of a point without some rays."""
-        normal = self.normal[point] - self.across[less].sum(axis=0)
-        constant = self.constant[point] - self.right[less].sum(axis=0)
-        rays = self.count[point] - len(less)
-        position: Floats = meet(normal[np.newaxis], constant[np.newaxis], np.array([rays]))[0]
-        return position
-
-    def without(self, point: int, rows: Indices, row: int) -> float:
-        """Return the largest residual of a point's other observations without one of them."""
-        return self.largest(rows[rows != row], self.met(point, [row]))
-
-
-def _exchanged(rays: Rays, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, int]]:
-    """Find exchanged names among broken points; return findings, and the photo of each point."""
-    block = rays.block
-    # Before the adjustment, residuals of good images have the size of the pattern of their photo.
-    sizes = rays.intersect().sizes
-    usual = np.fmax(_medians(block, sizes, rays.used), np.nanmedian(sizes[rays.used])) / MEDIAN_SIZE
-    alone = kept_images(block, rays.used).replace(point_sd=np.inf)
-    alone = alone.replace(image_sd=np.maximum(alone.image_sd, usual[alone.image_photos, np.newaxis]))
-    findings: list[Finding] = []
-    found: dict[int, int] = {}
-    for each in exchanged_names(alone, ~np.isin(alone.image_points, list(rows_of))):
-        photo, points = each.photos[0], list(each.points)
-        message = phrase("check.exchanged-points", points=points, photo=photo)
-        values = {"statistic_as_named": each.as_named, "statistic_exchanged": each.exchanged}
-        findings.append(finding("grave", message, [photo], points, values=values))
-        found |= dict.fromkeys(map(block.point_ids.index, points), block.photo_ids.index(photo))
-    return findings, found
 
 
 def _control(rays: Rays, section: Section) -> Bools:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from photogram.diagnosis.editing import Edited
+from photogram.diagnosis.blunders import Edited
 from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.diagnosis.adjusting import Adjuster, put_right
+from photogram.diagnosis.adjusting import Adjuster, Proposal, best_of, residuals_explained
 from photogram.diagnosis.findings import Finding, finding
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.wider_models import calibrated, calibration_words, freed
 from photogram.results.result import Result
 from photogram.statistics.evidence import Evidence
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 RADIAL = re.compile(r"[Kk]([1-6])")
 SIGNIFICANT = 5.0
@@ -37,13 +37,13 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     test = None if first is None or not first.converged else first.global_test
     if test is not None and not test.rejected_high:
         return block
-    found = put_right(first, _hypotheses(block, adjusted), adjusted)
+    found = best_of(first, _proposals(block, adjusted), adjusted)
     if found is None:
         return block
-    message, changed, verdict = found
+    best, verdict = found
     values = {"likelihood_ratio": verdict.likelihood, "times_smaller": verdict.fall}
-    findings.append(finding("grave", message, kind="lens", values=values))
-    return changed
+    findings.append(finding("grave", residuals_explained(best, verdict), kind="lens", values=values))
+    return best.block
 
 
 def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
@@ -78,18 +78,18 @@ def _given_terms(camera: Camera) -> dict[str, int]:
     }
 
 
-def _hypotheses(block: Block, adjusted: Adjuster) -> Iterator[tuple[Phrase, Block]]:
+def _proposals(block: Block, adjusted: Adjuster) -> Iterator[Proposal]:
     scales = [camera.scale for camera in block.cameras]
-    yield phrase("mistake.lens.sign"), _scaled(block, [-1.0] * len(scales), 0)
-    yield phrase("mistake.lens.divided"), _scaled(block, [1 / scale for scale in scales], 2)
-    yield phrase("mistake.lens.measured", unit=block.image_unit), _scaled(block, scales, 2)
+    yield Proposal(phrase("mistake.lens.sign"), _scaled(block, [-1.0] * len(scales), 0))
+    yield Proposal(phrase("mistake.lens.divided"), _scaled(block, [1 / scale for scale in scales], 2))
+    yield Proposal(phrase("mistake.lens.measured", unit=block.image_unit), _scaled(block, scales, 2))
     ratio = _free_ratio(block, adjusted)
     if ratio > 0:
         factor = math.sqrt(ratio)
         pitch = factor if block.image_unit == "px" else 1 / factor
         if PITCH[0] < pitch < PITCH[1]:
             code = "mistake.lens.mm" if block.image_unit == "px" else "mistake.lens.px"
-            yield phrase(code, pitch=pitch), _scaled(block, [factor] * len(scales), 2)
+            yield Proposal(phrase(code, pitch=pitch), _scaled(block, [factor] * len(scales), 2))
 
 
 def _scaled(block: Block, factors: list[float], power: int) -> Block:

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.adjusting import Adjuster, put_right
+from photogram.diagnosis.adjusting import Adjuster, Proposal, best_of, residuals_explained
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.motion import timed_photos
@@ -47,8 +47,8 @@ def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> lis
         return []
     if first is not None and first.converged and (first.loss or not is_suspected(first)):
         return []
-    found = put_right(first, _tried(block), adjusted)
-    return [] if found is None else [Message(found[0])]
+    found = best_of(first, _proposals(block), adjusted)
+    return [] if found is None else [Message(residuals_explained(*found))]
 
 
 def backward_readouts(result: Result) -> list[Message]:
@@ -68,7 +68,7 @@ def backward_readouts(result: Result) -> list[Message]:
     ]
 
 
-def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
+def _proposals(block: Block) -> Iterator[Proposal]:
     ends = {True: _ends(block, 0), False: _ends(block, 1)}
 
     def opposite(own: Shutter) -> Shutter:
@@ -81,14 +81,14 @@ def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
     def across_back(own: Shutter) -> Shutter:
         return opposite(across(own))
 
-    yield phrase("mistake.shutter.opposite"), _changed(block, opposite)
+    yield Proposal(phrase("mistake.shutter.opposite"), _changed(block, opposite))
     rows = any(own.shutter.direction in ("down", "up") for own in block.timed if own.shutter is not None)
     code = f"mistake.shutter.{'columns' if rows else 'rows'}"
-    yield phrase(f"{code}.first"), _changed(block, across)
+    yield Proposal(phrase(f"{code}.first"), _changed(block, across))
     readouts = [own.readout for own in block.timed if own.shutter is not None]
     if not all(each is not None and np.isinf(each.sd).all() for each in readouts):
         # A free readout time adopts the sign that fits.
-        yield phrase(f"{code}.last"), _changed(block, across_back)
+        yield Proposal(phrase(f"{code}.last"), _changed(block, across_back))
     if any(each is not None and abs(float(each.position[0])) > LONGEST for each in readouts):
         known: dict[int, Readout] = {}
 
@@ -101,7 +101,7 @@ def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
             )
             return replace(own, readout=known.setdefault(id(readout), meant))
 
-        yield phrase("mistake.shutter.milliseconds"), _changed(block, thousandth)
+        yield Proposal(phrase("mistake.shutter.milliseconds"), _changed(block, thousandth))
 
 
 def _changed(block: Block, change: Callable[[Shutter], Shutter]) -> Block:

@@ -42,7 +42,7 @@ def stations(block: Block, result: Result | None, misleading: Collection[str] = 
     )
     which = "initial"
     if result is not None:
-        _moved(result, misleading, section)
+        _moved(block, result, misleading, section)
         block = result.block.replace(
             photo_positions=result.photo_positions, photo_attitudes=result.photo_attitudes
         )
@@ -138,14 +138,16 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
             )
 
 
-def _moved(result: Result, misleading: Collection[str], section: Section) -> None:
+def _moved(given: Block, result: Result, misleading: Collection[str], section: Section) -> None:
     """Report the stations that the adjustment moved far more than the others."""
     block = result.block
     if len(block.photo_ids) - len(block.mounts) < FEWEST:
         return
-    axes, base = local_axes(block), _base(block)
-    shifts = axes.positions(result.photo_positions) - axes.positions(block.photo_positions)
-    turns = result.photo_attitudes - block.photo_attitudes
+    rows = {name: row for row, name in enumerate(given.photo_ids)}
+    own = [rows[name] for name in block.photo_ids]
+    axes, base = local_axes(given), _base(given)
+    shifts = axes.positions(result.photo_positions) - axes.positions(given.photo_positions)[own]
+    turns = result.photo_attitudes - given.photo_attitudes[own]
     turns = np.angle(np.exp(1j * turns))
     unit = block.linear_unit
     # Photos on frames do not have poses of their own.

@@ -301,7 +301,9 @@ EXACT = 1e-7  # Value for R of all rows, and for hypotheses on sets
 LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a part of the extent of the block
 
 
-def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
+def network_trial(
+    block: Block, core: _photocore.NetworkTrial, *, control: str = "plan and height"
+) -> NetworkTrial:
     deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     # If only weak weights of photos define the datum, standard deviations of unknowns are those of the datum.
     # A step may be small relative to them, and leave partials that contradict the cofactors by hundreds.
@@ -315,7 +317,7 @@ def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = 
         supported=np.asarray(np.isfinite(deviations).all(axis=1) | on_shared(block)),
         rough=EXACT if np.isfinite(position_sd).any() and not firm else ROUGH,
         exact=EXACT,
-        control="plan and height" if parts else "whole",
+        control=control,
     )
 
 

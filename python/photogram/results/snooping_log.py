@@ -43,6 +43,7 @@ class Aside:
 
 @dataclass(frozen=True)
 class Rival:
+    group: int
     name: str
     statistic: float  # T when the other was chosen
     dimension: int
@@ -144,8 +145,11 @@ def snooped(
     options: SnoopOptions,
     afresh: Callable[[], Aside | None] | None = None,
     common: Callable[[Tests, Standing], Sequence[Phrase]] | None = None,
+    start: Aside | None = None,
 ) -> Outcome:
     """Remove gross errors from a network and return the outcome.
+
+    `start` excludes suspected images at first; those that agree with the others are included again.
 
     `afresh` restarts the trial from a consensus if its adjustment diverges, and returns the rejected
     observations or None. `common` returns common errors of sets that explain the tests better than single
@@ -164,16 +168,18 @@ def snooped(
         max_rows=MAX_ROWS,
         is_supported=trial.supported.tolist(),
     )
-    aside = None
+    aside = start
     try:
-        core = trial.asked(begin, trial.core, None)
+        core = trial.asked(begin, trial.core, aside and (aside.images, set(aside.photos)))
     except LostSupportError:
         aside = None if options.robust is False or afresh is None else afresh()
         if aside is None:
             raise
         core = trial.asked(begin, trial.core, (aside.images, set(aside.photos)))
     else:
-        if afresh is not None and core.needs_consensus and (aside := afresh()) is not None:
+        again = afresh() if afresh is not None and core.needs_consensus else None
+        if again is not None:
+            aside = again
             trial.asked(core.restart, trial.core, (aside.images, set(aside.photos)))
     errors: Sequence[Phrase] = []
     if common is not None and trial.asked(core.may_have_common_errors, trial.core):
@@ -227,7 +233,9 @@ class _Names:
             "subject": subject,
             "components": components,
             "units": tuple(map(suspects.unit, rows)),
-            "rivals": [Rival(str(suspects.name(rival)), *values) for rival, *values in entry["rivals"]],
+            "rivals": [
+                Rival(rival, str(suspects.name(rival)), *values) for rival, *values in entry["rivals"]
+            ],
             "consequences": [self._consequence(*each) for each in entry["consequences"]],
             "kept": KEPT[entry["kept"]] if entry["kept"] else "",
         }
@@ -274,7 +282,11 @@ def disputes(log: Sequence[Removal]) -> list[Phrase]:
         first, *others = needed
         odds = [math.exp(min(first.statistic - each.statistic, 1e3) / 2) for each in others]
         rivals = zip(others, odds, strict=True)
-        near = [Rival(each.name, each.statistic, each.dimension, own) for each, own in rivals if own < ODDS]
+        near = [
+            Rival(each.group, each.name, each.statistic, each.dimension, own)
+            for each, own in rivals
+            if own < ODDS
+        ]
         if near:
             found.append(_alternatives(first, near))
     return found

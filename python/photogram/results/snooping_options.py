@@ -56,3 +56,8 @@ class SnoopOptions(Checked):
     def is_known(self) -> bool:
         """Whether the unit weight is known: chi-square decides, otherwise F."""
         return self.unit_weight == "known"
+
+    @property
+    def control(self) -> str:
+        """Parts of control points that may be removed alone, as in the core."""
+        return "plan and height" if self.parts else "whole"

@@ -1,0 +1,270 @@
+"""Findings on observations that data snooping removes, or retains as doubtful."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Bools
+from photogram.diagnosis.findings import Finding, Level, Section, finding, small_unit
+from photogram.diagnosis.gross import parted_rays
+from photogram.diagnosis.robust import critical
+from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, spread_of
+from photogram.lazy_dataclasses import replace
+from photogram.network.block import Block
+from photogram.network.observations import Observation
+from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, BlockSuspects
+from photogram.results.result import Result
+from photogram.results.snooping_log import Removal
+from photogram.results.snooping_result import Snooped
+from photogram.show.angles import ARCSEC
+from photogram.show.quantity import Axis, Quantity, Table
+from photogram.words import phrase
+
+ODDS = 20.0  # Likelihood ratio below which another observation is an alternative
+BLUNDER, TWENTIETH = 3.0, 1.96
+SHOWN = 20
+
+
+class Misfits:
+    """Findings on a block of which (m,) images were suspected before data snooping."""
+
+    def __init__(self, block: Block, suspected: Bools, found: Snooped, result: Result) -> None:
+        assert isinstance(found.suspects, BlockSuspects)
+        self.block, self.suspected, self.suspects = block, suspected, found.suspects
+        self.found, self.result = found, result
+        values = sizes_of_tests(result)["image"]
+        values = values[values > 0]
+        # If errors have heavier tails than normal ones, the 95 % quantile (1.96 sd) defines the spread.
+        self.tail = max(1.0, float(np.quantile(values, 0.95)) / TWENTIETH) if values.size else 1.0
+
+        self.in_section: list[Finding] = []  # on observations of the adjustment
+        self.of_suspects: list[Finding] = []  # on photos, names, and images that intersection suspects
+        self.control: dict[str, list[Finding]] = {}  # on components of control, by point
+        # Errors against the others are exact, also if they are large.
+        entries = [
+            replace(entry, error=entry.prediction_error or entry.error)
+            for entry in found.log
+            if entry.returned is None
+        ]
+        explained = self._exchanged() | self._parted(entries)
+        for entry in entries:
+            if entry.group not in explained:
+                self._add(entry)
+        common = [each.fields for each in found.outcome.remarks if each.code == "snooping.common"]
+        self.is_common = bool(common)
+        self.in_section += [finding("grave", phrase("check.common-error", **each)) for each in common]
+
+    @property
+    def misleading(self) -> set[str]:
+        """Photos of suspected images that agree with the others."""
+        out = self.suspects.with_any(self.found.outcome.out.rows)[: len(self.suspected)]
+        on_points = np.isin(self.block.image_points, self.block.image_points[self.suspected & ~out])
+        return {self.block.photo_ids[photo] for photo in self.block.image_photos[on_points]}
+
+    def _add(self, entry: Removal) -> None:
+        kind = int(self.suspects.kinds[entry.group])
+        if entry.kind == "photo":
+            photo = int(self.suspects.photos[entry.group])
+            name, count = self.block.photo_ids[photo], int((self.block.image_photos == photo).sum())
+            message = phrase("check.bad-photo.points", photo=name, n=count)
+            self.of_suspects.append(finding("grave", message, [name], values={"points": float(count)}))
+        elif kind == IMAGE:
+            (self.of_suspects if self.suspected[entry.group] else self.in_section).append(self._image(entry))
+        elif kind == CONTROL:
+            findings = self._control(entry)
+            self.control.setdefault(findings[0].points[0], []).extend(findings)
+        elif kind in (POSITION, ATTITUDE):
+            self.in_section += self._station(entry)
+        else:
+            self.in_section.append(self._other(entry))
+
+    def _exchanged(self) -> set[int]:
+        """Add exchanged names; return the images that they explain."""
+        block, explained = self.block, set[int]()
+        for each in self.found.exchanged:
+            photo, points = each.photos[0], list(each.points)
+            message = phrase("check.exchanged-points", points=points, photo=photo)
+            values = {"statistic_as_named": each.as_named, "statistic_exchanged": each.exchanged}
+            self.of_suspects.append(finding("grave", message, [photo], points, values))
+            rows = [block.point_ids.index(point) for point in points]
+            on = np.isin(block.image_points, rows) & (np.array(block.photo_ids)[block.image_photos] == photo)
+            explained |= {*np.flatnonzero(on).tolist()}
+        return explained
+
+    def _parted(self, entries: list[Removal]) -> set[int]:
+        """Add names of two points, the rays of which intersect in two groups; return their images."""
+        block, explained = self.block, set[int]()
+        images = np.array([entry.group for entry in entries if entry.rows], dtype=np.int64)
+        images = images[self.suspects.kinds[images] == IMAGE]
+        points, counts = np.unique(block.image_points[images], return_counts=True)
+        points = np.union1d(points[counts > 1], block.image_points[self.suspected])
+        reached = block.replace(
+            photo_positions=self.result.photo_positions, photo_attitudes=self.result.photo_attitudes
+        )
+        for point, one, other, before in parted_rays(reached, points.tolist()):
+            first, second = ([block.photo_ids[photo] for photo in own] for own in (one, other))
+            name, unit = block.point_ids[point], block.image_unit
+            message = phrase(
+                "check.name-used-twice", point=name, first=first, second=second, before=before, unit=unit
+            )
+            found = finding("grave", message, [*first, *second], [name], {f"residual_{unit}": before})
+            self.of_suspects.append(found)
+            explained |= {*np.flatnonzero(block.image_points == point).tolist()}
+        return explained
+
+    def _level(self, entry: Removal) -> Level:
+        """Return the level by the p-value, also for errors with heavier tails than normal ones."""
+        limit, freedom = SURE / self.found.outcome.tests, float(entry.dimension)
+        if math.isnan(entry.log_probability):
+            return "grave"
+        chance = _photocore.chi_square((self._test(entry) / self.tail) ** 2, freedom)
+        return "grave" if entry.log_probability < math.log(limit) and chance < limit else "look"
+
+    def _test(self, entry: Removal) -> float:
+        """Return the root of T in units of the remaining variance."""
+        return math.sqrt(entry.fisher * entry.dimension)
+
+    def _largest(self, entry: Removal) -> int:
+        """Return the component with the largest error in standard deviations."""
+        return int(np.argmax(np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd))))
+
+    def _image(self, entry: Removal) -> Finding:
+        block, row = self.block, entry.group
+        photo, point = int(block.image_photos[row]), int(block.image_points[row])
+        axis = int(np.argmax(np.nan_to_num(np.abs(entry.error)) / block.image_sd[row]))
+        rivals = [rival.group for rival in entry.rivals if rival.odds < ODDS]
+        others = [
+            block.photo_ids[block.image_photos[own]]
+            for own in rivals
+            if self.suspects.kinds[own] == IMAGE and block.image_points[own] == point
+        ]
+        two = np.count_nonzero(block.image_points == point) == 2
+        unit, factor = small_unit(block.image_unit)
+        error, test = factor * entry.error[axis], self._test(entry)
+        code = "check.gross-error.one" if self.suspected[row] else "check.blunder.image"
+        message = phrase(
+            code,
+            point=block.point_ids[point],
+            photo=block.photo_ids[photo],
+            axis="xy"[axis],
+            error=error,
+            unit=unit,
+            test=test,
+            redundancy=entry.redundancy,
+            rivals=phrase(f"check.rival.{'two-rays' if two else 'images'}", photos=others) if others else "",
+        )
+        values = {f"error_{unit}": error, "test_value": test, "axis": float(axis)}
+        photos = [block.photo_ids[photo], *others]
+        return finding(self._level(entry), message, photos, [block.point_ids[point]], values)
+
+    def _control(self, entry: Removal) -> list[Finding]:
+        """Return findings on the components with significant errors."""
+        block, suspects = self.block, self.suspects
+        others = [
+            block.point_ids[suspects.points[rival.group]]
+            for rival in entry.rivals
+            if rival.odds < ODDS and suspects.kinds[rival.group] == CONTROL
+        ]
+        sizes = np.abs(entry.error) / np.array(entry.error_sd) / spread_of(self.result)
+        limit = critical(self.found.outcome.tests, FOUND)
+        chosen = [k for k in range(len(sizes)) if sizes[k] > limit] or [int(np.argmax(np.nan_to_num(sizes)))]
+        return [
+            control_finding(
+                block,
+                int(suspects.points[entry.group]),
+                int(suspects.components[entry.rows[k]]),
+                entry.error[k],
+                float(sizes[k]) if len(chosen) > 1 else self._test(entry),
+                self._level(entry),
+                others,
+            )
+            for k in chosen
+        ]
+
+    def _station(self, entry: Removal) -> list[Finding]:
+        name, test = self.block.photo_ids[self.suspects.photos[entry.group]], self._test(entry)
+        part = "coordinate" if self.suspects.kinds[entry.group] == POSITION else "angle"
+        found = []
+        for row in entry.rows:
+            axis = int(self.suspects.components[row]) + 1
+            message = phrase(f"check.station-misfit.{part}", photo=name, axis=axis, test=test)
+            found.append(finding(self._level(entry), message, [name], values={"test_value": test}))
+        return found
+
+    def _other(self, entry: Removal) -> Finding:
+        observation = self.suspects.observations[int(self.suspects.subjects[entry.group])]
+        k = self._largest(entry)
+        named = entry.components[k], entry.units[k]
+        parts = entry.error[k], self._test(entry), entry.redundancy, self._level(entry)
+        return observation_finding(observation, named, *parts)
+
+
+def control_finding(
+    block: Block, row: int, axis: int, error: float, test: float, level: Level, others: Sequence[str] = ()
+) -> Finding:
+    """Return the finding on a control component; `error` is that of the given value."""
+    name, unit = block.point_ids[row], block.linear_unit
+    names = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
+    if block.geographic and axis < 2:
+        error, unit = error / ARCSEC, "arcsec"
+    fields = {"component": names[axis], "point": name, "test": test, "error": error, "unit": unit}
+    rivals = phrase("check.rival.control", points=list(others)) if others else ""
+    message = phrase("check.control-misfit.component", **fields, rivals=rivals)
+    values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
+    return finding(level, message, [], [name, *others], values)
+
+
+def observation_finding(
+    observation: Observation,
+    component: tuple[str, str],
+    error: float,
+    test: float,
+    redundancy: float,
+    level: Level,
+) -> Finding:
+    """Return the finding on a component, with its unit, of an additional observation."""
+    name, unit = component
+    if unit == "rad":
+        error, unit = error / ARCSEC, "arcsec"
+    fields = {"component": name, "test": test, "redundancy": redundancy, "error": error, "unit": unit}
+    message = phrase("check.observation-misfit", observation=observation.name, **fields)
+    values = {"test_value": test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
+    return finding(level, message, observation.photos, observation.points, values)
+
+
+def list_test_values(result: Result, section: Section) -> None:
+    """List test values beyond 3 after all removals, the largest ones, and their number."""
+    values = sizes_of_tests(result)["image"]
+    tested = int((values > 0).sum())
+    images, axes = np.nonzero(values > BLUNDER)
+    section.figure(
+        "robust spread of the test values", f"{spread_of(result):.3f} (1 when the weights are right)"
+    )
+    section.figure(
+        f"image coordinates beyond {BLUNDER:g} times the spread",
+        f"{len(images)} of {tested} tested ({0.0027 * tested:.0f} to be expected)",
+    )
+    if not len(images):
+        return
+    block = result.block
+    unit, factor = small_unit(block.image_unit)
+    order = np.argsort(-values[images, axes], kind="stable")[:SHOWN]
+    rows, axis = images[order], axes[order]
+    residuals, redundancy = factor * result.residuals[rows, axis], result.redundancy[rows, axis]
+    photos, points = block.image_photos[rows].tolist(), block.image_points[rows].tolist()
+    small = (Axis.of("", unit),)
+    columns = [
+        Quantity([block.photo_ids[photo] for photo in photos], kind="name", head="Photo"),
+        Quantity([block.point_ids[point] for point in points], kind="name", head="Point"),
+        Quantity(["xy"[k] for k in axis], kind="name", head="Axis"),
+        Quantity(residuals, small, "deviation", head="Residual", decimals=1),
+        Quantity(redundancy, head="Redundancy", decimals=3),
+        Quantity(values[rows, axis], head="Test value", decimals=2),
+        Quantity(residuals / redundancy, small, "deviation", head="Error", decimals=1),
+    ]
+    note = "The error is the gross error that would explain the residual."
+    section.parts.append(Table("", "Largest test values of the other observations", columns, note))

@@ -1,0 +1,51 @@
+"""Test values of single components, with the robust spread of all as unit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats
+from photogram.diagnosis.robust import critical, mad_sd
+from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
+
+FOUND, SURE = 0.01, 1e-4  # Probabilities that a correct block has any finding, and a grave one
+ROUNDING = 0.01  # Standard deviation of test values below which residuals are rounding errors
+TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
+"""Redundancy numbers below which image coordinates, and control or stations, are not tested.
+
+Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth. Its test
+value is still meaningful."""
+
+
+def spread_of(result: AdjustedNetwork) -> float:
+    """Return the robust standard deviation of the test values; 1 if residuals are rounding errors."""
+    size = mad_sd(result.standardized)
+    return size if size > ROUNDING else 1.0
+
+
+def sizes_of_tests(result: Result) -> dict[str, Floats]:
+    """Return absolute test values w by type, in their robust sd; 0 without redundancy."""
+    values = {
+        "image": (result.redundancy, result.standardized),
+        "control": (result.point_redundancy, result.point_standardized),
+        "station": (result.photo_redundancy, result.photo_standardized),
+        **{name: (each.redundancy, each.standardized) for name, each in result.kinds.items()},
+    }
+    least = {"image": TESTABLE}
+    return {
+        kind: np.where(redundancy > least.get(kind, TESTABLE_PRIOR), np.nan_to_num(np.abs(own)), 0.0)
+        / spread_of(result)
+        for kind, (redundancy, own) in values.items()
+    }
+
+
+def outliers(result: Result) -> dict[str, Bools]:
+    """Return components by type beyond the critical value of the largest of all test values."""
+    limit = critical(tested_count(result), FOUND)
+    return {name: each > limit for name, each in sizes_of_tests(result).items()}
+
+
+def tested_count(result: Result) -> int:
+    """Return the number of tested components."""
+    return sum(int((each > 0).sum()) for each in sizes_of_tests(result).values())
