@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from message_codes import nested_codes
 from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
-from photogram.diagnosis.orientation import MIRRORS
 from photogram.diagnosis.exchanges import exchange
+from photogram.diagnosis.orientation import MIRRORS
 from photogram.diagnosis.robust import critical, fit, mad_sd
 from photogram.diagnosis.stations import neighbours
 from photogram.diagnosis.structure import parts_of
