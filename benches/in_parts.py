@@ -143,7 +143,7 @@ def carried_out(block: Block, workers: int, parts: int, memory: str, *, alone: b
     with connected("local", workers, bytes_of(memory)) as client, TemporaryDirectory() as folder:
         division = Division(cluster=client, parts=parts, memory=memory, folder=folder)
         plan = plan_in_parts(block, division)
-        print("\n".join(plan.lines()), flush=True)
+        print(plan.report(), flush=True)
         before = client.run(peak_memory)
         start = time.perf_counter()
         found = adjust_in_parts(block, division)

@@ -183,12 +183,12 @@ def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> N
         division = Division(cluster=client, parts=parts, memory=memory)
         with opened(run, source(images), images, divided, divided, division, None) as own_run:
             start = time.perf_counter()
-            print("\n".join(own_run.plan().lines()))
+            print(own_run.plan().report())
             print(f"planned in {time.perf_counter() - start:,.0f} s", flush=True)
             start = time.perf_counter()
             outcome = own_run.adjust(told(start))
             seconds = time.perf_counter() - start
-            print("\n".join(OnDisk(outcome, own_run.manifest, []).lines()))
+            print(OnDisk(outcome, own_run.manifest, []).report())
         peaks, processors = client.run(peak_memory), client.run(time.process_time)
     print(f"adjusted in {seconds:,.0f} s; parts, states and results take {on_disk(run):.2f} GiB on disk")
     for worker, peak in sorted(peaks.items()):

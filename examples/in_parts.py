@@ -31,7 +31,7 @@ def main() -> None:
     """Plan, adjust in parts and in one process, and compare."""
     block = flown()
     division = Division(parts=PARTS)
-    print("\n".join(plan_in_parts(block, division).lines()))
+    print(plan_in_parts(block, division).report())
     found, whole = adjust_in_parts(block, division), adjust(block)
     values, redundancy = apart(found, whole)
     print(f"photos differ by {values:.0e} standard deviations, redundancy numbers by {redundancy:.0e}")

@@ -1,5 +1,7 @@
 """Blocks in parts by the core: what one process gives."""
 
+import re
+
 import numpy as np
 import pytest
 from test_parts import tied_block
@@ -260,9 +262,11 @@ def test_a_plan_is_what_is_needed(block, tmp_path):
         contributions[node] = formed.contribution
         sent = sum(each.nbytes for each in contributions[node])
         assert sent == plan.predictions[node]["contribution_bytes"]
-    text = "\n".join(plan.lines())
-    assert "4 parts and 3 separators for 1 workers" in text
-    assert "at the rate measured" in text
+    figures = {fact.name: (fact.value, fact.note) for fact in plan.document().highlights}
+    assert figures["Parts"] == ("4", "3 separators")
+    assert figures["Workers"] == ("1", "")
+    assert plan.document().table("levels").frame().nodes.tolist() == [1, 2, 4]
+    assert "Predicted time" in plan.report()
 
 
 def test_a_plan_that_does_not_fit_says_what_would(block):
@@ -307,7 +311,7 @@ def test_what_parts_cannot_do_is_refused(block):
 def test_the_example_is_right(capsys):
     script = load("in_parts")
     script.main()
-    assert "4 parts and 3 separators for 1 workers" in capsys.readouterr().out
+    assert re.search(r"parts +4 \(3 separators\)", capsys.readouterr().out)
     block = script.flown(seed=12)
     values, redundancy = script.apart(adjust_in_parts(block, Division(parts=3)), adjust(block))
     assert values < 1e-9

@@ -71,6 +71,13 @@ def print_document(document: Document, whole: str, *keys: str, remarks: Iterable
         print_remark(remark)
 
 
+def print_text(document: Document) -> None:
+    """Print the whole text of a document."""
+    from photogram.show.forms import text
+
+    output.print(escape(text(document).removesuffix("\n")))
+
+
 def print_written(paths: Iterable[Path], to: Console = output) -> None:
     """Print the names of written files."""
     if names := ", ".join(str(path) for path in paths):

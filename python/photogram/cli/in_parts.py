@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from photogram.cli.console import NOT_CONVERGED, output, print_sections
+from photogram.cli.console import NOT_CONVERGED, print_text
 from photogram.cli.job import Job, adjustment_status
 from photogram.lazy_dataclasses import replace
 from photogram.words import phrase
@@ -29,7 +29,7 @@ TAKEN = frozenset(
 
 def print_plan(plan: PartsPlan) -> None:
     """Print how a block would be adjusted in parts."""
-    output.print("\n".join(plan.lines()))
+    print_text(plan.document())
     plan.check()
 
 
@@ -51,6 +51,8 @@ def adjusted_on_disk(
         return False
     job.only(TAKEN, "parquet-in-parts", options=[each for each in job.given if each in DIVIDING])
     from photogram.formats import in_parts
+    from photogram.show.forms import text
+    from photogram.show.page import Section, Text
 
     reading, folder = ReadOptions(), Path(division.folder or target / "run")
     change = partial(replace, **choices)
@@ -61,10 +63,11 @@ def adjusted_on_disk(
         found = in_parts.adjusted_on_disk(
             path, reading, folder, division, change=change, threads=threads, progress=progress
         )
-    lines = [*found.lines(), str(phrase("command.node-results", folder=folder / "results"))]
+    place = Text(str(phrase("command.node-results", folder=folder / "results")))
+    document = found.document().with_sections(Section("files", "Files", [place]))
     job.finish(
-        {target / "report.txt": ("\n".join(lines) + "\n").encode()},
-        summary=lambda: print_sections([("adjusted in parts", lines)], "report.txt"),
+        {target / "report.txt": text(document).encode()},
+        summary=lambda: print_text(document),
         code=0 if found.outcome.status == "converged" else NOT_CONVERGED,
     )
     return True

@@ -10,11 +10,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.distributed.cut import Tree
 from photogram.errors import OutOfMemoryError
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import gibibytes
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Fact, Facts, Section, about
+from photogram.show.quantity import Table, column, members
 from photogram.words import Phrase, phrase
 
 __all__ = ["PartsPlan", "Rates", "Times", "measured_rates", "scheduled"]
@@ -23,11 +26,12 @@ __all__ = ["PartsPlan", "Rates", "Times", "measured_rates", "scheduled"]
 IMAGE = 200.0  # Multiply-adds of the formation of an image point
 BANDWIDTH = 1e9  # Bytes per second between workers: 10 Gbit Ethernet
 ITERATIONS = 4  # Formations of an adjustment from typical initial values
+MIB = 2.0**20
 SHARE = 0.8  # Part of the memory of a worker for nodes; messages use the rest
 
 
 @dataclass(frozen=True)
-class PartsPlan:
+class PartsPlan(Documented):
     """Resources of a partitioned adjustment.
 
     Attributes
@@ -128,51 +132,74 @@ class PartsPlan:
         fit = parts * 2 ** int(np.ceil(np.log2(float(memory[leaf].max()) / self.room)))
         return phrase("parts.more-parts", parts=fit, given=parts)
 
-    def lines(self) -> list[str]:
-        """Return the plan as lines of text."""
-        parts = sum(not below for below in self.tree.children)
-        unknowns = self.of("interior").sum() + self.of("points").sum()
-        lines = [
-            f"{parts} parts and {len(self.tree) - parts} separators for {self.workers} workers"
-            + ("" if self.memory is None else f" of {gibibytes(self.memory)} GiB"),
-            f"{sum(self.photos):,} photos, {self.of('images').sum():,.0f} image points,"
-            f" {self.of('observations').sum():,.0f} observations, {unknowns:,.0f} unknowns",
-            "",
-            f"{'level':>5} {'nodes':>6} {'photos':>9} {'image points':>13} {'outer':>7} {'factor':>9}"
-            f" {'memory':>9} {'up':>9}",
-            f"{'':5} {'':6} {'':9} {'':13} {'most':>7} {'10^9':>9} {'most MiB':>9} {'MiB':>9}",
-        ]
-        levels = self.tree.levels
+    def document(self) -> Document:
+        """Return the document: size, levels of the tree, traffic, and predicted time."""
         leaf = np.array([not below for below in self.tree.children])
-        for name, rows in [
-            *((f"{level}", ~leaf & (levels == level)) for level in range(int(levels.max()) + 1)),
-            ("parts", leaf),
-        ]:
-            if not rows.any():
-                continue
-            photos = int(np.array(self.photos)[rows].sum())
-            lines.append(
-                f"{name:>5} {int(rows.sum()):>6} {photos:>9,} {self.of('images')[rows].sum():>13,.0f}"
-                f" {self.of('outer')[rows].max():>7,.0f} {self.of('factor')[rows].sum() / 1e9:>9,.3f}"
-                f" {self.of('memory_bytes')[rows].max() / 2**20:>9,.1f}"
-                f" {self.of('contribution_bytes')[rows].sum() / 2**20:>9,.1f}"
-            )
-        lines += [
-            "",
-            f"in an iteration {self.bytes_up / 2**20:,.1f} MiB go up and {self.bytes_down / 2**20:,.3f} MiB"
-            f" down, in the inversion {self.bytes_inverted / 2**20:,.1f} MiB down, where all nodes are on"
-            " different workers",
-            f"the largest node takes {self.largest / 2**20:,.0f} MiB"
-            + (f", a worker holds {self.held / 2**20:,.0f} MiB before it begins" if self.held else ""),
+        unknowns = self.of("interior") + self.of("points")
+        traffic = [
+            Fact.of(
+                "Up in an iteration", self.bytes_up / MIB, "MiB", decimals=1, note=about("parts.traffic")
+            ),
+            Fact.of("Down in an iteration", self.bytes_down / MIB, "MiB", decimals=3),
+            Fact.of("Down in the inversion", self.bytes_inverted / MIB, "MiB", decimals=1),
         ]
-        times = self.times
-        if times is not None:
-            lines.append(
-                f"at the rate measured {times.up + times.down:,.1f} s for an iteration and"
-                f" {times.inversion:,.1f} s for the inversion: {times.whole(ITERATIONS):,.0f} s with"
-                f" {ITERATIONS} iterations"
-            )
-        return lines
+        memory = [
+            Fact.of("Largest node", self.largest / MIB, "MiB", decimals=0),
+            Fact.of("Worker before the run", self.held / MIB, "MiB", decimals=0),
+        ]
+        seconds = list[Fact]()
+        if (times := self.times) is not None:
+            seconds = [
+                Fact.of("Iteration", times.up + times.down, "s", decimals=1),
+                Fact.of("Inversion", times.inversion, "s", decimals=1),
+                Fact.of(f"Adjustment with {ITERATIONS} iterations", times.whole(ITERATIONS), "s", decimals=0),
+            ]
+        limit = "" if self.memory is None else f"of {gibibytes(self.memory)} GiB"
+        return Document(
+            "Plan of an adjustment in parts",
+            "",
+            highlights=[
+                Fact.of("Parts", leaf.sum(), note=f"{np.count_nonzero(~leaf)} separators"),
+                Fact.of("Workers", self.workers, note=limit),
+                Fact.of("Photos", sum(self.photos)),
+                Fact.of("Image points", self.of("images").sum(), decimals=0),
+                Fact.of("Observations", self.of("observations").sum(), decimals=0),
+                Fact.of("Unknowns", unknowns.sum(), decimals=0),
+            ],
+            sections=[
+                Section.of(self._levels(leaf)),
+                Section("resources", "Memory and traffic", [Facts("", [*memory, *traffic])]),
+                Section("time", "Predicted time", [Facts("", seconds)], about("parts.time")),
+            ],
+            members=members(
+                self,
+                *("workers", "memory", "held", "largest", "bytes_up", "bytes_down", "bytes_inverted"),
+            ),
+        )
+
+    def _levels(self, leaf: Bools) -> Table:
+        """Return one row per level of separators from the root, and one of the parts."""
+        levels = self.tree.levels
+        separators = [(str(level), ~leaf & (levels == level)) for level in range(int(levels.max()) + 1)]
+        rows = [(name, nodes) for name, nodes in [*separators, ("parts", leaf)] if nodes.any()]
+
+        def sums(values: Floats, factor: float = 1.0) -> list[float]:
+            return [float(values[nodes].sum()) / factor for _, nodes in rows]
+
+        def largest(name: str, factor: float = 1.0) -> list[float]:
+            return [float(self.of(name)[nodes].max()) / factor for _, nodes in rows]
+
+        columns = [
+            column("level", [name for name, _ in rows], "Level", kind="name"),
+            column("nodes", [int(nodes.sum()) for _, nodes in rows], "Nodes"),
+            column("photos", sums(np.array(self.photos)), "Photos", decimals=0),
+            column("image_points", sums(self.of("images")), "Image points", decimals=0),
+            column("largest_outer", largest("outer"), "Outer, most", decimals=0),
+            column("factor_1e9", sums(self.of("factor"), 1e9), "Factor, 10^9", decimals=3),
+            column("largest_memory_mib", largest("memory_bytes", MIB), "Memory, most MiB", decimals=1),
+            column("up_mib", sums(self.of("contribution_bytes"), MIB), "Up, MiB", decimals=1),
+        ]
+        return Table("levels", "Levels of the tree", columns)
 
 
 def measured_rates(part: _photocore.Node) -> Rates:

@@ -17,10 +17,14 @@ from photogram.distributed.run import Manifest, result_folder
 from photogram.formats.plain.batches import Streamed
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import dataclass
+from photogram.results.network_tables import iteration_table
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Fact, Section
+from photogram.show.quantity import Table
 
 
 @dataclass(frozen=True)
-class OnDisk:
+class OnDisk(Documented):
     """The result of the adjustment of a project on disk."""
 
     outcome: Outcome  # History, sums and variance
@@ -29,29 +33,40 @@ class OnDisk:
     # several, with equal values and covariances
     folders: list[Path]
 
-    def lines(self) -> list[str]:
-        """Return a report in a few lines."""
+    def document(self) -> Document:
+        """Return the document: sizes, sums of squares, iterations."""
         outcome, variance = self.outcome, self.outcome.variance_of_unit_weight
         observations, weighted, unknowns = outcome.counts
-        camera, ground, plates, others = outcome.sums_of_squares
         manifest = self.manifest
         photos, points, images = map(sum, (manifest.photos, manifest.points, manifest.images))
-        lines = [
-            f"{outcome.status} after {len(outcome.iterations)} iterations",
-            f"{photos:,} photos, {points:,} points, {images:,} image points in {len(self.folders)} nodes",
-            f"{observations:,} observations and {weighted:,} weighted unknowns, {unknowns:,} unknowns:"
-            f" {outcome.degrees_of_freedom:,} degrees of freedom",
-            f"weighted sum of squares {sum(outcome.sums_of_squares):.6g}: camera {camera:.6g}, ground"
-            f" {ground:.6g}, plates {plates:.6g}, observations {others:.6g}",
-        ]
-        if variance is not None:
-            lines.append(f"sigma0 {variance**0.5:.6g} (a priori 1)")
-        lines += [
-            f"iteration {each.number}: weighted sum of squares {each.weighted_sum_of_squares:.6g}, largest"
-            f" change {each.largest_change:.2g} standard deviations"
-            for each in outcome.iterations
-        ]
-        return lines
+        groups = dict(
+            zip(("camera", "ground", "plates", "observations"), outcome.sums_of_squares, strict=True)
+        )
+        groups["total"] = sum(outcome.sums_of_squares)
+        iterations = Table("iterations", "Iterations", iteration_table(outcome.iterations))
+        return Document(
+            "Adjustment in parts",
+            "",
+            highlights=[
+                Fact("Status", outcome.status, note=f"{len(outcome.iterations)} iterations"),
+                *(
+                    []
+                    if variance is None
+                    else [Fact.of("sigma0", variance**0.5, figures=6, note="a priori 1")]
+                ),
+                Fact.of("Photos", photos, note=f"in {len(self.folders)} nodes"),
+                Fact.of("Points", points),
+                Fact.of("Image points", images),
+                Fact.of("Observations", observations, note=f"and {weighted} weighted unknowns"),
+                Fact.of("Unknowns", unknowns),
+                Fact.of("Degrees of freedom", outcome.degrees_of_freedom, decimals=0),
+                *(
+                    Fact.of(f"Weighted sum of squares, {name}", value, figures=6)
+                    for name, value in groups.items()
+                ),
+            ],
+            sections=[Section.of(iterations)],
+        )
 
 
 def adjusted_on_disk(

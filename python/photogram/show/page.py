@@ -67,6 +67,21 @@ class Fact:
     note: str = ""
     tone: Tone = ""
 
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        value: Any,
+        unit: str = "",
+        *,
+        decimals: int | None = None,
+        figures: int = 4,
+        **more: Any,
+    ) -> Fact:
+        """Return a fact of a number with decimals or figures; integers and texts unchanged."""
+        number = value.item() if isinstance(value, np.generic) else value
+        return cls(name, number_text(number, decimals, figures), unit, **more)
+
 
 @dataclass(frozen=True)
 class Facts:
