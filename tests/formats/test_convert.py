@@ -75,7 +75,7 @@ def test_a_format_that_is_only_read_is_refused_with_those_that_are_written(run, 
 def test_commands_have_the_example(run, tmp_path, command):
     done = run(command, "--example")
     assert done.exit_code == 0, done.output
-    assert "drone: opencv, 4000 x 3000" in done.output
+    assert "drone   opencv  4000 x 3000" in done.output
     for words in ((), ("some", "--example")):
         refused = run(command, *words)
         assert refused.exit_code == 2

@@ -201,7 +201,7 @@ def test_a_command_counts_weighted_control_of_another_system(utm, tmp_path, run)
         "adjust", place, "--control", table, "--control-crs", "EPSG:32632", "--out", tmp_path / "out"
     )
     assert outcome.exit_code == 0
-    assert "control: 4 points held, 1 check point" in outcome.stdout
+    assert "control points 4 check points 1 " in " ".join(outcome.stdout.split())
     assert "Lacking" not in outcome.stdout
     differences = read_columns(tmp_path / "out" / "in_crs" / "control.csv", known=(), numbers=())
     assert sorted(differences.texts("point")) == CONTROL
@@ -214,4 +214,5 @@ def test_control_without_images_does_not_count(utm, run):
     (place / "control.csv").write_bytes(table.read_bytes())
     change(place / "project.toml", "[adjust]", '[control]\ncrs = "EPSG:32632"\n[adjust]')
     outcome = run("info", place)
-    assert "control: 4 points held, 1 check point; without image observations: unseen" in outcome.stdout
+    text = " ".join(outcome.stdout.split())
+    assert "control points 4 check points 1 control without observations unseen" in text

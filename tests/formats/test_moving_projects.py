@@ -16,10 +16,12 @@ import test_moving
 from message_codes import rejected
 from photogram import Attitudes, InputError, adjust, formats
 from photogram.formats import ReadOptions
-from photogram.formats.block_contents import motions
+from photogram.formats.description import described
 from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network import Lens, Polynomial, Smoothness, Spline, Table, Timed, Trajectory
 from photogram.network.motion import about
+from photogram.show.forms import text as text_of
+from photogram.show.page import Document
 
 GOLDEN = ("rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair")
 
@@ -393,6 +395,11 @@ def test_what_tables_cannot_hold(tmp_path):
     assert "trajectories: 6 photos with their approximate poses" in lost
 
 
+def motions(project):
+    (section,) = [each for each in described(project).sections if each.key == "given-trajectories"]
+    return " ".join(text_of(Document("", "", sections=[section])).split())
+
+
 def test_what_counts_from_where_is_kept(moving_projects):
     lines = moving_projects / "lines"
     for origin, told in (
@@ -403,7 +410,7 @@ def test_what_counts_from_where_is_kept(moving_projects):
         text = (lines / "project.toml").read_text().split("\n[time]")[0]
         (lines / "project.toml").write_text(f'{text}\n[time]\norigin = {origin}\nscale = "gps"\n')
         read = formats.read(lines)
-        assert f"times: seconds from {told}, gps" in motions(read)
+        assert f"times seconds from {told}, gps" in motions(read)
         files = formats.to_files(read, "plain")
         again_read = formats.read(written(read, moving_projects / "again"))
         assert motions(again_read) == motions(read)
@@ -419,15 +426,18 @@ def test_adjust_and_info_on_the_command_line(run, moving_projects, tmp_path):
     told = run("info", moving_projects / "lines")
     assert told.exit_code == 0, told.output
     text = " ".join(told.output.split())
-    assert "2 photos on trajectories: 2 of a line scanner" in text
-    assert "strip 7: 12 records of positions, 24 of attitudes, 200.0 to 211.0 s" in text
-    assert (
-        "position: polynomial of degree 1, 2 coefficients; rotation: spline of degree 3, 9 coefficients"
-        in text
+    assert "photos on trajectories 2 photos of a line scanner 2" in text
+    table = described(formats.read(moving_projects / "lines")).table("trajectories").frame()
+    first = table.set_index("name").loc["strip 7"]
+    assert first[["positions", "attitudes", "start_s", "end_s"]].tolist() == [12, 24, 200.0, 211.0]
+    assert (first.position, first.rotation) == (
+        "polynomial of degree 1, 2 coefficients",
+        "spline of degree 3, 9 coefficients",
     )
-    assert "12 observations of the kind velocity" in text
-    assert "6 photos on trajectories: 6 with a rolling shutter, 6 with a motion of their own" in " ".join(
-        run("info", moving_projects / "drone").output.split()
+    assert "observations, velocity 12" in text
+    assert (
+        "photos on trajectories 6 photos with a rolling shutter 6 photos with a motion of their own 6"
+        in " ".join(run("info", moving_projects / "drone").output.split())
     )
     edited(moving_projects / "lines" / "trajectories.csv", lambda table: table.assign(colour="red"))
     for name in ("drone", "lines"):

@@ -167,23 +167,22 @@ def test_info_says_in_a_line_what_would_be_stated(run, site):
     text = (site / "project.toml").read_text()
     (site / "project.toml").write_text(text + '\n[statement]\nclass_h = "5cm"\nclass_3d = "12cm"\n')
     done = run("info", site, "--json", "info.json")
-    said = (
-        "asprs-2023, plain; classes: horizontal 5 cm, 3D 12 cm; 30 check points;"
-        " budgets: three that are chosen"
-    )
-    assert json.loads(Path("info.json").read_text())["Accuracy statement"] == [said]
-    assert "Accuracy statement" in done.output
+    stated = json.loads(Path("info.json").read_text())["statement"]
+    assert stated["standards"] == ["asprs-2023", "plain"]
+    assert stated["classes"] == {"h": 0.05, "3d": 0.12}
+    assert (stated["check_points"], stated["calibrated_lengths"], stated["budgets"]) == (30, 0, None)
+    said = "Accuracy statement standards asprs-2023, plain classes horizontal 5 cm, 3D 12 cm check points 30"
+    assert f"{said} budgets three that are chosen" in " ".join(done.output.split())
     (site / "lengths.csv").write_text("line,from,to,length,sd\na,C01,C30,230.0,0.001\n")
     asked = '\n[statement]\nstandards = ["vdi-2634"]\nbudgets = ["point C08 z", "distance C01 C30"]\n'
     (site / "project.toml").write_text(text + asked)
-    said = (
-        "vdi-2634; classes: none; 30 check points; 1 calibrated length;"
-        " budgets: point C08 z, distance C01 C30"
-    )
     run("info", site, "--json", "info.json")
-    assert json.loads(Path("info.json").read_text())["Accuracy statement"] == [said]
+    stated = json.loads(Path("info.json").read_text())["statement"]
+    assert (stated["standards"], stated["classes"]) == (["vdi-2634"], {})
+    assert (stated["check_points"], stated["calibrated_lengths"]) == (30, 1)
+    assert stated["budgets"] == ["point C08 z", "distance C01 C30"]
     (site / "project.toml").write_text(text + '\n[check]\nindependent = "yes"\n')
-    assert "classes: none; 30 check points" in " ".join(run("info", site).output.split())
+    assert "classes none check points 30" in " ".join(run("info", site).output.split())
 
 
 def test_a_result_as_data_is_stated_as_the_project_asks_in_whose_folder_it_lies(run, site, monkeypatch):

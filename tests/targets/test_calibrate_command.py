@@ -67,7 +67,7 @@ def test_other_commands_know_the_folder(left):
     told = run("info", left)
     assert told.exit_code == 0
     assert "corners of a board" in told.output
-    assert "13 photos, 13 with a position; 702 images of 54 points" in told.output
+    assert "photos 13 (13 with a position) images 702 (of 54 points)" in " ".join(told.output.split())
     again = run("adjust", left, "--out", left.parent / "adjusted", "--no-html", "--quiet")
     assert again.exit_code in (0, 4)
     assert (left.parent / "adjusted" / "report.txt").exists()

@@ -22,6 +22,10 @@ from photogram.network.block import Block, refuse_trajectories
 from photogram.network.datum import MinimumConstraints
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
+from photogram.show.judgement import remarks_section
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Section
+from photogram.show.quantity import Table, column, of_each
 from photogram.words import phrase
 
 LEAST = 5  # Points needed for the relative orientation of two photos
@@ -47,7 +51,7 @@ class Model:
 
 
 @dataclass(frozen=True, eq=False)
-class Strip:
+class Strip(Documented):
     """Models joined by similarities, in the units and axes of the first.
 
     Attributes
@@ -69,6 +73,33 @@ class Strip:
     def converged(self) -> bool:
         """Whether the adjustments of all models converged."""
         return all(each.result.converged for each in self.models)
+
+    def document(self) -> Document:
+        """Return the document: models, differences at their joints, models without redundancy."""
+        results = [each.result for each in self.models]
+        names = [" ".join(each.block.photo_ids) for each in results]
+        squares = [each.sums_of_squares.total for each in results]
+        models = [
+            column("photos", names, "Photos", kind="name"),
+            column("points", [len(each.ids) - 2 for each in self.models], "Points"),
+            of_each(results, "status", kind="name", head="Status"),
+            column("weighted_sum_of_squares", squares, "Weighted sum of squares", figures=4),
+            of_each(results, "degrees_of_freedom", head="Degrees of freedom", decimals=0),
+        ]
+        joints = [
+            column("model", names[1:], "Model", kind="name"),
+            column("rms", self.rms, "rms, bases of the first model", figures=3),
+        ]
+        unchecked = [phrase("orientation.unchecked", names=self.unchecked)] if self.unchecked else []
+        return Document(
+            "Strip of models",
+            "",
+            sections=[
+                remarks_section(unchecked),
+                Section.of(Table("models", "Models", models)),
+                Section.of(Table("joints", "Joints", joints)),
+            ],
+        )
 
     @property
     def unchecked(self) -> list[str]:

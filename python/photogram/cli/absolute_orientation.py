@@ -175,23 +175,9 @@ def relative(
     ground = [np.where(held, at, np.nan) for at, held in (control.get(each, unknown) for each in strip.ids)]
     columns = {"id": list(strip.ids)} | dict(zip("XYZ", np.array(ground).T, strict=True))
     columns |= dict(zip("xyz", strip.positions.T, strict=True))
-    models = [
-        f"{' '.join(each.result.block.photo_ids)}: {len(each.ids) - 2} points, {each.result.status},"
-        f" weighted sum of squares {each.result.sums_of_squares.total:.4g},"
-        f" {each.result.degrees_of_freedom} degrees of freedom"
-        for each in strip.models
-    ]
-    joints = [f"after {names[k + 1]}: rms {rms:.3g}" for k, rms in enumerate(strip.rms)]
-    sections = [
-        ("Models", models),
-        ("Joints, in bases of the first model", joints or ["none: one model"]),
-    ]
-    if strip.unchecked:
-        text = f"nothing checks the models {', '.join(strip.unchecked)}: five points have no residuals"
-        sections.insert(0, ("Not to be used as it is", [text]))
     job.finish(
         {out: csv_text(columns)},
-        summary=lambda: print_sections(sections, "OUT"),
+        summary=lambda: print_sections(strip.document(), "OUT"),
         code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
     )
 

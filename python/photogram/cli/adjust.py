@@ -75,9 +75,9 @@ def adjust(
     check_maps(documents.map)  # now that all inputs are known, which it must not be
     project = unknowns.of(project, choices)
     asked = wanted.asked(project, reading, project.block.linear_unit) if statement else None
-    sections = described(project)
+    description = described(project)
     if not job.quiet:
-        print_sections(sections, "`photogram info`")
+        print_sections(description, "`photogram info`")
     if documents.crs is not None:
         from photogram.formats.crs_results import check_place
 
@@ -110,14 +110,14 @@ def adjust(
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     code = result.verdict.exit_code(strict=strict)
+    document = subject.document().with_sections(*more)
     documents.conclude(
         job,
         subject,
         files,
-        document=subject.document().with_sections(*more),
+        document=replace(document, details=[*document.details, *description.sections]),
         network=result,
         sizes=project.sizes if project.block.image_unit == "px" else (),
-        below=sections,
         beside={} if own is None else statement_files(job, own, documents.folder / "statement"),
         code=code or (0 if own is None else own.exit),
     )

@@ -98,12 +98,14 @@ def collection(
         factor=0.5,
     )
     files = {adjusted: to_bytes(result.result.adjusted(), packing, found.name), **result.files}
+    from photogram.show.page import Fact
+
+    file = Fact("File", str(job.shown(problem)), note=found.title)
     documents.conclude(
         job,
         result.subject,
         files if documents.out is not None else {},
-        document=replace(result.document, title=problem.name),
+        document=replace(result.document, title=problem.name, head=[file]),
         network=result.result,
-        above=[("File", [f"{job.shown(problem)}: {found.title}"])],
         code=result.verdict.exit_code(strict=strict),
     )

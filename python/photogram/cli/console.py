@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -16,7 +16,6 @@ from photogram.messages import printable
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.show.forms import TitledLines
     from photogram.show.page import Document
 
 INPUT_ERROR = 1
@@ -49,11 +48,11 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 output = Console(highlight=False, soft_wrap=True, emoji=False)
 
 
-def print_sections(summary: Iterable[TitledLines], whole: str) -> None:
-    """Print titled sections, shortened; `whole` names the complete file."""
-    for title, lines in summary:
-        if not lines:
-            continue
+def print_sections(document: Document, whole: str, keys: Collection[str] | None = None) -> None:
+    """Print verdict and sections, all or with these keys, shortened; `whole` names the complete file."""
+    from photogram.show.forms import titled_lines
+
+    for title, lines in titled_lines(document, keys):
         output.print(f"[bold]{escape(title)}[/]")
         for line in lines[:SHOWN]:
             output.print(f"  {escape(line)}")
@@ -63,10 +62,8 @@ def print_sections(summary: Iterable[TitledLines], whole: str) -> None:
 
 def print_document(document: Document, whole: str, *keys: str, remarks: Iterable[object] = ()) -> None:
     """Print verdict, advice, key figures, some sections and tables of a document, then remarks."""
-    from photogram.show.forms import titled_lines
-
     output.print(escape(": ".join(filter(None, (document.what, document.title)))))
-    print_sections(titled_lines(document, keys), whole)
+    print_sections(document, whole, keys)
     for remark in remarks:
         print_remark(remark)
 

@@ -7,14 +7,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from rich.markup import escape
-
 from photogram.cli.console import (
     SUMMARY,
-    output,
     print_document,
     print_remark,
-    print_sections,
+    print_text,
     print_withheld,
 )
 from photogram.cli.job import Job
@@ -25,7 +22,6 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.results.network import AdjustedNetwork
-    from photogram.show.forms import TitledLines
     from photogram.show.page import Document
     from photogram.show.sketch.plot import Plot
 
@@ -167,8 +163,6 @@ class Documents:
         plots: Callable[[], Mapping[str, Plot | None]] = dict,
         report: bool = True,
         beside: Mapping[Path, Content] | None = None,
-        below: Iterable[TitledLines] = (),
-        above: Iterable[TitledLines] = (),
         tables: Sequence[str] | None = None,
         remarks: Iterable[object] = (),
         code: int | None = None,
@@ -185,11 +179,11 @@ class Documents:
             Adjusted network with plots, Parquet files and maps, and pixels of its photos.
         plots
             Plots by name, beside those of a network.
-        report, below
-            Whether the text of the document is a file of the output folder, and lines below it.
-        above, tables, remarks
-            Lines above the summary, its tables or sections, and remarks below. None: the whole report of a
-            result that is no network.
+        report
+            Whether the text of the document is a file of the output folder.
+        tables, remarks
+            Tables or sections of the summary, and remarks below. None: the whole report of a result that is
+            no network.
         code
             Exit code; None: of the verdict.
         """
@@ -198,13 +192,11 @@ class Documents:
 
         made = document or result.document()
         made = made if network is None else formatted(made)
-        lines = [line for title, own in below for line in (title, *(f"  {each}" for each in own))]
-        texts = {TEXT: "\n".join([text(made), *lines, *([""] if lines else [])]).encode()} if report else {}
+        texts = {TEXT: text(made).encode()} if report else {}
 
         def summarize() -> None:
-            print_sections(above, "the report")
             if network is None and tables is None:
-                output.print(escape(text(made).removesuffix("\n")))
+                print_text(made)
                 return
             keys = (*(SUMMARY if network is not None else ()), *(tables or ()))
             print_document(made, TEXT if report else "the report", *keys, remarks=remarks)

@@ -13,12 +13,11 @@ from photogram.cli.options import Input, OutputFolder, Reads, Threads
 from photogram.cli.projects import read_project
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import replace
-from photogram.messages import counted
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
-    from photogram.show.forms import TitledLines
+    from photogram.show.page import Document
 
 
 @with_job("film", example=("archive",), ending="-film")
@@ -72,26 +71,33 @@ def marks(
     MicMac.
     """
     from photogram.formats.micmac import has_marks, write_marks
+    from photogram.show.page import Document, Fact
 
     if has_marks(path):
-        files, told = _tables(job, path, name)
+        files, document = _tables(job, path, name)
     else:
         files = write_marks(read_project(job, path, ReadOptions()))
-        told = [("For MicMac", [counted(len(files), "file")])]
+        document = Document("For MicMac", "", highlights=[Fact.of("Files", len(files))])
     written = {} if out is None else {out / file: content for file, content in files.items()}
-    job.finish(written, summary=lambda: print_sections(told, "--out DIR"))
+    job.finish(written, summary=lambda: print_sections(document, "--out DIR"))
 
 
-def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], list[TitledLines]]:
-    """Return tables of the marks of MicMac from its files, and remarks."""
+def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], Document]:
+    """Return tables of the marks of MicMac from its files, and the document of their sizes."""
     from photogram.formats.micmac import read_marks
     from photogram.io.csv_text import csv_text
+    from photogram.show.judgement import remarks_section
+    from photogram.show.page import Document, Fact
 
     job.reads(*(each for each in sorted(folder.rglob("*")) if each.suffix in (".xml", ".txt")))
     found = read_marks(folder)
     files = {
         f"{table}.csv": csv_text(columns, found.remarks) for table, columns in found.tables(camera).items()
     }
-    read = sum(map(len, found.readings.values()))
-    size = f"{counted(len(found.places), 'mark')}, {read} readings on {counted(len(found.readings), 'photo')}"
-    return files, [("Marks of MicMac", [size]), ("Remarks", list(found.remarks))]
+    figures = [
+        Fact.of("Marks", len(found.places)),
+        Fact.of("Readings", sum(map(len, found.readings.values()))),
+        Fact.of("Photos", len(found.readings)),
+    ]
+    remarks = remarks_section(found.remarks)
+    return files, Document("Marks of MicMac", "", highlights=figures, sections=[remarks])

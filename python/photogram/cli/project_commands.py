@@ -10,12 +10,13 @@ from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFile, Reads, Writes
 from photogram.cli.projects import EXAMPLE, read_project
 from photogram.formats.read_options import ReadOptions
-from photogram.messages import counted, listed
+from photogram.lazy_dataclasses import replace
+from photogram.messages import listed
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.formats import Project
-    from photogram.show.forms import TitledLines
+    from photogram.show.page import Document
 
 CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 
@@ -33,33 +34,43 @@ def info(
     If the project requests an accuracy statement, the command describes the subject of the statement.
     """
     from photogram.formats.description import described
-    from photogram.io.json import to_json
+    from photogram.show.forms import to_json
 
     project = read_project(job, path, reading)
-    sections = [*described(project), *_asked(project)]
+    document = described(project)
+    if project.statement:
+        document = _with_statement(document, project)
     job.finish(
-        {} if json is None else {json: to_json(dict(sections))},
-        summary=lambda: print_sections(sections, "--json FILE"),
+        {} if json is None else {json: to_json(document)},
+        summary=lambda: print_sections(document, "--json FILE"),
     )
 
 
-def _asked(project: Project) -> list[TitledLines]:
-    if not project.statement:
-        return []
+def _with_statement(document: Document, project: Project) -> Document:
+    """Return the document of a project with the subject of its accuracy statement."""
     from photogram.results.statement.request import Asked
     from photogram.results.statement.texts import Texts
+    from photogram.show.page import Fact, Facts, Section
 
     asked, texts = Asked.checked(**project.statement), Texts(unit=project.block.linear_unit)
     classes = [f"{CLASSES[name]} {texts.size(size)}" for name, size in asked.classes.items()]
     budgets = "three that are chosen" if asked.budgets is None else listed(list(asked.budgets)) or "none"
-    said = [
-        ", ".join(asked.standards),
-        f"classes: {', '.join(classes) or 'none'}",
-        counted(len(project.checks), "check point"),
-        *([counted(len(asked.lengths), "calibrated length")] if asked.lengths else []),
-        f"budgets: {budgets}",
+    facts = [
+        Fact("Standards", ", ".join(asked.standards)),
+        Fact("Classes", ", ".join(classes) or "none"),
+        Fact.of("Check points", len(project.checks)),
+        *([Fact.of("Calibrated lengths", len(asked.lengths))] if asked.lengths else []),
+        Fact("Budgets", budgets),
     ]
-    return [("Accuracy statement", ["; ".join(said)])]
+    members = {
+        "standards": list(asked.standards),
+        "classes": dict(asked.classes),
+        "check_points": len(project.checks),
+        "calibrated_lengths": len(asked.lengths),
+        "budgets": asked.budgets,
+    }
+    document = document.with_sections(Section("statement", "Accuracy statement", [Facts("", facts)]))
+    return replace(document, members={**document.members, "statement": members})
 
 
 @with_job("convert", example=EXAMPLE)
@@ -74,16 +85,16 @@ def convert(
     """Write a project in another format and list the data that the format cannot contain."""
     from photogram.formats import cannot_hold, target
     from photogram.formats.description import described
+    from photogram.show.page import Remarks, Section, Text
 
     chosen = target(out, to)
     project = read_project(job, path, reading)
     lost = cannot_hold(project, chosen.format.name)
-    sections = [
-        *described(project),
-        ("Written", [f"{out}: {chosen.format.title} (--to {chosen.format.name})"]),
-        ("Lost, as the format has no place for it", lost or ["nothing"]),
-    ]
-    job.finish(chosen.files(project), summary=lambda: print_sections(sections, "`photogram info`"))
+    document = described(project).with_sections(
+        Section("written", "Written", [Text(f"{out}: {chosen.format.title} (--to {chosen.format.name})")]),
+        Section("lost", "Lost, as the format has no place for it", [Remarks(lost or ["nothing"])]),
+    )
+    job.finish(chosen.files(project), summary=lambda: print_sections(document, "`photogram info`"))
 
 
 @with_job("metadata")
@@ -109,7 +120,7 @@ def metadata(
     job.reads(*found.tables)
     job.spares(*found.pictures)
     files = {} if out is None else gnss_files(found, out, photos_crs, given.get("gnss"))
-    job.finish(files, summary=lambda: print_sections(found.sections(), "--out FILE"))
+    job.finish(files, summary=lambda: print_sections(found.document(), "--out FILE"))
 
 
 Kind = Literal["block", "metrology", "survey", "rolling", "archive", "night", "board"]

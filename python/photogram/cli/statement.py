@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from photogram.cli.adjust import result_at
 from photogram.cli.choices import Choices, Unknowns
-from photogram.cli.console import print_remark, print_sections
+from photogram.cli.console import print_document, print_remark
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFolder, Threads
 from photogram.cli.statement_output import StatementOptions, stated, statement_files
@@ -17,8 +17,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import Result
     from photogram.formats import Project
-    from photogram.results.statement.statement import Statement
-    from photogram.show.forms import TitledLines
 
 
 @with_job("statement", example=("survey",), ending="-statement")
@@ -52,16 +50,11 @@ def statement(
     with job.status("stating"):
         found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
         files = statement_files(job, found, out)
-    job.finish(files, summary=lambda: print_sections(_summary(found), "statement.json"), code=found.exit)
-
-
-def _summary(found: Statement) -> list[TitledLines]:
-    """Return the lines for the screen: the first lines of the page."""
-    return [
-        (found.texts("page.what"), [found.headline]),
-        (found.texts("page.figures"), [text for _, text in found.judged.sentences]),
-        *([(found.texts("page.remarks"), found.judged.remarks)] if found.judged.remarks else []),
-    ]
+    job.finish(
+        files,
+        summary=lambda: print_document(found.document(), "statement.json", "remarks"),
+        code=found.exit,
+    )
 
 
 def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:

@@ -2,96 +2,189 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import Counter
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.formats.block_contents import motions
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.trajectories import shared_trajectories
 from photogram.formats.plain.writing import known_cameras
 from photogram.formats.project import Project
 from photogram.formats.self_check import agreement, doubts
-from photogram.messages import counted, listed
+from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.film_reduction import camera_unit
 from photogram.network.observations import Control
+from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.datum import point_kinds
+from photogram.show.judgement import remarks_section
+from photogram.show.page import Document, Fact, Facts, Remarks, Section, Text, significant
+from photogram.show.quantity import Quantity, Table, column, of_each
 
-if TYPE_CHECKING:
-    from photogram.show.forms import TitledLines
+MOST_TRAJECTORIES = 12  # Largest number of trajectories in reports
+MOST_RAYS = 10  # Points with more rays are counted together
 
 
-def described(project: Project) -> list[TitledLines]:
-    """Return a description of a project as titled sections."""
+def described(project: Project) -> Document:
+    """Return the document of a project: sizes, cameras, trajectories, units, missing data."""
+    remarks = [*project.messages, *doubts(project)]
+    size, members = _size(project)
+    return Document(
+        "Project",
+        project.title,
+        sections=[
+            Section("read", "Read", [Text(f"{project.path}: {project.title}")]),
+            Section("given-size", "Size", [size]),
+            Section("given-cameras", "Cameras", [_cameras(project)]),
+            Section("given-trajectories", "Trajectories", _trajectories(project)),
+            Section("conventions", "Units and axes", [_conventions(project)]),
+            Section("lacking", "Lacking", [Remarks([*map(str, project.lacks)])]),
+            remarks_section(remarks),
+        ],
+        members={
+            "path": str(project.path),
+            "title": project.title,
+            **members,
+            "frame": project.frame,
+            "unit": project.block.linear_unit,
+            "image_unit": project.block.image_unit,
+            "lacks": [{"code": each.code, "text": str(each)} for each in project.lacks],
+            "messages": [{"code": each.code, "text": str(each)} for each in remarks],
+        },
+    )
+
+
+def _size(project: Project) -> tuple[Facts, dict[str, Any]]:
+    """Return numbers of photos, observations and points as facts, and as members of JSON."""
     block = project.block
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
-    posed = int(np.count_nonzero(np.isfinite(block.photo_positions).all(axis=1)))
-    size = [
-        f"{len(block.photo_ids)} photos, {posed} with a position; {len(block.image_xy)} images of"
-        f" {np.count_nonzero(rays)} points",
-        "rays of points: "
-        + ", ".join(f"{count} with {k}{' or more' if k == _MANY else ''}" for k, count in _ray_counts(rays)),
-        _control_line(block, rays),
+    counts = np.bincount(np.minimum(rays[rays > 0], MOST_RAYS), minlength=MOST_RAYS + 1).tolist()
+    of_rays = {f"{k}{' or more' * (k == MOST_RAYS)}": count for k, count in enumerate(counts) if count}
+    kinds, (control, checks, idle) = Counter(each.label for each in block.observations), _control(block, rays)
+    members = {
+        "photos": len(block.photo_ids),
+        "photos_with_position": int(np.count_nonzero(np.isfinite(block.photo_positions).all(axis=1))),
+        "images": len(block.image_xy),
+        "points": int(np.count_nonzero(rays)),
+        "rays": of_rays,
+        "control_points": control,
+        "check_points": checks,
+        "control_without_observations": idle,
+        "observations": dict(kinds),
+        "features": list(project.features),
+        "photos_on_frames": len(block.mounts),
+    }
+    facts = [
+        Fact.of("Photos", members["photos"], note=f"{members['photos_with_position']} with a position"),
+        Fact.of("Images", members["images"], note=f"of {members['points']} points"),
+        Fact("Rays of points", ", ".join(f"{count} with {k}" for k, count in of_rays.items()) or "none"),
+        Fact.of("Control points", control),
+        Fact.of("Check points", checks),
+        *([Fact("Control without observations", listed(idle))] if idle else []),
+        *(Fact.of(f"Observations, {kind}", count) for kind, count in kinds.items()),
     ]
-    kinds: dict[str, int] = {}
-    for each in block.observations:
-        kinds[each.label] = kinds.get(each.label, 0) + 1
-    size += [f"{counted(count, 'observation')} of the kind {kind}" for kind, count in kinds.items()]
     if project.features:
-        size.append(f"{counted(len(project.features), 'feature')}: {listed(list(project.features))}")
+        facts.append(Fact.of("Features", len(project.features), note=listed(list(project.features))))
     if block.mounts:
-        size.append(f"{len(block.mounts)} photos on frames with others")
-    cameras = []
-    known, which = known_cameras(block)
-    for row, camera in enumerate(known):
-        pictures = project.sizes[row] if row < len(project.sizes) else None
-        extent = "" if pictures is None else f", {pictures[0]} x {pictures[1]} pixels"
-        values = ", ".join(f"{name} {value:.7g}" for name, value in camera.parameters.items() if value)
-        cameras.append(
-            f"{camera.title}: {camera.model}{extent}, {which.count(row)} photos: {values} ({camera.unit})"
-        )
-    found = agreement(project)
-    conventions = [
-        f"frame: {project.frame}, unit {block.linear_unit}",
-        f"image coordinates in {block.image_unit}"
-        + (", pixels from the upper-left corner" if {each.image_y for each in known} == {"down"} else ""),
-    ]
-    if found.images:
-        conventions.append(
-            f"median residual of {found.images} images with the positions of the file: {found.median:.3g}"
-            f" {camera_unit(block)}"
-        )
-    remarks = [str(each) for each in (*project.messages, *doubts(project))]
-    return [
-        each
-        for each in (
-            ("Read", [f"{project.path}: {project.title}"]),
-            ("Size", size),
-            ("Cameras", cameras),
-            ("Trajectories", motions(project)),
-            ("Units and axes", conventions),
-            ("Lacking", list(map(str, project.lacks))),
-            ("Remarks", remarks),
-        )
-        if each[1]
-    ]
+        facts.append(Fact.of("Photos on frames with others", len(block.mounts)))
+    return Facts("", facts), members
 
 
-def _control_line(block: Block, rays: Indices) -> str:
+def _control(block: Block, rays: Indices) -> tuple[int, int, list[str]]:
     """Return numbers of control and check points, and names of unobserved ones."""
     others = {name for each in block.observations if not isinstance(each, Control) for name in each.points}
     measured = (rays > 0) | np.isin(block.point_ids, list(others))
     kinds = point_kinds(block)
     control, checks = (int(np.count_nonzero(measured & (kinds == kind))) for kind in ("control", "check"))
-    idle = [block.point_ids[row] for row in np.flatnonzero(~measured & (kinds != "pass")).tolist()]
-    rest = f"; without image observations: {listed(idle)}" if idle else ""
-    return f"control: {counted(control, 'point')} held, {counted(checks, 'check point')}{rest}"
+    return control, checks, [block.point_ids[row] for row in np.flatnonzero(~measured & (kinds != "pass"))]
 
 
-_MANY = 10
+def _cameras(project: Project) -> Table:
+    cameras, which = known_cameras(project.block)
+    sizes = [*project.sizes, *[None] * len(cameras)][: len(cameras)]
+    values = [
+        ", ".join(f"{name} {significant(value, 7)}" for name, value in each.parameters.items() if value)
+        for each in cameras
+    ]
+    columns = [
+        of_each(cameras, "title", kind="name", name="name", head="Camera"),
+        of_each(cameras, "model", kind="name", name="model", head="Model"),
+        Quantity([(size and " x ".join(map(str, size))) or "" for size in sizes], kind="name", head="Pixels"),
+        Quantity(sizes, member="pixels"),
+        column("photos", [which.count(row) for row in range(len(cameras))], "Photos"),
+        of_each(cameras, "unit", kind="name", name="unit", head="Unit"),
+        Quantity(values, kind="name", head="Parameters"),
+        Quantity([dict(each.parameters) for each in cameras], member="parameters"),
+    ]
+    return Table("cameras", "Cameras", columns)
 
 
-def _ray_counts(rays: Indices) -> list[tuple[int, int]]:
-    """Return pairs of a number of rays and the number of points with it."""
-    counts = np.bincount(np.minimum(rays[rays > 0], _MANY), minlength=_MANY + 1)
-    return [(k, int(count)) for k, count in enumerate(counts.tolist()) if count]
+def _trajectories(project: Project) -> list[Facts | Table]:
+    """Return numbers of photos on trajectories, and the trajectories of several photos."""
+    block, facts = project.block, list[Fact]()
+    shared = shared_trajectories(block)
+    if block.timed:
+        kinds = {
+            "with a rolling shutter": sum(each.shutter is not None for each in block.timed),
+            "of a line scanner": sum(each.lines is not None for each in block.timed),
+            "with a motion of their own": sum(each.trajectory is None for each in block.timed),
+        }
+        facts = [Fact.of(f"Photos {what}", count) for what, count in kinds.items() if count]
+        facts.insert(0, Fact.of("Photos on trajectories", len(block.timed)))
+    settings = project.details.get("settings")
+    if (block.timed or shared) and isinstance(settings, Settings) and settings.times:
+        facts.append(Fact("Times", str(settings.times)))
+    moments = [(each.moment.trajectory, each.label) for each in block.observations if each.moment is not None]
+    kinds_on = [Counter(label for one, label in moments if one is each) for each in shared]
+    columns = [
+        of_each(shared, "name", kind="name", name="name", head="Trajectory"),
+        column("photos", [sum(one.trajectory is each for one in block.timed) for each in shared], "Photos"),
+        column("positions", [len(each.table.times) for each in shared], "Records of positions"),
+        column("attitudes", [len(each.table.attitude_times) for each in shared], "Of attitudes"),
+        column("start_s", [each.table.span[0] for each in shared], "Start, s", decimals=1),
+        column("end_s", [each.table.span[1] for each in shared], "End, s", decimals=1),
+        *(
+            column(
+                name,
+                [_basis(getattr(each, name), each.coefficients[k]) for each in shared],
+                head,
+                kind="name",
+            )
+            for k, (name, head) in enumerate({"position": "Position", "rotation": "Rotation"}.items())
+        ),
+        Quantity(
+            [listed([f"{n} {kind}" for kind, n in each.items()]) for each in kinds_on],
+            kind="name",
+            head="Observations",
+        ),
+        Quantity([dict(each) for each in kinds_on], member="observations"),
+    ]
+    hidden = len(shared) - MOST_TRAJECTORIES
+    note = f"{hidden} more trajectories" if hidden > 0 else ""
+    rows = np.arange(min(len(shared), MOST_TRAJECTORIES))
+    return [Facts("", facts), Table("trajectories", "Trajectories", columns, note, shown=rows)]
+
+
+def _basis(basis: Basis | None, coefficients: tuple[Coefficient, ...]) -> str:
+    """Describe the corrections of a trajectory."""
+    if basis is None:
+        return "as given"
+    kind = "polynomial" if isinstance(basis, Polynomial) else "spline"
+    known = ", fixed" if all(each.is_held for each in coefficients) else ""
+    return f"{kind} of degree {basis.degree}, {len(coefficients)} coefficients{known}"
+
+
+def _conventions(project: Project) -> Facts:
+    block, found = project.block, agreement(project)
+    down = {each.image_y for each in known_cameras(block)[0]} == {"down"}
+    facts = [
+        Fact("Frame", str(project.frame)),
+        Fact("Unit", block.linear_unit),
+        Fact("Image coordinates", block.image_unit, note="pixels from the upper-left corner" if down else ""),
+    ]
+    if found.images:
+        note = f"{found.images} images with the positions of the file"
+        facts.append(Fact.of("Median residual", found.median, camera_unit(block), figures=3, note=note))
+    return Facts("", facts)

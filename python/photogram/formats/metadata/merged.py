@@ -30,9 +30,11 @@ from photogram.formats.metadata.reference import GEO_TXT, is_reference, read_geo
 from photogram.formats.plain.schema import TABLES
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, counted
-from photogram.show.forms import TitledLines
-from photogram.show.methods import Brief
+from photogram.messages import Message
+from photogram.show.judgement import remarks_section
+from photogram.show.methods import Brief, Documented
+from photogram.show.page import Document, Fact, Facts, Section
+from photogram.show.quantity import Table, column
 from photogram.words import phrase
 
 _TEXTS = (".csv", ".txt")
@@ -243,7 +245,7 @@ class PhotoRecord:
 
 
 @dataclass(frozen=True, repr=False)
-class Metadata(Brief):
+class Metadata(Documented, Brief):
     """Positions of photos from the metadata of a folder of photographs.
 
     Attributes
@@ -269,28 +271,35 @@ class Metadata(Brief):
         located = [each for each in self.photos.values() if each.position is not None]
         return counts(each.deviations for each in located)
 
-    def sections(self) -> list[TitledLines]:
-        """Return a summary for users as titled sections."""
+    def document(self) -> Document:
+        """Return the document: files, sources of positions and standard deviations, flights."""
         records = list(self.photos.values())
         located = [each for each in records if each.position is not None]
         flights: dict[str, list[PhotoRecord]] = {}
         for each in located:
             flights.setdefault(each.flight, []).append(each)
-        read = f"{self.directory}: {counted(len(self.pictures), 'picture')}"
-        read += f", {counted(len(self.tables), 'table')}, {counted(len(records), 'photo')}"
-        return [
-            ("Read", [read]),
-            ("Positions", [told(counts(each.position for each in records))]),
-            ("Standard deviations of positions", [told(self.sources())]),
-            (
-                "Flights",
-                [
-                    f"{name}: {counted(len(own), 'photo')}, {sum(each.rtk for each in own)} of RTK"
-                    for name, own in flights.items()
-                ],
-            ),
-            ("Remarks", [str(each) for each in (*self.messages, *remarks_on(located))]),
+        files = [
+            Fact("Folder", str(self.directory)),
+            Fact.of("Pictures", len(self.pictures)),
+            Fact.of("Tables", len(self.tables)),
+            Fact.of("Photos", len(records)),
+            Fact("Positions", told(counts(each.position for each in records))),
+            Fact("Standard deviations of positions", told(self.sources())),
         ]
+        columns = [
+            column("flight", list(flights), "Flight", kind="name"),
+            column("photos", [len(own) for own in flights.values()], "Photos"),
+            column("rtk", [sum(each.rtk for each in own) for own in flights.values()], "Of RTK"),
+        ]
+        return Document(
+            "Positions of photographs",
+            "",
+            sections=[
+                Section("read", "Read", [Facts("", files)]),
+                Section.of(Table("flights", "Flights", columns)),
+                remarks_section([*self.messages, *remarks_on(located)]),
+            ],
+        )
 
 
 def counts(sources: Iterable[Said | None]) -> dict[str, int]:
