@@ -90,8 +90,8 @@ def _facts(result: Orientation) -> tuple[list[Fact], list[Fact]]:
         Fact("Status", f"{result.status} after {done} iterations", note=f"method {result.method}"),
         Fact("Initial values", STARTS[result.started]),
         Fact("Stations that took part", f"{int(result.took_part.sum())} of {len(result.stations.ids)}"),
-        Fact("Known coordinates", f"{result.known}", note=known),
-        Fact("Degrees of freedom", f"{result.degrees_of_freedom}"),
+        Fact.of("Known coordinates", result.known, note=known),
+        Fact.of("Degrees of freedom", result.degrees_of_freedom),
     ]
     in_model = f"{significant(result.rms, 6)} {model} in the model"
     sigma0, unit, note = "undefined", "", ""
@@ -101,9 +101,9 @@ def _facts(result: Orientation) -> tuple[list[Fact], list[Fact]]:
             unit, note = model, f"{significant(result.sigma0 / scale, 6)} {ground} on the ground"
     condition = "of the equations: rotations, relative scale, shifts"
     good = [
-        Fact("rms of residuals on the ground", significant(result.rms / scale, 6), ground, in_model),
+        Fact.of("rms of residuals on the ground", result.rms / scale, ground, in_model, figures=6),
         Fact("Standard deviation of unit weight", sigma0, unit, note),
-        Fact("Condition number", f"{result.condition:.1f}", note=condition),
+        Fact.of("Condition number", result.condition, note=condition, decimals=1),
     ]
     return much, good
 

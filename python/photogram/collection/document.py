@@ -11,7 +11,7 @@ from photogram.results.network_document import drawings, network_document, netwo
 from photogram.results.network_sections import control_section, stations_section
 from photogram.results.network_tables import image_axes
 from photogram.results.parts import Terms
-from photogram.show.page import Document, Fact, Section, significant
+from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity
 
 if TYPE_CHECKING:
@@ -33,12 +33,12 @@ def collection_document(result: AdjustedCollection) -> Document:
         held = [f"{name} of photo {photo}" for photo, name in result.datum]
         more.append(Fact("Datum", "held parameters", note=", ".join(held)))
     if behind := int(np.count_nonzero(result.point_rays_behind)):
-        more.append(Fact("Points behind a camera", f"{behind}", tone="look"))
+        more.append(Fact.of("Points behind a camera", behind, tone="look"))
     first = 0.5 * result.initial_weighted_sum_of_squares
     good = [
-        Fact("Cost at first, half the sum of squares", significant(first, 7)),
-        Fact("Cost", significant(result.cost, 7)),
-        Fact("Variance of unit weight", f"{variance:.6f}" if variance is not None else "undefined"),
+        Fact.of("Cost at first, half the sum of squares", first, figures=7),
+        Fact.of("Cost", result.cost, figures=7),
+        Fact.of("Variance of unit weight", variance, decimals=6),
     ]
     pictures = drawings(result)
     cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])

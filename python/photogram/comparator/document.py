@@ -97,25 +97,28 @@ def _highlights(calibration: Calibration) -> list[Fact]:
     before = significant(variance.before.total, 3)
     found = [
         Fact("A coordinate before", before, UM, "standard deviation of one axis"),
-        Fact("After the calibration", significant(after.total, 3), UM),
-        Fact("Random comparator", significant(variance.random, 3), UM),
-        Fact("Pointing, mean of a point", significant(variance.pointing.total, 3), UM),
-        Fact("Lack of orthogonality", significant(lack, 3), "″"),
+        Fact.of("After the calibration", after.total, UM, figures=3),
+        Fact.of("Random comparator", variance.random, UM, figures=3),
+        Fact.of("Pointing, mean of a point", variance.pointing.total, UM, figures=3),
+        Fact.of("Lack of orthogonality", lack, "″", figures=3),
     ]
-    return found + ([Fact("Joint adjustment, unit weight", f"{joint.sigma0:.4f}")] if joint else [])
+    return found + ([Fact.of("Joint adjustment, unit weight", joint.sigma0, decimals=4)] if joint else [])
 
 
 def _joint(joint: JointFit) -> list[Part]:
     freedom = joint.degrees_of_freedom
     facts = [
-        Fact(
-            "Standard deviation of unit weight", f"{joint.sigma0:.4f}", note=f"{freedom} degrees of freedom"
+        Fact.of(
+            "Standard deviation of unit weight",
+            joint.sigma0,
+            note=f"{freedom} degrees of freedom",
+            decimals=4,
         ),
-        Fact("Random comparator, estimated", significant(joint.random_um, 4), UM),
+        Fact.of("Random comparator, estimated", joint.random_um, UM, figures=4),
     ]
     for plate, own in joint.plates.items():
         how = "estimated" if own.estimated else "given"
-        facts.append(Fact(f"Grid {plate}, standard deviation", significant(own.sigma_um, 4), UM, how))
+        facts.append(Fact.of(f"Grid {plate}, standard deviation", own.sigma_um, UM, how, figures=4))
     return [
         Facts("Joint adjustment", facts),
         linear(joint.correction, joint.covariance, freedom, "joint_parameters"),

@@ -22,7 +22,7 @@ from photogram.film.certificate_tables import (
 )
 from photogram.network.cameras import Camera
 from photogram.show.judgement import judged, tests_section
-from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
+from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section
 from photogram.show.quantity import members
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, band, error_bars, spread
 from photogram.show.sketch.plot import Plot
@@ -136,12 +136,12 @@ def _facts(certificate: Certificate) -> list[Fact]:
     ]
     if certificate.c is not None:
         facts += [
-            Fact("Calibrated focal length", f"{certificate.c:.3f}", "mm"),
-            Fact("Principal point", f"{xp:.4f}, {yp:.4f}", "mm", f"{what}, sd {sd:g} mm"),
+            Fact.of("Calibrated focal length", certificate.c, "mm", decimals=3),
+            Fact.of("Principal point", (xp, yp), "mm", f"{what}, sd {sd:g} mm", decimals=4),
         ]
     if certificate.radial is not None:
         apart = certificate.lens("brown").apart
-        facts.append(Fact("Conversion to brown", significant(1e3 * apart, 2), "um", "differs by at most"))
+        facts.append(Fact.of("Conversion to brown", 1e3 * apart, "um", "differs by at most", figures=2))
     return facts
 
 

@@ -155,5 +155,5 @@ def _facts(found: StepsCompared) -> list[Fact]:
         if test is not None:
             low, high = test.limits
             expected = f"expected {low:.3g} to {high:.3g}"
-            facts.append(Fact(f"Unit variance, {name}", f"{test.variance:.4g}", note=expected))
+            facts.append(Fact.of(f"Unit variance, {name}", test.variance, note=expected, figures=4))
     return [*facts, Fact("Points compared", counted(len(found.rows), "point"))]

@@ -63,7 +63,7 @@ def _size(project: Project) -> tuple[Facts, dict[str, Any]]:
     counts = np.bincount(np.minimum(rays[rays > 0], MOST_RAYS), minlength=MOST_RAYS + 1).tolist()
     of_rays = {f"{k}{' or more' * (k == MOST_RAYS)}": count for k, count in enumerate(counts) if count}
     kinds, (control, checks, idle) = Counter(each.label for each in block.observations), _control(block, rays)
-    members = {
+    members: dict[str, Any] = {
         "photos": len(block.photo_ids),
         "photos_with_position": int(np.count_nonzero(np.isfinite(block.photo_positions).all(axis=1))),
         "images": len(block.image_xy),

@@ -102,7 +102,7 @@ def _highlights(result: PerspectiveCenter) -> list[Fact]:
     if not math.isfinite(result.limit):
         test = "no test of single residuals: it takes two degrees of freedom"
     return [
-        Fact("Standard error on the plate", significant(plate, 3), "µm", model),
+        Fact.of("Standard error on the plate", plate, "µm", model, figures=3),
         Fact("Readings beyond the limit", str(len(names)), "", test, "look" if names else ""),
     ]
 

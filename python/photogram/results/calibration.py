@@ -26,7 +26,7 @@ from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
 from photogram.results.parts import AdjustedCamera
-from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section, about
+from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section, about, significant
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
 if TYPE_CHECKING:
@@ -269,15 +269,19 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     facts = [
         Fact(
             f"{each.name}: {each.camera.model}",
-            ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0),
+            ", ".join(
+                f"{name} {significant(value, 8)}"
+                for name, value in each.camera.parameters.items()
+                if value != 0
+            ),
             each.camera.unit or "",
             f"{each.photos} photos, {each.images} images",
         )
         for each in held[:LISTED]
     ]
     if len(held) > LISTED:
-        facts.append(Fact("Not shown here", f"{len(held) - LISTED}", note=note))
-    more = [Fact("Not shown here", f"{len(found) - LISTED}", note=note)] if len(found) > LISTED else []
+        facts.append(Fact.of("Not shown here", len(held) - LISTED, note=note))
+    more = [Fact.of("Not shown here", len(found) - LISTED, note=note)] if len(found) > LISTED else []
     parts += [Remarks(remarks), Facts("Cameras that are held", facts), Facts("More cameras", more)]
     return Section("cameras", "Cameras", parts, about("cameras") if found else "")
 

@@ -13,7 +13,19 @@ from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import judged, remarks_section
 from photogram.show.methods import Brief, Documented, Judged
-from photogram.show.page import Document, Drawing, Fact, Facts, Part, Remarks, Section, about
+from photogram.show.page import (
+    Document,
+    Drawing,
+    Fact,
+    Facts,
+    Part,
+    Remarks,
+    Section,
+    about,
+    fixed,
+    probability_written,
+    significant,
+)
 from photogram.show.quantity import Quantity, Table, column, members, of_each
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, spread
 from photogram.show.sketch.plot import Plot
@@ -297,12 +309,15 @@ class VarianceFunction(Documented, Brief):
         estimate = self.estimate
         values = zip(("a^2", "b^2"), estimate.coefficients.tolist(), estimate.sd.tolist(), strict=True)
         facts = [
-            Fact("Variance", f"given variance x (a^2 + b^2 ({self.name} / {self.largest:.6g})^2)"),
-            *(Fact(name, f"{value:.4f}", note=f"sd {sd:.4f}") for name, value, sd in values),
             Fact(
+                "Variance", f"given variance x (a^2 + b^2 ({self.name} / {significant(self.largest, 6)})^2)"
+            ),
+            *(Fact.of(name, value, note=f"sd {fixed(sd, 4)}", decimals=4) for name, value, sd in values),
+            Fact.of(
                 "b^2 / sd",
-                f"{self.test_value:.2f}",
-                note=f"probability {self.probability:.2g} where nothing grows",
+                self.test_value,
+                note=f"probability {probability_written(self.probability)} where nothing grows",
+                decimals=2,
             ),
         ]
         remarks = []

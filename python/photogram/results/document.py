@@ -22,7 +22,7 @@ from photogram.results.film_report import film_table, films_section, mark_table,
 from photogram.results.network_tables import control, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
-from photogram.show.page import Document, Fact, Section, about, fixed, significant
+from photogram.show.page import Document, Fact, Section, about, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _accuracy(result: Result) -> list[Fact]:
         worst = zip(axes, (rms_of(column[np.isfinite(column)]) for column in columns), strict=True)
         note = ", ".join(f"{axis.name} {significant(each, 2)}" for axis, each in worst if math.isfinite(each))
         unit = "" if result.geographic else f" {axes[2].small}"
-        found.append(Fact("Check points", f"{np.count_nonzero(check)}", note=f"rms {note}{unit}"))
+        found.append(Fact.of("Check points", int(np.count_nonzero(check)), note=f"rms {note}{unit}"))
     height = result.point_sd[result.used_points]
     known = height[np.isfinite(height).all(axis=1)] * factors
     if len(known):
@@ -90,14 +90,16 @@ def _size_section(result: Result) -> Section:
     if result.dropped:
         reasons = Counter(result.dropped.values()).items()
         note = ", ".join(f"{count}: {reason}" for reason, count in reasons)
-        more.append(Fact("Points left out", f"{len(result.dropped)}", note=note))
-    value = f"{variance:.6f}" if variance is not None else "undefined"
-    good = [Fact("Variance of unit weight", value, note=about(f"unit-variance.{result.unit_variance}"))]
+        more.append(Fact.of("Points left out", len(result.dropped), note=note))
+    note = about(f"unit-variance.{result.unit_variance}")
+    good = [Fact.of("Variance of unit weight", variance, note=note, decimals=6)]
     sums = result.sums_of_squares
     groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
     groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
     groups["total"] = sums.total
-    good += [Fact(f"Weighted sum of squares, {name}", fixed(square, 6)) for name, square in groups.items()]
+    good += [
+        Fact.of(f"Weighted sum of squares, {name}", square, decimals=6) for name, square in groups.items()
+    ]
     tables: dict[str, Callable[[Result], list[Quantity]]] = {
         "control points": control,
         "unheld components": declared.unheld,

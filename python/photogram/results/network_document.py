@@ -144,7 +144,7 @@ def size_section(
 ) -> Section:
     """Return the sizes of the network, `more` facts, and its accuracy."""
     facts = [Fact(f"{name[:1].upper()}{name[1:]}", value) for name, value in much]
-    facts.append(Fact("Degrees of freedom", f"{result.degrees_of_freedom:.8g}"))
+    facts.append(Fact.of("Degrees of freedom", result.degrees_of_freedom))
     parts: list[Part] = [
         Facts("How much", [*facts, *more]),
         Facts("How good", [*good, *_images_facts(result)]),
@@ -170,11 +170,11 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
         Fact("Standard deviation of unit weight", sigma, note=note),
         Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
         Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
-        Fact("Iterations", f"{len(result.iterations)}", note=result.status),
+        Fact.of("Iterations", len(result.iterations), note=result.status),
     ]
     if images:
         rms = math.sqrt(float(((result.residuals[used] * axis.factor) ** 2).mean()))
-        found.append(Fact("rms of image residuals", significant(rms, 3), unit_written(axis.small)))
+        found.append(Fact.of("rms of image residuals", rms, unit_written(axis.small), figures=3))
     return found
 
 
@@ -187,16 +187,15 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
         rms = np.sqrt((residuals**2).mean(axis=0))
         length = np.hypot(*residuals.T)
     lengths = float(np.median(length)), float(length.max())
-    both = [", ".join(significant(value, 3) for value in pair) for pair in (rms.tolist(), lengths)]
     names = ("Residuals of images, rms in x and y", "Length of image residuals, median and largest")
-    facts = [Fact(name, value, unit) for name, value in zip(names, both, strict=True)]
+    facts = [Fact.of(name, pair, unit, figures=3) for name, pair in zip(names, (rms, lengths), strict=True)]
     redundancy = result.redundancy[used]
     if np.isfinite(redundancy).all():
-        least = f"{redundancy.mean():.3f}, {redundancy.min():.3f}"
+        least, note = (redundancy.mean(), redundancy.min()), about("redundancy-numbers")
         hidden = f"{int(np.count_nonzero(redundancy <= _NOT_CHECKED))} of {redundancy.size}"
         below = f"redundancy below {_NOT_CHECKED:g}"
         facts += [
-            Fact("Redundancy numbers of images, mean and least", least, note=about("redundancy-numbers")),
+            Fact.of("Redundancy numbers of images, mean and least", least, note=note, decimals=3),
             Fact("Image coordinates that nothing checks", hidden, note=below),
         ]
     return facts
@@ -229,16 +228,16 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
     """Return the elimination order, and numbers of operations, also of other orders."""
     return [
         Fact("Photos eliminated", about(f"ordering.{result.ordering}")),
-        Fact("Normal equations formed", f"{result.formations}", note="times"),
+        Fact.of("Normal equations formed", result.formations, note="times"),
         *(
             Fact(
                 f"Multiply-adds if eliminated {about(f'ordering.{name}')}",
-                "too large for this ordering" if math.isnan(count) else f"{count:.3e}",
+                "too large for this ordering" if math.isnan(count) else significant(count, 4),
             )
             for name, count in result.predictions.items()
             if name != result.ordering
         ),
-        *(Fact(f"Multiply-adds of one {name}", f"{count:.3e}") for name, count in result.operations.items()),
+        *(Fact.of(f"Multiply-adds of one {name}", n, figures=4) for name, n in result.operations.items()),
     ]
 
 

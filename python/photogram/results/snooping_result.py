@@ -135,7 +135,7 @@ class Snooped(Brief, Documented):
         parts += [log_table(log), _tests_table(log)] if log else []
         parts += [Remarks(remarks)] if remarks else []
         section = Section("removed", "What was taken out", parts, about("removed"))
-        removed = Fact("Taken out", f"{count}", note=f"of {len(self.suspects)} groups of observations")
+        removed = Fact.of("Taken out", count, note=f"of {len(self.suspects)} groups of observations")
         highlights = [removed, *network.highlights]
         return replace(network, highlights=highlights, sections=[section, *network.sections])
 
@@ -151,11 +151,11 @@ class Snooped(Brief, Documented):
         taken_out = f"returned {returned}, suspect but kept {suspect}"
         return [
             Fact("Unit weight", "known: chi-square tests" if options.is_known else "unknown: F tests"),
-            Fact(name, f"{level:g}", note=tests),
+            Fact.of(name, level, note=tests),
             Fact("Unit variance before", _said(outcome.before)),
             Fact("Unit variance after", _said(outcome.standing), note=biased if self.removed else ""),
-            Fact("Rounds", f"{len(outcome.rounds)}"),
-            Fact("Taken out", f"{len(self.removed)}", note=taken_out),
+            Fact.of("Rounds", len(outcome.rounds)),
+            Fact.of("Taken out", len(self.removed), note=taken_out),
         ]
 
 

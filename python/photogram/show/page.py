@@ -71,16 +71,19 @@ class Fact:
     def of(
         cls,
         name: str,
-        value: Any,
+        value: float | Sequence[float] | Floats | None,
         unit: str = "",
+        note: str = "",
+        tone: Tone = "",
         *,
         decimals: int | None = None,
-        figures: int = 4,
-        **more: Any,
+        figures: int = 0,
     ) -> Fact:
-        """Return a fact of a number with decimals or figures; integers and texts unchanged."""
-        number = value.item() if isinstance(value, np.generic) else value
-        return cls(name, number_text(number, decimals, figures), unit, **more)
+        """Return a fact of numbers, with decimals, with significant figures, or as given."""
+        numbers = [] if value is None else np.ravel(value).tolist()
+        given = decimals is None and not figures
+        texts = [f"{each:.10g}" if given else number_text(each, decimals, figures) for each in numbers]
+        return cls(name, ", ".join(texts) or "undefined", unit, note, tone)
 
 
 @dataclass(frozen=True)

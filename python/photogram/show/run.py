@@ -56,7 +56,7 @@ def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
     if run is not None:
         made.append(Fact("Command", printable(run.command)))
         made.append(Fact("Began", run.began.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S"), "UTC"))
-        made.append(Fact("Time up to this report", f"{run.seconds:.2f}", "s"))
+        made.append(Fact.of("Time up to this report", run.seconds, "s", decimals=2))
     inputs, options = (run.inputs, run.options) if run else ((), dict[str, str]())
     files = [
         Quantity([printable(str(each.path)) for each in inputs], kind="name", head="File"),

@@ -168,10 +168,10 @@ def _highlights(result: Result) -> list[Fact]:
     known = int(result.problem.known.sum())
     stars = f"{known} known, {len(result.problem.image_stars)} images"
     return [
-        Fact("Mean error of unit weight", significant(1e6 * result.mean_error, 4), "µm", _UNIT),
-        Fact("rms of plate residuals, x", significant(float(x), 3), "µm", f"y {significant(float(y), 3)} µm"),
-        Fact("Stars", f"{len(result.problem.star_ids)}", note=stars),
-        Fact("Degrees of freedom", f"{result.degrees_of_freedom}"),
+        Fact.of("Mean error of unit weight", 1e6 * result.mean_error, "µm", _UNIT, figures=4),
+        Fact.of("rms of plate residuals, x", x, "µm", f"y {significant(float(y), 3)} µm", figures=3),
+        Fact.of("Stars", len(result.problem.star_ids), note=stars),
+        Fact.of("Degrees of freedom", result.degrees_of_freedom),
     ]
 
 
@@ -189,11 +189,11 @@ def _much(result: Result) -> list[Fact]:
     unique = "" if counts.degrees_of_freedom else "unique; 1 used"
     return [
         Fact("Stars", f"{known} known, {len(problem.star_ids) - known} unknown"),
-        Fact("Images on the plate", f"{len(problem.image_stars)}"),
+        Fact.of("Images on the plate", len(problem.image_stars)),
         Fact("Images pre, post, event", points, note="of known / unknown stars"),
-        Fact("Observations", f"{counts.observations}", note=observations),
-        Fact("Unknowns", f"{counts.unknowns}", note=unknowns),
-        Fact("Degrees of freedom", f"{counts.degrees_of_freedom}", note=unique),
+        Fact.of("Observations", counts.observations, note=observations),
+        Fact.of("Unknowns", counts.unknowns, note=unknowns),
+        Fact.of("Degrees of freedom", counts.degrees_of_freedom, note=unique),
         Fact("Stop", result.solved.stop.capitalize()),
     ]
 
@@ -202,10 +202,10 @@ def _good(result: Result) -> list[Fact]:
     sums = result.solved.sums
     squares = zip(("plate", "stars", "parameters", "total"), (*sums, sum(sums)), strict=True)
     return [
-        Fact("Mean error of unit weight, computed", significant(1e6 * result.computed_mean_error, 9), "µm"),
-        Fact("Mean error of unit weight, in use", significant(1e6 * result.mean_error, 9), "µm", _UNIT),
+        Fact.of("Mean error of unit weight, computed", 1e6 * result.computed_mean_error, "µm", figures=9),
+        Fact.of("Mean error of unit weight, in use", 1e6 * result.mean_error, "µm", _UNIT, figures=9),
         *(
-            Fact(f"Weighted sum of squares, {name}", significant(1e12 * float(square), 9), "µm²")
+            Fact.of(f"Weighted sum of squares, {name}", 1e12 * square, "µm²", figures=9)
             for name, square in squares
         ),
         Fact("Test of cx = cy", _scale_test(result)),
@@ -219,10 +219,11 @@ def _residuals(result: Result) -> list[Fact]:
         Fact("Common mean error of the plate", *_before(result, problem.image_weights, 1e-6, "µm")),
         Fact("Common mean error of the stars", *_before(result, weights, ARCSEC, "arcsec")),
         *(
-            Fact(
+            Fact.of(
                 f"Sums of {axis} residuals: +, -, both",
-                f"{v[v > 0].sum():.3f}, {v[v < 0].sum():.3f}, {v.sum():z.3f}",
+                (v[v > 0].sum(), v[v < 0].sum(), v.sum()),
                 "µm",
+                decimals=3,
             )
             for axis, v in zip("xy", residuals, strict=True)
         ),
@@ -253,35 +254,34 @@ def _derived(result: Result) -> list[Fact]:
     for name, *terms in (("XS", "xp", "dx"), ("YS", "yp", "dy")):
         rows = [INDEX[term] for term in terms]
         error = np.sqrt(max(float(result.covariance[np.ix_(rows, rows)].sum()), 0.0))
-        value = f"{result.solved.parameters[rows].sum():.10g}"
-        facts.append(Fact(f"{name} = {terms[0]} + {terms[1]}", value, "m", f"mean error {error:.8g} m"))
+        value, note = result.solved.parameters[rows].sum(), f"mean error {significant(error, 8)} m"
+        facts.append(Fact.of(f"{name} = {terms[0]} + {terms[1]}", value, "m", note, figures=10))
     if options.curves:
         curves = distortion_curves(result)
         error = f"mean error {significant(1e6 * curves.calibrated_error, 4)} µm"
         facts += [
-            Fact("Calibrated principal distance", f"{curves.calibrated:.9f}", "m", error),
-            Fact("Crossover", f"{1e3 * options.crossover:g}", "mm"),
+            Fact.of("Calibrated principal distance", curves.calibrated, "m", error, decimals=9),
+            Fact.of("Crossover", 1e3 * options.crossover, "mm"),
         ]
     if options.comparator_angle is not None:
         frame = comparator_frame(result, options.comparator_angle)
         x, y, oblique = (f"mean error {error:.3e}" for error in np.divide(frame.mean_errors, [1, 1, GRAD]))
         facts += [
-            Fact("Comparator, angle x to y", f"{options.comparator_angle / GRAD:.9f}", "grads"),
-            Fact("Comparator, scale x", f"{frame.scale_x:.12f}", note=x),
-            Fact("Comparator, scale y", f"{frame.scale_y:.12f}", note=y),
-            Fact("Comparator, epsilon", f"{frame.epsilon / GRAD:.9f}", "grads", oblique),
+            Fact.of("Comparator, angle x to y", options.comparator_angle / GRAD, "grads", decimals=9),
+            Fact.of("Comparator, scale x", frame.scale_x, note=x, decimals=12),
+            Fact.of("Comparator, scale y", frame.scale_y, note=y, decimals=12),
+            Fact.of("Comparator, epsilon", frame.epsilon / GRAD, "grads", oblique, decimals=9),
         ]
     if given is not None and residual is not None:
-        (x, y), (vx, vy), weight = 1e3 * given.xy, 1e6 * residual, given.weight
-        weights = ", ".join(f"{value:.6G}" for value in (weight[0, 0], weight[1, 1], weight[0, 1]))
+        weight = given.weight
         south = "from south, positive west"
         facts += [
             Fact("Axis, orientation", GROUPS[given.group]),
             Fact("Axis, azimuth", tables.degrees(given.azimuth), note=south),
             Fact("Axis, elevation", tables.degrees(np.pi / 2 - given.zenith_distance)),
-            Fact("Axis, plate x, y", f"{x:.6f}, {y:.6f}", "mm"),
-            Fact("Axis, weights", weights),
-            Fact("Axis, residuals", f"{vx:.3f}, {vy:.3f}", "µm"),
+            Fact.of("Axis, plate x, y", 1e3 * given.xy, "mm", decimals=6),
+            Fact.of("Axis, weights", (weight[0, 0], weight[1, 1], weight[0, 1])),
+            Fact.of("Axis, residuals", 1e6 * residual, "µm", decimals=3),
         ]
     return facts
 
@@ -291,21 +291,21 @@ def _problem(result: Result) -> list[Fact]:
     facts = [
         *(Fact(name, value) for name, value in result.problem.labels.items()),
         *_station("Station", site),
-        Fact("Elevation", f"{site.elevation:.4f}", "m"),
-        Fact("Temperature, pressure", f"{site.air.temperature:.2f} K, {site.air.pressure:.2f} mm of mercury"),
-        Fact("Diurnal aberration at the equator", f"{site.aberration / ARCSEC:.4f}", "arcsec"),
-        Fact("Tolerance of levels", f"{o.tolerance:.3E}", "m"),
-        Fact("Tolerance of refraction", f"{o.refraction_tolerance / ARCSEC:.3E}", "arcsec"),
-        Fact("Tolerance of distortion", f"{o.distortion_tolerance:.3E}", "m"),
-        Fact("Crossover, interval, end of curves", f"{o.crossover:g}, {o.interval:g}, {o.extent:g}", "m"),
-        Fact("Factor k of the movement test", f"{o.movement_factor:g}"),
+        Fact.of("Elevation", site.elevation, "m", decimals=4),
+        Fact.of("Temperature", site.air.temperature, "K", decimals=2),
+        Fact.of("Pressure", site.air.pressure, "mm of mercury", decimals=2),
+        Fact.of("Diurnal aberration at the equator", site.aberration / ARCSEC, "arcsec", decimals=4),
+        Fact.of("Tolerance of levels", o.tolerance, "m"),
+        Fact.of("Tolerance of refraction", o.refraction_tolerance / ARCSEC, "arcsec"),
+        Fact.of("Tolerance of distortion", o.distortion_tolerance, "m"),
+        Fact.of("Crossover, interval, end of curves", (o.crossover, o.interval, o.extent), "m"),
+        Fact.of("Factor k of the movement test", o.movement_factor),
         Fact("Time of the fictitious points", tables.hours(o.movement_time)),
     ]
     if o.reference is not None:
-        x, y = (value / ARCSEC for value in o.pole)
         facts += [
             *_station("Reference station", o.reference),
-            Fact("Pole x, y", f"{x:.4f}, {y:.4f}", "arcsec"),
+            Fact.of("Pole x, y", np.divide(o.pole, ARCSEC), "arcsec", decimals=4),
         ]
     return facts
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import judged, remarks_section, tests_section
-from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section, significant
+from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section
 from photogram.show.quantity import members
 from photogram.show.sketch.plot import Plot
 from photogram.stellar import night_tables as tables
@@ -131,10 +131,14 @@ def _highlights(result: CalibratedNight) -> list[Fact]:
     rms = float(np.sqrt(np.mean(found.residuals**2)))
     expected = test and f"{test.limits[0]:.3f} to {test.limits[1]:.3f} expected of its square"
     of = f"of {len(result.night.exposures)}; {len(found.xy)} images of {len(found.catalogue)} stars"
-    falsely = f"{result.falsely_identified:.0e}"
     return [
-        Fact("Mean error of unit weight", f"{found.mean_error:.3f}", note=expected or ""),
-        Fact("rms of image residuals", significant(rms, 3), "px"),
-        Fact("Exposures", f"{len(result.exposures)}", note=of),
-        Fact("Any exposure falsely identified", falsely, note="probability, at most"),
+        Fact.of("Mean error of unit weight", found.mean_error, note=expected or "", decimals=3),
+        Fact.of("rms of image residuals", rms, "px", figures=3),
+        Fact.of("Exposures", len(result.exposures), note=of),
+        Fact.of(
+            "Any exposure falsely identified",
+            result.falsely_identified,
+            note="probability, at most",
+            figures=1,
+        ),
     ]

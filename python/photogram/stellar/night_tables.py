@@ -251,28 +251,31 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
     found, night = result.calibration, result.night
     estimated = int(np.isfinite(found.star_residuals[:, 0]).sum())
     measured = sum(len(exposure.xy) for exposure in result.exposures)
-    x, y = np.sqrt(np.mean(found.residuals**2, axis=0)).tolist()
+    rms = np.sqrt(np.mean(found.residuals**2, axis=0))
     lens = result.camera.lens + (" (fx = fy)" if result.camera.common_scale else "")
-    pole = ", ".join(f"{value / ARCSEC:.4f}" for value in night.earth.pole)
-    falsely = f"probability below {result.falsely_identified:.1E}"
     much = [
         Fact("Status", f"{found.status}, {found.iterations} iterations"),
         Fact("Exposures, of those given", f"{len(result.exposures)} of {len(night.exposures)}"),
         Fact("Images measured, identified, used", f"{measured}, {result.identified.sum()}, {len(found.xy)}"),
-        Fact("Stars", f"{len(found.catalogue)}", note=f"{estimated} of them estimated"),
-        Fact("Degrees of freedom", f"{found.degrees_of_freedom}"),
+        Fact.of("Stars", len(found.catalogue), note=f"{estimated} of them estimated"),
+        Fact.of("Degrees of freedom", found.degrees_of_freedom),
         Fact("Lens", lens),
         Fact("First attitudes", _first_attitudes(night)),
         Fact("Effects left out of places", ", ".join(night.site.effects.left_out) or "none"),
     ]
     good = [
-        Fact("Mean error of unit weight", f"{found.mean_error:.4f}"),
+        Fact.of("Mean error of unit weight", found.mean_error, decimals=4),
         Fact("Global test", _global_test(result)),
-        Fact("Mean error of an image coordinate", f"{found.mean_error * night.pixel_sd:.4f}", "px"),
-        Fact("rms of residuals in x and y", f"{x:.4f}, {y:.4f}", "px"),
-        Fact("Any exposure falsely identified", falsely),
-        Fact("UT1 - UTC", f"{night.earth.dut1:.4f}", "s"),
-        Fact("Pole x, y", pole, "arcsec"),
+        Fact.of("Mean error of an image coordinate", found.mean_error * night.pixel_sd, "px", decimals=4),
+        Fact.of("rms of residuals in x and y", rms, "px", decimals=4),
+        Fact.of(
+            "Any exposure falsely identified",
+            result.falsely_identified,
+            note="probability, at most",
+            figures=2,
+        ),
+        Fact.of("UT1 - UTC", night.earth.dut1, "s", decimals=4),
+        Fact.of("Pole x, y", np.divide(night.earth.pole, ARCSEC), "arcsec", decimals=4),
     ]
     return much, good
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.results.document import block_members
-from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section
+from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section, Tone
 from photogram.show.quantity import Quantity, Table, members, records
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation, DifferenceTest, changes_between
@@ -111,11 +111,12 @@ APART = "Where both calibrations image the same points, once the motion between 
 def worth_facts(worth: Worth) -> list[Fact]:
     """Return the largest standard deviation of each map in the observed board region."""
     return [
-        Fact(
+        Fact.of(
             f"{each.camera}, {distance_text(each.distance, each.unit)}",
-            f"{each.largest:.2g}",
+            each.largest,
             "px",
             "largest standard deviation of projection where the board was seen",
+            figures=2,
         )
         for each in worth.maps
     ]
@@ -153,7 +154,8 @@ def _tests(worth: Worth) -> list[Fact]:
         for (a, b), tests in zip(cross.parts, cross.tests, strict=True):
             for each in tests:
                 note = f"chi² of {each.dof}, p {each.probability:.2g}; {len(a)} and {len(b)} views"
-                found.append(Fact(each.name, f"{each.chi2:.3g}", "", note, "" if each.explained else "bad"))
+                tone: Tone = "" if each.explained else "bad"
+                found.append(Fact.of(each.name, each.chi2, note=note, tone=tone, figures=3))
     return found
 
 

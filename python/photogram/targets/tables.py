@@ -16,7 +16,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import Knot, beyond_knots
 from photogram.network.observations.unknowns import Prior
-from photogram.show.page import Fact, Tone, significant
+from photogram.show.page import Fact, Tone, fixed, significant
 from photogram.show.quantity import Axis, Quantity
 from photogram.targets.lens_fit import field_of, grid_of_pixels
 from photogram.targets.vision import TURNED
@@ -99,14 +99,14 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
     found.append(Fact("Pixels", "centre is 0", note=where))
     if (bend := calibrated.bend) is not None:
         for name, value, sd in zip(_BENDS, bend.position.tolist(), bend.sd.tolist(), strict=False):
-            found.append(Fact(name, significant(value, 4), unit, f"sd {significant(sd, 2)} {unit}"))
+            found.append(Fact.of(name, value, unit, f"sd {significant(sd, 2)} {unit}", figures=4))
     fit = board_fit(calibrated)
     if fit is None:
         return found
-    found.append(Fact("Out of its plane, rms", significant(fit.rms_out_of_plane, 3), unit))
+    found.append(Fact.of("Out of its plane, rms", fit.rms_out_of_plane, unit, figures=3))
     for name, value, sd in zip(STRETCHES, fit.stretch.tolist(), fit.sd.tolist(), strict=True):
         tone: Tone = "look" if abs(value) > NOTABLE_STRETCH * sd else ""
-        found.append(Fact(f"Spacing, {name}", f"{value:.0f}", "ppm", f"sd {sd:.0f} ppm", tone))
+        found.append(Fact.of(f"Spacing, {name}", value, "ppm", f"sd {fixed(sd, 0)} ppm", tone, decimals=0))
     return found
 
 

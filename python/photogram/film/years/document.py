@@ -73,7 +73,7 @@ def comparison_document(comparison: CameraComparison) -> Document:
         {name: {"angle_rad": angle} for name, angle in comparison.angles.items()},
         about=FIGURES,
         highlights=[
-            Fact(f"{name[:1].upper()}{name[1:]} compared up to", f"{math.degrees(angle):.1f}", "°")
+            Fact.of(f"{name[:1].upper()}{name[1:]} compared up to", math.degrees(angle), "°", decimals=1)
             for name, angle in comparison.angles.items()
         ],
         members={"remarks": [*map(str, comparison.remarks)]},
