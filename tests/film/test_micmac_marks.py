@@ -13,6 +13,7 @@ from photogram import InputError
 from photogram.formats import Project, ReadOptions, read, read_marks, write_marks
 from photogram.io.csv_text import csv_text
 from photogram.network import Fiducial
+from photogram.words import phrase
 from test_film import project, project_again
 
 
@@ -27,7 +28,7 @@ def test_marks_are_read_as_they_were(tmp_path: Path) -> None:
     own = project(tmp_path)
     found = read_marks(written(own, tmp_path / "micmac"))
     assert found.turned
-    assert "5 of 6 scans have it that are not mirrored; 1 are mirrored then" in found.remarks[0]
+    assert found.remarks[0] == phrase("micmac.side-down", most=5, all=6, mirrored=1)
     for each in own.block.observations:
         if isinstance(each, Fiducial):
             name = each.mark.name.split()[1]
@@ -75,7 +76,8 @@ def test_places_that_count_from_a_corner_are_brought_amid_the_marks(tmp_path: Pa
 
     path.write_text(re.sub("<PtIm>(.*)</PtIm>", moved, path.read_text()))
     found = read_marks(folder)
-    assert any("count from a corner: they are taken from their mean, 11" in each for each in found.remarks)
+    (corner,) = [each for each in found.remarks if each.code == "micmac.corner"]
+    assert corner.fields["x"] == pytest.approx(113.0, abs=3.0)
     middle = np.mean([*given.places.values()], axis=0)
     assert np.abs(middle).max() < 0.01
     for name, xy in given.places.items():
@@ -107,7 +109,7 @@ def test_marks_that_no_scan_shows_are_told(tmp_path: Path) -> None:
     for path in (folder / "Ori-InterneScan").glob("MeasuresIm-*.xml"):
         lines = path.read_text().splitlines()
         path.write_text("\n".join(each for each in lines if ">mr<" not in each))
-    assert read_marks(folder).remarks[1] == "no scan has the mark mr"
+    assert read_marks(folder).remarks[1] == phrase("micmac.unread", names=["mr"], n=1)
 
 
 def test_files_at_fault_are_refused(tmp_path: Path) -> None:
@@ -134,10 +136,10 @@ def test_the_command_takes_marks_both_ways(tmp_path: Path, run: Callable[..., An
     assert {path.name for path in (tmp_path / "micmac").iterdir()} == {"Ori-InterneScan", "id_fiducial.txt"}
     done = run("film", "marks", tmp_path / "micmac", "--name", "rc10", "--out", tmp_path / "tables")
     assert done.exit_code == 0, done.output
-    assert "y of the camera is taken to count down" in done.output
+    assert "y of the camera is assumed to count down" in done.output
     for table in ("fiducials", "fiducial_images"):
         content = (tmp_path / "tables" / f"{table}.csv").read_text()
-        assert content.startswith("# y of the camera is taken to count down")
+        assert content.startswith("# y of the camera is assumed to count down")
         (tmp_path / f"{table}.csv").write_text(content)
     assert "sd" not in (tmp_path / "fiducial_images.csv").read_text().splitlines()[-1]
     again = read(tmp_path, ReadOptions(settings=["sd.fiducial_images=0.2"]))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from photogram.cli.adjust import adjusted_block, started_block
-from photogram.cli.console import print_sections
+from photogram.cli.console import print_document
 from photogram.cli.documents import PageAndJson
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFolder, Reads, Threads
@@ -79,7 +79,7 @@ def marks(
         files = write_marks(read_project(job, path, ReadOptions()))
         document = Document("For MicMac", "", highlights=[Fact.of("Files", len(files))])
     written = {} if out is None else {out / file: content for file, content in files.items()}
-    job.finish(written, summary=lambda: print_sections(document, "--out DIR"))
+    job.finish(written, summary=lambda: print_document(document, "--out DIR", "remarks"))
 
 
 def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], Document]:
@@ -91,13 +91,12 @@ def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], Docu
 
     job.reads(*(each for each in sorted(folder.rglob("*")) if each.suffix in (".xml", ".txt")))
     found = read_marks(folder)
-    files = {
-        f"{table}.csv": csv_text(columns, found.remarks) for table, columns in found.tables(camera).items()
-    }
+    remarks = [*map(str, found.remarks)]
+    files = {f"{table}.csv": csv_text(columns, remarks) for table, columns in found.tables(camera).items()}
     figures = [
         Fact.of("Marks", len(found.places)),
         Fact.of("Readings", sum(map(len, found.readings.values()))),
         Fact.of("Photos", len(found.readings)),
     ]
-    remarks = remarks_section(found.remarks)
-    return files, Document("Marks of MicMac", "", highlights=figures, sections=[remarks])
+    sections = [remarks_section(remarks)]
+    return files, Document("Marks of MicMac", "", highlights=figures, sections=sections)

@@ -18,8 +18,7 @@ from photogram.formats.project import Project
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.files import read_lines
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import listed
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
 SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
@@ -33,7 +32,7 @@ class MicmacMarks:
     places: Mapping[str, Floats]  # (x, y) by mark, mm, y up, relative to their mean
     readings: Mapping[str, Mapping[str, Floats]]  # By photo and mark (column, row)
     turned: bool  # Whether y of the file counts down and was reversed
-    remarks: tuple[str, ...]  # Assumptions of the reader
+    remarks: tuple[Phrase, ...]  # Assumptions of the reader
 
     def tables(self, camera: str) -> dict[str, dict[str, Any]]:
         """Return the tables `fiducials` and `fiducial_images` of a camera."""
@@ -109,10 +108,7 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     turned, remark = _turned(down, readings)
     middle = np.mean([*down.values()], axis=0)
     if np.abs(middle).max() > AMID * np.ptp([*down.values()], axis=0).max():
-        remarks.append(
-            f"places of marks count from a corner: they are taken from their mean, {middle[0]:.3f},"
-            f" {middle[1]:.3f} mm there, and so is the principal point"
-        )
+        remarks.append(phrase("micmac.corner", x=float(middle[0]), y=float(middle[1])))
     else:
         middle = np.zeros(2)
     sign = np.array([1.0, -1.0 if turned else 1.0])
@@ -126,11 +122,11 @@ def _named(
     camera: Path,
     places: Mapping[str, Floats],
     readings: Mapping[str, Mapping[str, Floats]],
-) -> list[str]:
+) -> list[Phrase]:
     """Compare names with marks of the camera; report marks without readings."""
     read = {mark for own in readings.values() for mark in own}
     missing = [mark for mark in places if mark not in read]
-    remarks = [f"no scan has the {'marks' if missing[1:] else 'mark'} {listed(missing)}"] if missing else []
+    remarks = [phrase("micmac.unread", names=missing, n=len(missing))] if missing else []
     path = next(
         (each for each in (scans / NAMES, folder / NAMES, scans.parent / NAMES) if each.is_file()), None
     )
@@ -148,18 +144,16 @@ def _named(
     return remarks
 
 
-def _turned(places: Mapping[str, Floats], readings: Mapping[str, Mapping[str, Floats]]) -> tuple[bool, str]:
+def _turned(
+    places: Mapping[str, Floats], readings: Mapping[str, Mapping[str, Floats]]
+) -> tuple[bool, Phrase]:
     """Return whether y counts down (as rows) in most photos, and a remark."""
     sides = [is_mirrored([places[mark] for mark in own], list(own.values())) for own in readings.values()]
     down, up = sides.count(False), sides.count(True)
     if not down and not up:
-        return True, "no photo tells whether y of the camera counts up or down: down is taken"
-    way = "down" if down >= up else "up"
-    rest = min(down, up)
-    return down >= up, (
-        f"y of the camera is taken to count {way}, as {max(down, up)} of {down + up} scans have it that are"
-        " not mirrored" + (f"; {rest} are mirrored then" if rest else "") + ": if the scans are, all are"
-    )
+        return True, phrase("micmac.side-unknown")
+    code = f"micmac.side-{'down' if down >= up else 'up'}"
+    return down >= up, phrase(code, most=max(down, up), all=down + up, mirrored=min(down, up))
 
 
 def _measures(path: Path) -> dict[str, dict[str, Floats]]:

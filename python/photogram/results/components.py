@@ -310,19 +310,20 @@ class VarianceFunction(Documented, Brief):
         values = zip(("a^2", "b^2"), estimate.coefficients.tolist(), estimate.sd.tolist(), strict=True)
         facts = [
             Fact(
-                "Variance", f"given variance x (a^2 + b^2 ({self.name} / {significant(self.largest, 6)})^2)"
+                "Variance",
+                str(phrase("variance.model", name=self.name, largest=significant(self.largest, 6))),
             ),
             *(Fact.of(name, value, note=f"sd {fixed(sd, 4)}", decimals=4) for name, value, sd in values),
             Fact.of(
                 "b^2 / sd",
                 self.test_value,
-                note=f"probability {probability_written(self.probability)} where nothing grows",
+                note=str(phrase("variance.no-growth", p=probability_written(self.probability))),
                 decimals=2,
             ),
         ]
         remarks = []
         if not estimate.converged:
-            remarks.append(f"not converged after {estimate.steps} adjustments: do not use it")
+            remarks.append(phrase("variance.no-function", steps=estimate.steps))
         function = Section("function", "Function", [Facts("", facts)])
         more = {**members(estimate, "coefficients", "covariance", "converged")}
         more |= {"of": self.name, **members(self, "largest", "test_value", "probability")}

@@ -20,7 +20,7 @@ from photogram.network.rays import local_axes
 from photogram.results.footprints import metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 __all__ = ["check_map", "map_files", "point_cloud"]
 
@@ -54,7 +54,7 @@ def map_files(
     *,
     scale: float | None = None,
     sizes: Sequence[tuple[float, float] | None] = (),
-) -> tuple[dict[Path, bytes], list[str]]:
+) -> tuple[dict[Path, bytes], list[Phrase]]:
     """Return the files of a map, and remarks.
 
     Parameters
@@ -75,21 +75,16 @@ def map_files(
         If geopandas or pyogrio are not installed.
     """
     suffix = check_map(path)
-    remarks = []
+    remarks: list[Phrase] = []
     if suffix in GEOJSON and chosen_crs(result):
         if crs not in (None, WGS84):
-            remarks.append(f"GeoJSON is in WGS 84, not in {crs}: that is what it is defined to be")
+            remarks.append(phrase("maps.geojson", crs=crs))
         crs = WGS84
     layers = map_layers(result, crs, scale=scale, sizes=sizes)
     if layers[0].table.crs is None:
-        remarks.append(
-            f"the map {path.name} has no coordinate reference system: nothing says where on the earth the"
-            " coordinates are"
-        )
+        remarks.append(phrase("maps.no-crs", name=path.name))
     remarks += [
-        f"the map {path.name} has {each.description}; all standard deviations are in the layer of the points"
-        for each in layers
-        if each.left_out
+        phrase("maps.left-out", name=path.name, content=each.description) for each in layers if each.left_out
     ]
     return (_geopackage(path, layers) if suffix == GEOPACKAGE else _geojson(path, layers)), remarks
 
