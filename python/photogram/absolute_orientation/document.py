@@ -60,7 +60,7 @@ def orientation_document(result: Orientation) -> Document:
         advice=result.verdict.next,
         highlights=[
             *quality[:2],
-            Fact("Scale", significant(result.similarity.scale, 6), unit),
+            Fact.of("Scale", result.similarity.scale, unit, figures=6),
             *size[3:],
             size[0],
         ],

@@ -330,9 +330,10 @@ def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
         if pattern.new_points.any():
             x, y, z = pattern.points[-1].rms_sd
             plane = f"{pattern.axes[0]} {significant(x, 2)}, {pattern.axes[1]} {significant(y, 2)} {unit}"
-            facts.append(Fact(f"rms in {pattern.axes[2]}, {pattern.name}", significant(z, 2), unit, plane))
-    error = significant(patterns[0].unit, 2)
-    return [*facts, Fact("An image error on the ground", error, unit, "standard deviation, mean of all")]
+            name = f"rms in {pattern.axes[2]}, {pattern.name}"
+            facts.append(Fact.of(name, z, unit, plane, figures=2))
+    note = "standard deviation, mean of all"
+    return [*facts, Fact.of("An image error on the ground", patterns[0].unit, unit, note, figures=2)]
 
 
 def _comparison(patterns: Sequence[Pattern]) -> Table:

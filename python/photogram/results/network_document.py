@@ -156,18 +156,15 @@ def size_section(
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     used, (axis, _) = result.used_images, result._terms.image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
-    variance, sigma, note = (
-        result.variance_of_unit_weight,
-        "–",
-        "no degrees of freedom: covariances are scaled by 1",
-    )
+    variance, sigma = result.variance_of_unit_weight, math.nan
+    note = "no degrees of freedom: covariances are scaled by 1"
     if variance is not None:
-        sigma, note = f"{math.sqrt(variance):.3f}", ""
+        sigma, note = math.sqrt(variance), ""
         for test in result.verdict.tests:
             if test.kind == GLOBAL and test.limits[0] is not None and test.limits[1] is not None:
                 note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
     found = [
-        Fact("Standard deviation of unit weight", sigma, note=note),
+        Fact.of("Standard deviation of unit weight", sigma, note=note, decimals=3),
         Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
         Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
         Fact.of("Iterations", len(result.iterations), note=result.status),

@@ -121,11 +121,12 @@ def comparison_document(comparison: Comparison) -> Document:
         "comparators",
         {name: members(own, "centre_um", "half_range_um") for name, own in comparison.ranges.items()},
         highlights=[
-            Fact(
+            Fact.of(
                 f"Grid {plate}, a coordinate",
-                significant(grid.sigma_um or 0.0, 3),
+                grid.sigma_um or 0.0,
                 "µm",
                 f"given {significant(given[plate], 3)} µm; {grid.adopted}",
+                figures=3,
             )
             for plate, grid in comparison.grids.items()
         ],
