@@ -133,7 +133,7 @@ def test_stars_have_a_verdict(run):
     assert {str(Phrase("stars.plate-coordinates")), str(Phrase("stars.places"))} <= set(names)
 
 
-def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_path):
+def test_a_wrong_term_of_a_lens_is_named_and_not_removed(run, tmp_path):
     """Sixty observations look gross where one lens is wrong; snooping ends as the command that says so."""
     lens = Camera("brown", {"c": -152.74, "K1": 1e-7})
     nominal = Camera("brown", {"c": -152.74})
@@ -141,18 +141,17 @@ def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_pat
         strips=3, photos_per_strip=5, cameras=[lens], start_cameras=[nominal], position_sd=0.1, seed=5
     ).block
     found = adjust(block)
-    assert (found.verdict.code, found.verdict.exit) == ("model", 4)
-    names = "c,xp,yp,K1,K2,P1,P2"
-    remedy = found.verdict.message.fields["remedy"]
-    assert (remedy.code, remedy.fields["how"].fields) == ("part.calibrate.first", {"names": names})
+    assert (found.verdict.code, found.verdict.exit) == ("common-error", 4)
+    error, *others = found.verdict.message.fields["errors"]
+    assert (error.code, error.fields["named"].fields["parameters"], others) == ("common.error", ["K1"], [])
     page = found.document()
-    assert (page.advice[0].code, page.advice[0].fields) == ("advice.calibrate", {"names": names})
+    assert [each.code for each in page.advice] == ["advice.correct-common"]
     words = " ".join(map(str, [found.verdict.headline, *found.verdict.lines, *page.advice]))
     assert "photogram.snoop" not in words
     assert "gross" not in words.lower()
     looked = diagnose(block)
-    assert [each.kind for each in looked.grave] == ["lens"]
-    assert f"{names} (`Camera.sd`)" in looked.grave[0].text
+    assert [each.kind for each in looked.grave] == ["common-error"]
+    assert "K1 of camera 1" in looked.grave[0].text
     # A wrong observation is still one, and no lens.
     good = block.replace(cameras=[lens])
     xy = good.image_xy.copy()

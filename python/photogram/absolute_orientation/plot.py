@@ -39,9 +39,9 @@ def control_plot(
         f"Y, {unit}",
         equal=True,
         bars=[(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else [],
-        legend="beside",
+        legend="below",
     )
-    return Plot(8.5, high + 1.2, [panel])
+    return Plot(6.5, high + 1.8, [panel])
 
 
 def _stations(used: NDArray[np.bool_], plan: Floats) -> list[Mark]:

@@ -340,7 +340,7 @@ def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
     }
     if len(wrong) > MOST_PHOTOS * len(block.photo_ids) or not (wrong or found.set_aside.any()):
         return None
-    return _started(block, found), Aside(tuple(np.flatnonzero(found.set_aside).tolist()), wrong)
+    return _started(block, found), Aside(np.flatnonzero(found.set_aside), wrong)
 
 
 def _consensus(block: Block) -> FirstValues | None:

@@ -12,6 +12,7 @@ from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFolder, Threads
 from photogram.cli.statement_output import StatementOptions, stated, statement_files
 from photogram.formats.read_options import ReadOptions
+from photogram.lazy_dataclasses import replace
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def statement(
         files = statement_files(job, found, out)
     job.finish(
         files,
-        summary=lambda: print_document(found.document(), "statement.json", "remarks"),
+        summary=lambda: print_document(replace(found.document(), head=()), "statement.json", "remarks"),
         code=found.exit,
     )
 

@@ -33,7 +33,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
-from photogram.results.snooping_log import Aside
+from photogram.results.snooping_log import Aside, disputes
 from photogram.results.snooping_options import SnoopOptions
 
 HOPELESS = 5.0  # Spread of the test values of photos that are removed, if they did not fit before
@@ -57,6 +57,7 @@ class Edited:
     exchanged: list[tuple[str, str]] = field(default_factory=list)
     misleading: set[str] = field(default_factory=set)  # Photos of suspected images that are correct
     is_common: bool = False  # Whether errors of sets explain the residuals: nothing is removed
+    is_disputed: bool = False  # Whether the data do not decide which of several observations is wrong
     asked: bool = True  # Whether an adjustment was requested
 
     @property
@@ -109,7 +110,8 @@ def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
                 _restore_control(other, start.block, points, adjusted)
             _remove(start, adjusted, edited)
             # At equal cost, data snooping names alternatives to control.
-            if fewer is not start and (other.cost, bool(edited.control)) < (edited.cost, True):
+            is_better = (other.cost, bool(edited.control)) < (edited.cost, True)
+            if fewer is not start and is_better and not edited.is_disputed:
                 edited = other
             if len(edited.control) > 1:
                 pair = exchanged_control(start.good, edited.last, adjusted)
@@ -267,8 +269,8 @@ def _remove(start: _Start, adjusted: Adjuster, edited: Edited) -> None:
     if first is not None and is_good and not start.suspected.any():
         edited.last = first
     else:
-        images = tuple(np.flatnonzero(start.suspected).tolist())
-        aside = Aside(images, {}) if images else None
+        images = np.flatnonzero(start.suspected)
+        aside = Aside(images, {}) if images.size else None
         # The variance of rounding errors would make all of them gross errors.
         rounded = first is not None and first.converged and mad_sd(first.standardized) <= ROUNDING
         options = SnoopOptions(level=FOUND, unit_weight="known" if rounded else "unknown")
@@ -284,4 +286,5 @@ def _remove(start: _Start, adjusted: Adjuster, edited: Edited) -> None:
         edited.section.findings += misfits.in_section
         edited.gross, edited.control = misfits.of_suspects, misfits.control
         edited.misleading, edited.is_common = misfits.misleading, misfits.is_common
+        edited.is_disputed = bool(disputes(found.log))
     list_test_values(edited.last, edited.section)

@@ -52,7 +52,7 @@ class Misfits:
         ]
         explained = self._exchanged() | self._parted(entries)
         for entry in entries:
-            if entry.group not in explained:
+            if self._image_of(entry) not in explained:
                 self._add(entry)
         common = [each.fields for each in found.outcome.remarks if each.code == "snooping.common"]
         self.is_common = bool(common)
@@ -61,9 +61,16 @@ class Misfits:
     @property
     def misleading(self) -> set[str]:
         """Photos of suspected images that agree with the others."""
-        out = self.suspects.with_any(self.found.outcome.out.rows)[: len(self.suspected)]
-        on_points = np.isin(self.block.image_points, self.block.image_points[self.suspected & ~out])
+        out = self.suspects.with_any(self.found.outcome.out.rows) & (self.suspects.kinds == IMAGE)
+        left = self.suspected.copy()
+        left[self.suspects.subjects[out]] = False
+        on_points = np.isin(self.block.image_points, self.block.image_points[left])
         return {self.block.photo_ids[photo] for photo in self.block.image_photos[on_points]}
+
+    def _image_of(self, entry: Removal) -> int:
+        """Return the number of an image; -1 for other observations."""
+        is_image = self.suspects.kinds[entry.group] == IMAGE and entry.kind != "photo"
+        return int(self.suspects.subjects[entry.group]) if is_image else -1
 
     def _add(self, entry: Removal) -> None:
         kind = int(self.suspects.kinds[entry.group])
@@ -73,7 +80,8 @@ class Misfits:
             message = phrase("check.bad-photo.points", photo=name, n=count)
             self.of_suspects.append(finding("grave", message, [name], values={"points": float(count)}))
         elif kind == IMAGE:
-            (self.of_suspects if self.suspected[entry.group] else self.in_section).append(self._image(entry))
+            own = self.of_suspects if self.suspected[self._image_of(entry)] else self.in_section
+            own.append(self._image(entry))
         elif kind == CONTROL:
             findings = self._control(entry)
             self.control.setdefault(findings[0].points[0], []).extend(findings)
@@ -98,8 +106,7 @@ class Misfits:
     def _parted(self, entries: list[Removal]) -> set[int]:
         """Add names of two points, the rays of which intersect in two groups; return their images."""
         block, explained = self.block, set[int]()
-        images = np.array([entry.group for entry in entries if entry.rows], dtype=np.int64)
-        images = images[self.suspects.kinds[images] == IMAGE]
+        images = [image for entry in entries if entry.rows and (image := self._image_of(entry)) >= 0]
         points, counts = np.unique(block.image_points[images], return_counts=True)
         points = np.union1d(points[counts > 1], block.image_points[self.suspected])
         reached = block.replace(
@@ -133,14 +140,14 @@ class Misfits:
         return int(np.argmax(np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd))))
 
     def _image(self, entry: Removal) -> Finding:
-        block, row = self.block, entry.group
+        block, row = self.block, self._image_of(entry)
         photo, point = int(block.image_photos[row]), int(block.image_points[row])
         axis = int(np.argmax(np.nan_to_num(np.abs(entry.error)) / block.image_sd[row]))
         rivals = [rival.group for rival in entry.rivals if rival.odds < ODDS]
         others = [
-            block.photo_ids[block.image_photos[own]]
+            block.photo_ids[self.suspects.photos[own]]
             for own in rivals
-            if self.suspects.kinds[own] == IMAGE and block.image_points[own] == point
+            if self.suspects.kinds[own] == IMAGE and self.suspects.points[own] == point
         ]
         two = np.count_nonzero(block.image_points == point) == 2
         unit, factor = small_unit(block.image_unit)

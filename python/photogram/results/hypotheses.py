@@ -87,6 +87,7 @@ class Hypotheses:
     statistic: Floats
     probability: Floats
     log_odds: Floats  # against "no error"
+    by_checks: Floats  # Part of the log odds from check points
     estimate: Floats  # (h, k)
     redundancy: Floats
     mdb: Floats  # (h, k); NaN if an error of any size remains undetected
@@ -198,7 +199,8 @@ class Hypotheses:
         odds, sets = self.log_odds, range(len(self.sets))
         found = [k for k in sets if self.code[k] != "bending" and self._is_significant(k)]
         found.sort(key=lambda row: -odds[row])
-        if not found or odds[found[0]] < max(self.single_odds, rivals):
+        # Tests of rivals do not include check points.
+        if not found or odds[found[0]] < max(self.single_odds, rivals + self.by_checks[found[0]]):
             return []
         if self.statistic[found[0]] < EXPLAINED * self.excess:
             return []
@@ -350,7 +352,7 @@ def hypotheses(
     found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
-    effects, relative = {}, set[int]()
+    effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
     for row, (*sizes, changes) in found["effects"].items():
         of_checks, of_points = np.split(changes, [checks])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -387,6 +389,7 @@ def hypotheses(
         rank=found["rank"].astype(np.int64),
         statistic=statistic,
         log_odds=odds,
+        by_checks=(np.nan_to_num(statistic) - alone) / 2,
         effects=effects,
         drawn=drawn,
         limit=limit,

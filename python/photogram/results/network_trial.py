@@ -262,6 +262,10 @@ class NamedSuspects(ABC):
             for photo in many.tolist()
         }
 
+    def of_images(self, images: Indices) -> Indices:
+        """Return the groups of images; images without intersection have none."""
+        return np.flatnonzero((self.kinds == IMAGE) & np.isin(self.subjects, images))
+
     def with_any(self, rows: Bools) -> Bools:
         """Return (G,) groups with any of some rows."""
         return np.asarray(np.logical_or.reduceat(rows, self.row_starts[:-1]))
@@ -416,9 +420,11 @@ def block_facts(block: Block, places: Floats) -> Facts:
         facts |= {"times": times.tolist(), "timed": timed}
     if 1 < len(strips) <= MOST_SETS:
         facts["position_sets"] = sets.tolist()
-    control = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
-    if len(control):
-        facts["centre"] = block.point_positions[control].mean(axis=0).tolist()
+    held = np.isfinite(block.point_sd)
+    control = np.flatnonzero(held.any(axis=1))
+    # Coordinates without standard deviation may be unknown.
+    axes = zip(held.T, block.point_positions.T, places.T, strict=True)
+    facts["centre"] = [float((own[has] if has.any() else photos).mean()) for has, own, photos in axes]
     _, kinds, sizes = np.unique(block.point_sd[control], axis=0, return_inverse=True, return_counts=True)
     if 1 < len(sizes) <= MOST_SETS and (sizes > 1).all():
         control_sets: list[int | None] = [None] * len(block.point_sd)

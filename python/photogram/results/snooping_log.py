@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from photogram import _photocore
-from photogram.arguments.types import Bools
+from photogram.arguments.types import Bools, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.network_trial import (
     KINDS,
@@ -35,8 +35,7 @@ KEPT = {
 class Aside:
     """Exclusions by the consensus from which a network was restarted."""
 
-    # Groups, by number, that do not agree with most of their point and photo
-    images: tuple[int, ...]
+    images: Indices  # Images, by number, that do not agree with most of their point and photo
     photos: dict[int, str | Phrase]  # Photos whose observations agree with no pose, with the reason
     found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
 
@@ -168,19 +167,23 @@ def snooped(
         max_rows=MAX_ROWS,
         is_supported=trial.supported.tolist(),
     )
+
+    def excluded(aside: Aside) -> tuple[list[int], set[int]]:
+        return trial.suspects.of_images(aside.images).tolist(), set(aside.photos)
+
     aside = start
     try:
-        core = trial.asked(begin, trial.core, aside and (aside.images, set(aside.photos)))
+        core = trial.asked(begin, trial.core, aside and excluded(aside))
     except LostSupportError:
         aside = None if options.robust is False or afresh is None else afresh()
         if aside is None:
             raise
-        core = trial.asked(begin, trial.core, (aside.images, set(aside.photos)))
+        core = trial.asked(begin, trial.core, excluded(aside))
     else:
         again = afresh() if afresh is not None and core.needs_consensus else None
         if again is not None:
             aside = again
-            trial.asked(core.restart, trial.core, (aside.images, set(aside.photos)))
+            trial.asked(core.restart, trial.core, excluded(aside))
     errors: Sequence[Phrase] = []
     if common is not None and trial.asked(core.may_have_common_errors, trial.core):
         standing = Standing(*trial.asked(core.adjust_exactly, trial.core))

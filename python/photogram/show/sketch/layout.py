@@ -100,10 +100,12 @@ def _framed(panel: Panel, box: Box, room: float, numbered: bool, margin: float =
     across, up = _ticks(panel, right - left, low - top)
     placed = Placed(panel, box, across, up)
     marks, wide, down = _axes(placed, margin, numbered)
-    legend, entries = _legend(placed)
+    legend, entries = _legend(placed, down)
     side = right + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
     if legend and panel.legend == "beside":
         side = legend[2] + GAP
+    elif legend and panel.legend == "below":
+        down = legend[3] + GAP / 2
     if panel.shades:
         marks += _colour_bar(panel.shades, side + GAP, top, low, panel.decimal)
         side += COLOUR_BAR
@@ -150,14 +152,14 @@ def _axes(placed: Placed, margin: float, numbered: bool) -> tuple[list[Mark], fl
     return found, wide, down
 
 
-def _legend(placed: Placed) -> tuple[Box | None, list[Mark]]:
-    """Return the legend, one mark per line: beside the box, or in its emptiest corner."""
+def _legend(placed: Placed, down: float) -> tuple[Box | None, list[Mark]]:
+    """Return the legend, one mark per line: outside the box, or in its emptiest corner."""
     marks, (left, top, right, low) = placed.panel.labelled, placed.box
     if not placed.panel.legend or not marks:
         return None, []
     names, line = [mark.label for mark in marks], LEADING * LEGEND
     size = np.array([SWATCH + 6.0 + widest(names, LEGEND), line * len(marks)])
-    at, found = [right + GAP, top], list[Mark]()
+    at, found = [right + GAP, top] if placed.panel.legend == "beside" else [left, down], list[Mark]()
     if placed.panel.legend == "best":
         curves = placed.at(np.concatenate([shapes.NOWHERE, *_curves(placed.panel)]))
         corners = np.array([[right, top], [left, top], [right, low], [left, low]])

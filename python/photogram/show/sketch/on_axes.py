@@ -16,6 +16,7 @@ from photogram.words import phrase
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
 LEGENDS: dict[str, dict[str, Any]] = {
     "beside": {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0},
+    "below": {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "borderaxespad": 4.5},
     "best": {"loc": "best"},
 }
 TICKS: dict[str, Any] = {"color": FAINT, "labelsize": NUMBER, "labelcolor": INK}
