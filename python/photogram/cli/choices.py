@@ -18,7 +18,7 @@ Choices = Annotated[
     Mapping[str, Any],
     Changes(AdjustOptions, "datum", "loss", "unit_variance", "max_iterations", "max_bias_ratio"),
 ]
-"""Options of an adjustment that override those of the project."""
+"""Options of an adjustment with precedence over the project."""
 
 
 def _listed(text: str) -> list[str]:

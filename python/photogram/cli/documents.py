@@ -178,7 +178,7 @@ class Documents:
         network, sizes
             Adjusted network with plots, Parquet files and maps, and pixels of its photos.
         plots
-            Plots by name, beside those of a network.
+            Further plots by name, in addition to the plots of a network.
         report
             Whether the text of the document is a file of the output folder.
         tables, remarks

@@ -36,7 +36,7 @@ class GiantOptions:
     components: list[Basis] | None = None
 
     def rules(self, common: Common) -> dict[str, Any]:
-        """Return the rules of an adjustment: those of 1987 on request."""
+        """Return the rules of an adjustment; on request, the rules of 1987."""
         from photogram import AsPublished
 
         if not self.as_published:

@@ -33,7 +33,6 @@ from photogram.results.exchanged_names import exchanged_names
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
-    IMAGE,
     POSITION,
     LostSupportError,
     NetworkTrial,
@@ -78,9 +77,7 @@ def snoop_collection(
             state, images = found
             core = collection_network(collection, own).trial(state, threads=core_threads(threads))
             trial.restart(core)
-            kinds, subjects = core.suspects.subjects
-            groups = np.flatnonzero((kinds == IMAGE) & np.isin(subjects, images))
-            return Aside(tuple(groups.tolist()), {}, BY_LOSSES)
+            return Aside(images, {}, BY_LOSSES)
 
         return first, trial, snooped(trial, options, afresh)
 
