@@ -8,7 +8,6 @@ import pytest
 import photogram
 from fuzz.networks import random_network
 from photogram import adjust
-from photogram.adjustment import adjustment
 
 TESTED = ("active", "rank", "statistic", "least", "residual", "redundancy", "error", "error_sd")
 SEED = 5
@@ -85,13 +84,3 @@ def test_the_adjustment_is_the_same_to_the_last_bit():
     plain, kept = adjust(block), adjust(block, covariance="verdict")
     for name in ("photo_cofactors", "point_cofactors", "redundancy", "standardized", "photo_positions"):
         np.testing.assert_array_equal(getattr(plain, name), getattr(kept, name))
-
-
-def test_results_of_medium_size_are_kept_by_default(monkeypatch):
-    block = photogram.simulate(strips=2, photos_per_strip=4, points_per_photo=40, seed=7).block
-    images = len(block.image_xy)
-    for sizes, kept in ((range(images), False), (range(images, images + 1), True)):
-        monkeypatch.setattr(adjustment, "KEPT", sizes)
-        result = adjust(block)
-        rows = np.flatnonzero(result.point_kinds == "check").tolist()
-        assert (result.state.joint(rows) is not None) is kept

@@ -54,13 +54,6 @@ AS_PUBLISHED = 4  # Default number of iterations of the 1987 program
 OF_CAMERAS = 200  # Maximum iterations with free camera parameters
 OF_KNOTS = 400  # Maximum iterations with the knots of a splined lens
 NOTABLE_RISE = 1e-3  # Percent; less is rounding
-KEPT = range(20_000, 600_001)
-"""Numbers of image observations of blocks whose results store the last linearization for the verdict.
-
-It belongs to the values before the last step. Smaller blocks are linearized again within milliseconds; larger
-ones would occupy gigabytes.
-"""
-
 TURNS = 5  # Maximum number of updates of trajectory tables by large corrections
 
 
@@ -140,8 +133,7 @@ def adjust(
     check_cameras(block)
     block = started(block)
     core, inner = with_datum(block, core, chosen.constraints)
-    medium = bool(chosen.covariance) and len(block.image_xy) in KEPT
-    keep = medium or chosen.covariance == "verdict"
+    keep = chosen.covariance == "verdict"
     result = _adjusted(block, core, processors, progress, inner, keep=keep)
     messages: list[Message] = []
     for _ in range(TURNS if block.all_trajectories else 0):

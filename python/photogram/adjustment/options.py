@@ -56,10 +56,9 @@ class AdjustOptions(Checked):
         otherwise 1.50 for `huber` and 2.55 for `cauchy`. Variance, covariances and redundancy numbers refer
         to the weights modified by the loss (`image_weights`).
     covariance
-        Whether to compute covariances, redundancy numbers and standardized residuals. A result with 20,000 to
-        600,000 image observations then stores the data for the tests of the verdict until their first use:
-        about 40 MB for 100,000 observations. `verdict`: a verdict or report will follow, so that the data are
-        stored for any number. Both require enough memory, convergence, no loss and no inner constraints.
+        Whether to compute covariances, redundancy numbers and standardized residuals. `verdict`: a verdict or
+        report will follow. The adjustment then takes about 5 % longer and stores data for the tests, if there
+        is enough memory. This requires convergence, no loss and no inner constraints.
     tolerance
         Convergence limit: largest change of an unknown, as a fraction of its standard deviation (a-priori
         unit weight). The iteration also ends if the convergence rate predicts less than a tenth of it. A step

@@ -80,11 +80,9 @@ def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
     if not np.isfinite(covariance).all():
         return math.nan, math.nan
     scale = scale_of(covariance)
-    scaled, y = covariance / (scale[:, np.newaxis] * scale), d / scale
+    scaled, y = covariance / np.outer(scale, scale), d / scale
     # The last row of the factor of C bordered by d is L^-1 d; a second elimination is unnecessary.
-    bordered = np.empty((len(d) + 1, len(d) + 1))
-    bordered[:-1, :-1], bordered[-1, :-1], bordered[:-1, -1] = scaled, y, y
-    bordered[-1, -1] = BORDER * (1.0 + y @ y)
+    bordered = np.block([[scaled, y[:, np.newaxis]], [y, np.array([[BORDER * (1.0 + y @ y)]])]])
     root = root_of(bordered)
     if root is not None:
         return float(root[-1, :-1] @ root[-1, :-1]), float(len(d))
