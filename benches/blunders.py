@@ -209,7 +209,7 @@ def large(planted: Planted, block: Block, names: set[str]) -> set[str]:
         else:
             point = block.point_ids.index(name.removeprefix("control point "))
             shift = (planted.block.point_positions - block.point_positions)[point] / block.point_sd[point]
-        r = reliability.block(group)
+        r = reliability.trial.own_block(group)
         if tests.rank[group] and shift[: len(rows)] @ r @ shift[: len(rows)] > 1.5 * reliability.lambda0(
             int(tests.rank[group])
         ):
