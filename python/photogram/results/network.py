@@ -534,12 +534,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return a table by the type of its items."""
-        import pandas as pd
-
-        from photogram.results.tables import TABLES
-        from photogram.show.quantity import frame
-
-        return pd.DataFrame(frame(TABLES[what](self)))
+        raise NotImplementedError
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""

@@ -27,13 +27,15 @@ from photogram.results.network_tables import (
 )
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
 from photogram.show.cells import unit_written
-from photogram.show.quantity import Axis, Link, Quantity, column, component, joined, long
+from photogram.show.quantity import Axis, Link, Quantity, column, component, frame, joined, long
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.findings import Tested
 from photogram.statistics.reliability import TESTABLE, minimal_detectable_error
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from photogram import Result
 
 
@@ -396,3 +398,10 @@ TABLES: dict[str, Callable[[Any], list[Quantity]]] = {
     "feature": lambda result: quantity_columns(result.features or Features(())),
     "deviation": lambda result: deviation_quantities(result.features or Features(())),
 }
+
+
+def table_frame(result: Any, what: str) -> pd.DataFrame:
+    """Return a table of a result as a data frame, by the type of its items."""
+    import pandas as pd  # slow
+
+    return pd.DataFrame(frame(TABLES[what](result)))
