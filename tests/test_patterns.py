@@ -26,6 +26,13 @@ def test_anderson_and_darling():
     assert np.mean([each.beyond[0] for each in found]) == pytest.approx(0.0455, abs=0.003)
 
 
+def test_many_values_are_tested_by_a_sample_with_the_same_level():
+    rng = np.random.default_rng(6)
+    found = [normality(rng.normal(size=100_000)) for _ in range(100)]
+    assert np.mean([each.statistic > 0.631 for each in found]) == pytest.approx(0.10, abs=0.09)
+    assert np.mean([each.statistic for each in found]) == pytest.approx(0.385, abs=0.06)
+
+
 def test_heavy_tails_and_light_ones():
     rng = np.random.default_rng(5)
     heavy = normality(rng.standard_t(3, size=2000))

@@ -7,7 +7,8 @@ and selected inverse at the adjusted values.
 from __future__ import annotations
 
 import math
-from functools import partial
+from collections.abc import Callable
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,13 +28,15 @@ LOOKED_INTO = 2_000  # Number of points with examined pairs: those with the leas
 LIMIT = 0.9  # Largest correlation of separable tests (Foerstner 1983)
 APART = 1 / (1 + LIMIT)
 """Smallest redundancy that excludes this correlation of a pair: rho^2 <= (1 - r)(1 - s) / (r s)."""
+MOST_WAITING = 1_000_000  # Groups of a network whose factor and inverse wait for a report
+
+_SHARED = ("level", "power", "known", "suspects", "tests", "standing", "downweighted")
 
 
 @dataclass(frozen=True, eq=False)
-class ReliabilitySummary:
-    level: float  # of the tests
-    power: float
-    known: bool
+class Listed:
+    """Groups of observations that reports list."""
+
     weakest: Quantities  # of each type the groups with the largest undetected effect
     two_rays: int  # points on two photos: the wrong image cannot be identified
     # Inseparable pairs of observations on other points, the most correlated first
@@ -41,11 +44,32 @@ class ReliabilitySummary:
     pairs_found: int  # number of these pairs among the examined points
     # Number of examined points: those with the least redundancy, at most `LOOKED_INTO`
     points_looked_into: int
+
+
+@dataclass(eq=False)
+class ReliabilitySummary:
+    level: float  # of the tests
+    power: float
+    known: bool
+    list_groups: Callable[[], Listed] | None  # None as soon as it was called: it holds factor and inverse
     suspects: NamedSuspects  # all groups, and their tests
     tests: Tests
     hypotheses: Hypotheses  # Errors of sets and single observations, and their effects if undetected
     standing: Standing  # sum of squares and degrees of freedom of the tested observations
     downweighted: Downweighted | None  # observations that a robust loss excludes from the tests
+
+    @cached_property
+    def listed(self) -> Listed:
+        """Groups that reports list: verdicts do not need them."""
+        list_groups = self.list_groups
+        if list_groups is None:  # Another thread has just stored them.
+            return vars(self)["listed"]
+        found = vars(self)["listed"] = list_groups()
+        self.list_groups = None
+        return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"listed": self.listed} | vars(self)
 
     @property
     def testable(self) -> Bools:
@@ -80,7 +104,7 @@ class ReliabilitySummary:
 
     def weakest_table(self, unit: str = "") -> Table:
         """Return the declared table of weakest observations in object `unit`."""
-        *columns, own_point = self.weakest
+        *columns, own_point = self.listed.weakest
         columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
         weight = "known" if self.known else "estimated"
         note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
@@ -88,12 +112,13 @@ class ReliabilitySummary:
 
     def parts(self, unit: str) -> list[Part]:
         """Return the parts of a section; `unit` is the unit of the object space."""
-        two = f"{self.two_rays} points have two images: a wrong one of these cannot be identified"
-        sentences = [two] if self.two_rays else []
-        if self.pairs:
-            more = self.pairs_found - len(self.pairs)
+        listed, sentences = self.listed, list[str]()
+        if listed.two_rays:
+            sentences.append(f"{listed.two_rays} points have two images: a wrong one cannot be identified")
+        if listed.pairs:
+            more = listed.pairs_found - len(listed.pairs)
             sentences.append("on other points cannot be told apart:")
-            sentences += [*map(str, self.pairs), *([f"and {more} more"] if more > 0 else [])]
+            sentences += [*map(str, listed.pairs), *([f"and {more} more"] if more > 0 else [])]
         sentences = sentences or ["all observations of a point can be told apart"]
         found = self.hypotheses
         errors = [found.tests(found.likely), found.external_reliability(found.effective)]
@@ -105,10 +130,10 @@ class ReliabilitySummary:
             "unit_weight": "known" if self.known else "unknown",
             "kinds": records(self.kinds_table().columns),
             "weakest": records(self.weakest_table().columns),
-            "points_on_two_photos": self.two_rays,
-            "inseparable": [members(pair, "first", "second", "correlation") for pair in self.pairs],
-            "inseparable_found": self.pairs_found,
-            "points_looked_into": self.points_looked_into,
+            "points_on_two_photos": self.listed.two_rays,
+            "inseparable": [members(pair, "first", "second", "correlation") for pair in self.listed.pairs],
+            "inseparable_found": self.listed.pairs_found,
+            "points_looked_into": self.listed.points_looked_into,
             "hypotheses": self.hypotheses.document(),
         }
 
@@ -119,24 +144,31 @@ def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: 
     `hypotheses` are errors of sets and single observations; `heights` restricts effects on own points to
     heights, because plan coordinates are angles.
     """
-    suspects, tests = found.suspects, found.tests
-    two, points = _points(suspects, tests)
+    summary = ReliabilitySummary(
+        **{name: getattr(found, name) for name in _SHARED},
+        list_groups=partial(_listed, found, heights=heights),
+        hypotheses=hypotheses,
+    )
+    if len(found.suspects) > MOST_WAITING:
+        summary.listed  # noqa: B018
+    return summary
+
+
+def _listed(found: Reliability, *, heights: bool) -> Listed:
+    tests = found.tests
+    two, points = _points(found.suspects, tests)
     checked = tests.least > TESTABLE
     pairs = found.trial.core.inseparable(points, LIMIT)
     first, second, rho = (each[checked[pairs[0]] & checked[pairs[1]]] for each in pairs)
     # Rounding does not define an order: equal values remain in the order of their numbers.
     order = np.lexsort((second, first, -np.round(rho, 9)))[:PAIRS]
     named = zip(*(each[order].tolist() for each in (first, second, rho)), strict=True)
-    return ReliabilitySummary(
-        **{name: getattr(found, name) for name in ("level", "power", "known", "standing", "downweighted")},
+    return Listed(
         weakest=_weakest(found, heights=heights),
         two_rays=two,
         pairs=tuple(found.named(*pair) for pair in named),
         pairs_found=len(rho),
         points_looked_into=len(points),
-        suspects=suspects,
-        tests=tests,
-        hypotheses=hypotheses,
     )
 
 

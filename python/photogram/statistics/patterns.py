@@ -48,8 +48,9 @@ def normality(values: Floats) -> Normality | None:
     Residuals combine the errors of many observations and look more normal than these. So acceptance proves
     little if redundancy is low. None of less than 20 values, or equal ones.
     """
-    z = np.sort(values[np.isfinite(values)])
-    z = z[:: max(1, -(-z.size // MOST))]
+    z = values[np.isfinite(values)]
+    # An odd step, so that x and y are both in the sample.
+    z = np.sort(z[:: -(-z.size // MOST) | 1])
     n = z.size
     if n < 20 or not z.std(ddof=1) > 0:
         return None

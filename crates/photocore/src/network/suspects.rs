@@ -123,7 +123,9 @@ impl Lists {
 impl Suspects {
     /// Returns the test groups of a network with `count` images and the given cameras of its photos.
     pub(super) fn new(assembled: &Assembled, count: usize, camera_of_photo: &dyn Fn(usize) -> usize) -> Self {
-        let mut all = images(assembled, count);
+        let model = &assembled.problem.model;
+        let mut all = Vec::with_capacity(model.images.len() + model.points.len() + model.observations.len());
+        all.extend(images(assembled, count));
         all.extend(of_points(assembled));
         all.extend(of_photos(assembled));
         all.extend(observations(assembled));
@@ -292,7 +294,7 @@ fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) ->
 }
 
 /// Returns groups of the active ones among `count` images, in their order.
-fn images(assembled: &Assembled, count: usize) -> Vec<Suspect> {
+fn images(assembled: &Assembled, count: usize) -> impl Iterator<Item = Suspect> {
     let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
     let groups = layout.groups();
     let mut of_image = vec![None; count];
@@ -300,7 +302,7 @@ fn images(assembled: &Assembled, count: usize) -> Vec<Suspect> {
         (images[0]..images[1])
             .for_each(|place| of_image[model.point_images.order[place]] = Some((place, point)));
     }
-    let suspect = |(image, taken): (usize, Option<(usize, usize)>)| {
+    let suspect = move |(image, taken): (usize, Option<(usize, usize)>)| {
         let (place, point) = taken?;
         let first = layout.rows() * place;
         let home = match place.checked_sub(groups) {
@@ -315,7 +317,7 @@ fn images(assembled: &Assembled, count: usize) -> Vec<Suspect> {
             rows: (0..2).map(|k| (Row::Equation(first + k), k)).collect(),
         })
     };
-    of_image.into_iter().enumerate().filter_map(suspect).collect()
+    of_image.into_iter().enumerate().filter_map(suspect)
 }
 
 fn of_points(assembled: &Assembled) -> Vec<Suspect> {
