@@ -58,6 +58,32 @@ impl Equations for Dense {
 }
 
 impl Dense {
+    /// Returns the equations of the groups of a local block as functions.
+    fn rows_of(&self, local: usize) -> Vec<Vec<(usize, f64)>> {
+        let layout = &self.layout;
+        let of_group = |group: usize| {
+            let retained = layout.retained_range(layout.retained_of(group));
+            let columns: Vec<usize> =
+                layout.local_range(local).chain(retained).chain(layout.shared_columns(group)).collect();
+            (0..layout.rows()).map(move |row| self.row_of(group * layout.rows() + row, &columns))
+        };
+        layout.groups_of(local).flat_map(of_group).collect()
+    }
+
+    /// Returns the equations of the ties of a local block as functions.
+    fn ties_of(&self, local: usize) -> Vec<Vec<(usize, f64)>> {
+        let (layout, first) = (&self.layout, self.layout.groups() * self.layout.rows());
+        let of_tie = |&tie: &u32| {
+            let columns: Vec<usize> = layout.tie_columns(tie as usize).collect();
+            layout.tie_rows(tie as usize).map(move |row| self.row_of(first + row, &columns))
+        };
+        layout.ties_of(local).iter().flat_map(of_tie).collect()
+    }
+
+    fn row_of(&self, row: usize, columns: &[usize]) -> Vec<(usize, f64)> {
+        columns.iter().map(|&column| (column, self.matrix[(row, column)])).collect()
+    }
+
     /// Fills the system with random numbers between -1 and 1, reproducible by seed.
     fn new(layout: Layout, seed: u64) -> Self {
         let mut state = seed.wrapping_mul(2).wrapping_add(1);
@@ -330,7 +356,9 @@ fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedIn
     for local in (0..layout.locals()).step_by(layout.locals().div_ceil(20).max(1)) {
         let groups = layout.groups_of(local);
         let (first, count) = (groups.start * layout.rows(), groups.len() * layout.rows());
-        let found = done(system.local_cofactors(selected, dense, &dense.prior, dense, local, &[]));
+        let (rows, ties) = (dense.rows_of(local), dense.ties_of(local));
+        let formed = [rows.clone(), ties].concat();
+        let found = done(system.local_cofactors(selected, (&formed, &dense.prior), &rows, local));
         assert_eq!(found.rows(), count);
         let group = |row: usize| row / layout.rows();
         for (k, value) in found.equations.iter().enumerate() {
@@ -546,7 +574,7 @@ fn equations_of_a_held_local_block_are_functions() {
     let dense = target(12, 30, 20);
     let (threads, system) = (threads(2), System::new(dense.layout.clone(), Ordering::Auto).unwrap());
     let factor = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::default(), &mut go));
-    let functions = system.local_functions(&dense, 7);
+    let functions = dense.rows_of(7);
     let reduced = done(system.reduce(&threads, &dense, &dense.prior, &functions, None, &mut go));
     let found = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
     let count = dense.layout.unknowns();
@@ -773,7 +801,8 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
     let options = InvertOptions::default();
     let foreign = done(system.invert(&threads(1), factor, &apart, &apart.prior, &options, &mut go)).selected;
     let (_, whole) = inverted(dense.layout.clone());
-    let refused = whole.local_cofactors(&foreign, &dense, &dense.prior, &dense, 0, &[]);
+    let rows = dense.rows_of(0);
+    let refused = whole.local_cofactors(&foreign, (&rows, &dense.prior), &rows, 0);
     assert!(matches!(refused, Err(LayoutError::Block { .. })));
 }
 

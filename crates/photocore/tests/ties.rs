@@ -363,6 +363,35 @@ fn excluded_observations_may_not_be_finite() {
 }
 
 #[test]
+fn equations_of_ties_have_the_cofactors_of_solutions() {
+    let (problem, threads) = (network(vec![]), threads());
+    let adjusted = adjust(&problem, &Options::default(), &threads, &mut go).unwrap();
+    let (values, held) = (adjusted.unknowns, adjusted.datum);
+    let leverages = Leverages::at(&problem, values.clone(), held.clone(), &threads, &mut go).unwrap();
+    let mut go_on = |_| ControlFlow::Continue(());
+    let linearized = Linearized::form(&problem, None, values, held, &threads, &mut go_on).unwrap();
+    let layout = problem.layout();
+    let ties: Vec<usize> = (0..layout.ties().len()).collect();
+    for rows in leverages.rows_of_ties(&problem, &problem.observation_sd, &ties, &threads) {
+        let dense = |row: &Vec<(usize, f64)>| {
+            let mut dense = vec![0.0; layout.unknowns()];
+            row.iter().for_each(|&(unknown, value)| dense[unknown] = value);
+            dense
+        };
+        let rights: Vec<f64> = rows.iter().flat_map(dense).collect();
+        let solved = linearized.solve_for(&problem, &rights, &threads, &mut go_on).unwrap();
+        let found = leverages.of_rows(layout, &rows).unwrap();
+        for (k, value) in found.equations.iter().enumerate() {
+            let column = &solved[k % rows.len() * layout.unknowns()..][..layout.unknowns()];
+            let expected: f64 = rows[k / rows.len()].iter().map(|&(unknown, a)| a * column[unknown]).sum();
+            assert!((value - expected).abs() < 1e-9, "{k}: {value} {expected}");
+        }
+        let widths: usize = found.blocks.iter().map(|(_, along)| along.len() / rows.len()).sum();
+        assert_eq!(widths, rows[0].len());
+    }
+}
+
+#[test]
 fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say() {
     let (problem, threads) = (network(vec![]), threads());
     let mut go_on = |_| ControlFlow::Continue(());

@@ -85,9 +85,7 @@ mod _photocore {
     #[pymodule_export]
     use crate::network::steps::{is_chord, judge_full_step, step_rules};
     #[pymodule_export]
-    use crate::network::suspects::NetworkSuspects;
-    #[pymodule_export]
-    use crate::network::trial::NetworkTrial;
+    use crate::network::trial::{NetworkSuspects, NetworkTrial};
     #[pymodule_export]
     use crate::network::{BlockError, CollectionError};
     #[pymodule_export]

@@ -10,7 +10,12 @@
 //!   combines several steps.
 //! * Chains of chords with one factor are accelerated in the same way. With N = L L^T, a chord p is computed from y = L^-1 A^T l, and
 //!   y^T y' equals p^T N p', so that no pass over the observations is required.
+//! * Steps of a trust region have a second-order term (Transtrum and Sethna 2012, "Improvements to the Levenberg-Marquardt algorithm for
+//!   nonlinear least-squares minimization"). If a combination of unknowns is determined weakly, the sum of squares has a curved valley, and
+//!   straight steps along it are short. Let r be the residuals, v the step and r_vv their second derivative along it. With
+//!   (N + damping) a = A^T r_vv, v + a/2 is accurate to second order. Finite differences suffice: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use nalgebra::DMatrix;
@@ -21,6 +26,7 @@ use super::options::{History, Iteration, NEGLIGIBLE, Phase, Stop};
 use super::result::AdjustError;
 use super::run::{Iterate, Run, between};
 use super::secants::Secants;
+use super::statistics::weighted;
 use crate::normals::{Chord, dot};
 
 /// Minimum ratio of two successive step lengths for acceleration, which continues for all later steps.
@@ -39,11 +45,72 @@ const MOST_CHORDS: usize = 40;
 /// Number of chords, and the ratio that their lengths must fall below; otherwise new normal equations are more effective.
 const LONG: usize = 10;
 const FALL: f64 = 0.5;
+/// Fraction h of the step at which residuals are compared with their linearization.
+const PART: f64 = 0.1;
+
+/// Full step after acceleration.
+pub(super) struct Accelerated<'s> {
+    /// The step, accelerated or shortened if useful, with its record.
+    pub step: Cow<'s, [f64]>,
+    pub iteration: Iteration,
+    /// Values after the step and its chords.
+    pub values: Vec<f64>,
+    /// Whether the step makes too many groups leave the layout.
+    pub outgrown: bool,
+}
 
 impl<'a> Run<'a, '_> {
+    /// Accelerates a step, and follows it by chords that lower the sum of squares `best`.
+    pub(super) fn accelerated<'s>(
+        &mut self,
+        state: &Iterate<'a>,
+        step: &'s [f64],
+        iteration: Iteration,
+        (best, stop): (f64, Stop),
+    ) -> Result<Accelerated<'s>, AdjustError> {
+        let followed = self.is_followed(state, &iteration);
+        let corrected = self.corrected(state, step, &iteration, followed);
+        let (step, iteration) = match corrected {
+            Some((own, iteration)) => (Cow::Owned(own), iteration),
+            None => (Cow::Borrowed(step), iteration),
+        };
+        let ahead = self.problem.advanced(state.values(), &step);
+        let outgrown = self.is_outgrown(&iteration, followed, &ahead);
+        let values = if followed && !outgrown {
+            let found = self.followed(state, ahead.clone(), (best, stop))?;
+            self.chord = found.as_ref().map(|&(_, length)| length);
+            found.map_or(ahead, |(values, _)| values)
+        } else {
+            self.stepped(state, ahead, &iteration)?
+        };
+        Ok(Accelerated { step, iteration, values, outgrown })
+    }
+
+    /// Returns the second-order term a of a step, and a^T (N + damping) a. The few ties are regarded as linear.
+    pub(super) fn second_order(
+        &mut self,
+        state: &Iterate<'a>,
+        step: &[f64],
+    ) -> Result<(Vec<f64>, f64), AdjustError> {
+        let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
+        let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
+        let (equations, layout) = (&state.equations, self.problem.layout());
+        let of_groups = layout.groups() * layout.rows();
+        let right = equations.transposed(self.threads, 1, |row, bend| {
+            let difference = || weighted(ahead[row.number], equations.deviation(row.number)) - row.constant;
+            bend[0] = match row.number < of_groups {
+                true => 2.0 / PART * (difference() / PART + row.change(step)),
+                false => 0.0,
+            };
+        });
+        let term = self.solve_again(state, &right)?;
+        let square = right.iter().zip(&term).map(|(right, value)| right * value).sum();
+        Ok((term, square))
+    }
+
     /// Returns an accelerated or shortened step with its iteration record, if the full step converges slowly or raises the sum of squares.
     /// None if the step is unchanged or damped. Steps followed by chords are not accelerated.
-    pub(super) fn corrected(
+    fn corrected(
         &mut self,
         state: &Iterate<'a>,
         step: &[f64],
@@ -130,7 +197,7 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Returns the values after a step, including a chord if that is useful.
-    pub(super) fn stepped(
+    fn stepped(
         &mut self,
         state: &Iterate<'a>,
         values: Vec<f64>,
@@ -165,24 +232,12 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Whether a full step is followed by chords until convergence.
-    pub(super) fn is_followed(&self, state: &Iterate<'a>, step: &Iteration) -> bool {
+    fn is_followed(&self, state: &Iterate<'a>, step: &Iteration) -> bool {
         step.damping == 0.0
             && step.largest_change < CLOSE
             && self.options.loss.is_none()
             && self.problem.model.steps_swing()
             && state.linearized.factor.has_cached()
-    }
-
-    /// Returns the values after chords from given values.
-    pub(super) fn chords(
-        &mut self,
-        state: &Iterate<'a>,
-        values: Vec<f64>,
-        above: (f64, Stop),
-    ) -> Result<Vec<f64>, AdjustError> {
-        let found = self.followed(state, values.clone(), above)?;
-        self.chord = found.as_ref().map(|&(_, length)| length);
-        Ok(found.map_or(values, |(values, _)| values))
     }
 
     /// Returns the best values of a chain of chords and the length of the chord there. None if the sum of squares at the given values is

@@ -208,16 +208,8 @@ impl<'a> Extended<'a> {
                 rows.push(self, (of, self.equations.deviation(row.number), row), first);
             });
         }
-        self.each_prior(range, |unknown, row| {
+        self.equations.each_prior(&self.terms, range, |unknown, row| {
             rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], row), first);
-        });
-    }
-
-    /// Calls `take` with each weighted unknown of a range, as an equation.
-    fn each_prior(&self, range: Range<usize>, mut take: impl FnMut(usize, &Row<'_>)) {
-        self.terms.rows_within(range, |unknown, row, constant| {
-            let (columns, coefficients): (Vec<usize>, Vec<f64>) = row.unzip();
-            take(unknown, &Row::single(constant, &columns, &coefficients));
         });
     }
 
@@ -545,7 +537,7 @@ fn retained(extended: &Extended<'_>, count: usize) -> Sums {
             add(of, extended.equations.deviation(row.number), row);
         });
     }
-    extended.each_prior(first..layout.unknowns(), |unknown, row| {
+    extended.equations.each_prior(&extended.terms, first..layout.unknowns(), |unknown, row| {
         add(EquationOf::Unknown(unknown), problem.sd[unknown], row);
     });
     sums

@@ -121,7 +121,7 @@ impl<'a> Run<'a, '_> {
 
     /// Whether a full step makes too many groups leave the layout: more than a fraction, or any after a short step. Missing columns would
     /// disturb chords and last steps.
-    fn is_outgrown(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
+    pub(super) fn is_outgrown(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
         let short = followed || step.largest_change <= SETTLED;
         let most = if short { 0 } else { self.problem.layout().groups() / FEW };
         step.damping == 0.0
@@ -178,19 +178,10 @@ impl<'a> Run<'a, '_> {
         step: &[f64],
         control: &mut StepControl,
     ) -> Next<'a> {
-        let followed = self.is_followed(&state, &iteration);
-        let corrected = self.corrected(&state, step, &iteration, followed);
-        let (given, (step, iteration)) = match &corrected {
-            Some((own, iteration)) => (step, (&own[..], *iteration)),
-            None => (step, (step, iteration)),
-        };
-        let Iteration { damping, largest_change: change, .. } = iteration;
-        let ahead = self.problem.advanced(state.values(), step);
-        let outgrown = self.is_outgrown(&iteration, followed, &ahead);
-        let trial = match followed && !outgrown {
-            true => self.chords(&state, ahead, (control.best, control.stop))?,
-            false => self.stepped(&state, ahead, &iteration)?,
-        };
+        let given = step;
+        let accelerated = self.accelerated(&state, given, iteration, (control.best, control.stop))?;
+        let (step, iteration, outgrown) = (&*accelerated.step, accelerated.iteration, accelerated.outgrown);
+        let (trial, Iteration { damping, largest_change: change, .. }) = (accelerated.values, iteration);
         let moved = if damping == 0.0 { state.moved(step) } else { vec![] };
         let unknowns = state.recycle();
         let far = change > FAR * (unknowns.len() as f64).sqrt();

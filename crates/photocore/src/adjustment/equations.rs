@@ -1,14 +1,18 @@
 //! Observation equations of a problem at given values of the unknowns, in unit weight.
 //!
-//! Changes of the observations of a group by a step.
+//! Products of their matrix A with vectors.
 
-use smallvec::SmallVec;
+use std::ops::Range;
 
 use super::loss::Reweighting;
 use super::problem::{AnyProblem, Evaluated};
+use super::terms::Terms;
 use super::walk::Buffers;
-use crate::Threads;
-use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, TieRows, dot};
+use crate::normals::{Contribution, Equations, GroupRows, Prior, TieRows};
+use crate::{Threads, parallel};
+
+/// Number of parts of the loop over local blocks, for sums that are independent of the number of threads.
+const PARTS: usize = 16;
 
 /// Equations of a problem at given values: in unit weight, reweighted by a loss, with zero columns for fixed unknowns.
 pub(super) struct ObservationEquations<'a> {
@@ -26,7 +30,7 @@ pub(super) struct ObservationEquations<'a> {
 /// Single equation of unit weight.
 #[derive(Debug)]
 pub(super) struct Row<'a> {
-    /// Its index, in the order of groups and rows, then of ties and rows.
+    /// Its index, in the order of groups and rows, then of ties and rows, then of unknowns.
     pub number: usize,
     /// Observed minus computed.
     pub constant: f64,
@@ -34,17 +38,24 @@ pub(super) struct Row<'a> {
     coefficients: [&'a [f64]; 3],
 }
 
-impl<'a> Row<'a> {
-    /// Creates an equation without a number.
-    pub fn single(constant: f64, columns: &'a [usize], coefficients: &'a [f64]) -> Self {
-        Self { number: usize::MAX, constant, columns, coefficients: [coefficients, &[], &[]] }
-    }
-
+impl Row<'_> {
     /// Returns the unknowns of the equation, with their coefficients.
     #[inline(always)]
     pub fn taken(&self) -> impl Iterator<Item = (usize, f64)> {
         let [first, second, third] = self.coefficients;
         self.columns.iter().copied().zip(first.iter().chain(second).chain(third).copied())
+    }
+
+    /// Returns the change of the equation by a step: a v.
+    #[inline(always)]
+    pub fn change(&self, step: &[f64]) -> f64 {
+        let (mut columns, mut change) = (self.columns, 0.0);
+        for part in self.coefficients {
+            let (own, others) = columns.split_at(part.len());
+            own.iter().zip(part).for_each(|(&unknown, value)| change += value * step[unknown]);
+            columns = others;
+        }
+        change
     }
 }
 
@@ -170,35 +181,106 @@ impl<'a> ObservationEquations<'a> {
         }
     }
 
-    /// Returns the decrease of the weighted sum of squares of equations and priors by a step: sum of Ax (2 l - Ax).
-    pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
-        let layout = self.problem.layout();
-        let observed = self.problem.for_locals(threads, |buffers, local| {
-            let mut sum = 0.0;
-            for group in layout.groups_of(local) {
-                let mut rows = buffers.rows(layout, group);
-                self.write(local, group, &mut rows);
-                let of_group = GroupStep::of(step, layout, local, group);
-                for row in 0..layout.rows() {
-                    let change = of_group.change(&rows, row);
-                    sum += change * (2.0 * rows.constant[row] - change);
-                }
-            }
+    /// Calls `take` with each weighted unknown of a range and its row, as an observation of itself.
+    pub fn each_prior(&self, terms: &Terms<'_>, of: Range<usize>, mut take: impl FnMut(usize, &Row<'_>)) {
+        let first = self.observation_sd.len();
+        let is_free = |unknown: usize| self.fixed.as_ref().is_none_or(|fixed| !fixed[unknown]);
+        terms.rows_within(of, |unknown, row, constant| {
+            let (columns, own): (Vec<usize>, Vec<f64>) = row.filter(|own| is_free(own.0)).unzip();
+            let coefficients = [&own[..], &[], &[]];
+            take(unknown, &Row { number: first + unknown, constant, columns: &columns, coefficients });
+        });
+    }
+
+    /// Sums over the rows of groups and of ties, in parts of consecutive rows that depend on the layout only.
+    pub fn fold_rows<T: Send>(
+        &self,
+        threads: &Threads,
+        start: impl Fn() -> T + Sync,
+        add: impl Fn(&mut T, &Row<'_>) + Sync,
+    ) -> Vec<T> {
+        let mut parts = self.problem.for_locals(threads, |buffers, locals| {
+            let mut sum = start();
+            locals.for_each(|local| self.each_row(buffers, local, |row| add(&mut sum, row)));
             sum
         });
-        let tied = self.problem.for_ties(threads, |tie, rows| {
-            self.write_tie(tie, rows);
-            let columns: SmallVec<[f64; 16]> = layout.tie_columns(tie).map(|column| step[column]).collect();
-            let rows = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len()));
-            let decrease = |(constant, coefficients): (&f64, &[f64])| {
-                let change = dot(coefficients, &columns);
-                change * (2.0 * constant - change)
-            };
-            rows.map(decrease).sum::<f64>()
+        parts.extend(self.problem.for_ties(threads, |buffers, ties| {
+            let mut sum = start();
+            ties.for_each(|tie| self.each_row_of_tie(buffers, tie, |row| add(&mut sum, row)));
+            sum
+        }));
+        parts
+    }
+
+    /// Computes A x of all equations and priors for several x: one number per x for each row, in order.
+    pub fn times(&self, threads: &Threads, terms: &Terms<'_>, xs: &[&[f64]]) -> Vec<f64> {
+        let add = |found: &mut Vec<f64>, row: &Row<'_>| found.extend(xs.iter().map(|x| row.change(x)));
+        let mut all = self.fold_rows(threads, Vec::new, add).concat();
+        all.resize(xs.len() * self.problem.equations(), 0.0);
+        self.each_prior(terms, 0..self.problem.sd.len(), |_, row| {
+            let found = &mut all[row.number * xs.len()..][..xs.len()];
+            found.iter_mut().zip(xs).for_each(|(found, x)| *found = row.change(x));
         });
+        all
+    }
+
+    /// Computes A^T z over all unknowns for `count` columns z, one after the other; `put` writes the z of a row. Bitwise identical for any
+    /// number of threads.
+    pub fn transposed(
+        &self,
+        threads: &Threads,
+        count: usize,
+        put: impl Fn(&Row<'_>, &mut [f64]) + Sync,
+    ) -> Vec<f64> {
+        let layout = self.problem.layout();
+        let (unknowns, others) = (layout.unknowns(), layout.all_locals().end);
+        let part = |part: usize| {
+            let locals = part * layout.locals() / PARTS..(part + 1) * layout.locals() / PARTS;
+            let (first, width) = (layout.local_dim() * locals.start, layout.local_dim() * locals.len());
+            let (mut own, mut shared) = (vec![0.0; count * width], vec![0.0; count * (unknowns - others)]);
+            let (mut buffers, mut z) = (Buffers::default(), vec![0.0; count]);
+            for local in locals {
+                self.each_row(&mut buffers, local, |row| {
+                    put(row, &mut z);
+                    for (column, &z) in z.iter().enumerate().filter(|&(_, &z)| z != 0.0) {
+                        row.taken().for_each(|(unknown, value)| match unknown.checked_sub(others) {
+                            None => own[column * width + unknown - first] += value * z,
+                            Some(other) => shared[column * (unknowns - others) + other] += value * z,
+                        });
+                    }
+                });
+            }
+            (first, width, own, shared)
+        };
+        let parts: Vec<_> = threads.install(|| parallel::map(PARTS, 1, part));
+        let mut rights = vec![0.0; count * unknowns];
+        for (first, width, own, shared) in parts {
+            for (column, right) in rights.chunks_exact_mut(unknowns.max(1)).enumerate() {
+                right[first..first + width].copy_from_slice(&own[column * width..][..width]);
+                let sums = &shared[column * (unknowns - others)..][..unknowns - others];
+                right[others..].iter_mut().zip(sums).for_each(|(right, sum)| *right += sum);
+            }
+        }
+        let mut z = vec![0.0; count];
+        self.each_row_of_ties(|_, row| {
+            put(row, &mut z);
+            for (right, &z) in rights.chunks_exact_mut(unknowns).zip(&z) {
+                row.taken().for_each(|(unknown, value)| right[unknown] += value * z);
+            }
+        });
+        rights
+    }
+
+    /// Returns the decrease of the weighted sum of squares of equations and priors by a step: sum of Ax (2 l - Ax).
+    pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
+        let add = |sum: &mut f64, row: &Row<'_>| {
+            let change = row.change(step);
+            *sum += change * (2.0 * row.constant - change);
+        };
+        let observed = self.fold_rows(threads, || 0.0, add);
         let priors = step.iter().zip(&prior.weight).zip(&prior.right);
         let between = prior.between.iter().map(|&(i, j, weight)| 2.0 * weight * step[i] * step[j]);
-        observed.iter().chain(&tied).sum::<f64>()
+        observed.iter().sum::<f64>()
             + priors.map(|((x, weight), right)| x * (2.0 * right - weight * x)).sum::<f64>()
             - between.sum::<f64>()
     }
@@ -312,28 +394,5 @@ fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
     let width = part.len() / rows;
     for (column, _) in fixed.enumerate().filter(|&(_, fixed)| fixed) {
         (0..rows).for_each(|row| part[row * width + column] = 0.0);
-    }
-}
-
-/// Changes of the unknowns of one group by a step.
-pub(super) struct GroupStep<'s> {
-    pub local: &'s [f64],
-    pub retained: &'s [f64],
-    pub shared: Vec<f64>,
-}
-
-impl<'s> GroupStep<'s> {
-    pub fn of(step: &'s [f64], layout: &Layout, local: usize, group: usize) -> Self {
-        Self {
-            local: &step[layout.local_range(local)],
-            retained: &step[layout.retained_range(layout.retained_of(group))],
-            shared: layout.shared_columns(group).map(|unknown| step[unknown]).collect(),
-        }
-    }
-
-    /// Returns the change of a row of the group: A v.
-    pub fn change(&self, rows: &GroupRows<'_>, row: usize) -> f64 {
-        let part = |values: &[f64], step: &[f64]| dot(&values[row * step.len()..][..step.len()], step);
-        part(rows.local, self.local) + part(rows.retained, self.retained) + part(rows.shared, &self.shared)
     }
 }

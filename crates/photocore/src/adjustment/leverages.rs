@@ -129,7 +129,7 @@ impl Leverages {
     }
 
     /// Returns the cofactors of all equations of some local blocks, for given standard deviations. `terms` returns the prior equations of
-    /// the weighted unknowns of a block (see [`crate::normals::System::local_cofactors`]).
+    /// the weighted unknowns of a block.
     ///
     /// # Errors
     /// The problem has another layout.
@@ -138,15 +138,19 @@ impl Leverages {
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         locals: &[usize],
-        terms: impl Fn(usize) -> Vec<f64> + Sync,
+        terms: impl Fn(usize) -> Vec<Function> + Sync,
         threads: &Threads,
     ) -> Result<Vec<LocalCofactors>, AdjustError> {
-        let (formed, asked, prior) = self.equations(problem, observation_sd, threads);
+        let (formed, prior) = (self.equations(problem, threads), self.prior(problem));
         let same = std::ptr::eq(observation_sd, &problem.observation_sd[..]);
-        let asked = if same { &formed } else { &asked };
+        let other = (!same).then(|| self.equations(problem, threads).with_deviations(observation_sd));
         let of = |&local: &usize| {
-            let own_terms = terms(local);
-            problem.system.local_cofactors(&self.selected, &formed, &prior, asked, local, &own_terms)
+            let (of_groups, of_ties) = rows_of_local(&formed, local);
+            let mut rows =
+                other.as_ref().map_or_else(|| of_groups.clone(), |asked| rows_of_local(asked, local).0);
+            rows.extend(terms(local));
+            let formed = [of_groups, of_ties].concat();
+            problem.system.local_cofactors(&self.selected, (&formed, &prior), &rows, local)
         };
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
         Ok(found.into_iter().collect::<Result<_, _>>()?)
@@ -164,7 +168,7 @@ impl Leverages {
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         locals: &[usize],
-        (terms, limit): (impl Fn(usize) -> Vec<f64> + Sync, f64),
+        (terms, limit): (impl Fn(usize) -> Vec<Function> + Sync, f64),
         threads: &Threads,
     ) -> Result<Vec<LocalCofactors>, AdjustError> {
         let mut found = self.of_locals(problem, observation_sd, locals, terms, threads)?;
@@ -191,13 +195,12 @@ impl Leverages {
         if chosen.is_empty() {
             return Ok(());
         }
-        let (_, asked, _) = self.equations(problem, observation_sd, threads);
+        let asked = self.equations(problem, threads).with_deviations(observation_sd);
         let (formed, mut on) = (self.linearized(problem, threads)?, |_| ControlFlow::Continue(()));
         for (place, local, chosen) in chosen {
             let own = &mut found[place];
-            let mut functions = problem.system.local_functions(&asked, local);
-            let mut number = 0..;
-            functions.retain(|_| number.next().is_some_and(|row| chosen.binary_search(&row).is_ok()));
+            let (rows_of_groups, _) = rows_of_local(&asked, local);
+            let functions: Vec<Function> = chosen.iter().map(|&row| rows_of_groups[row].clone()).collect();
             let cofactors = match formed.cofactors(problem, &functions, None, None, threads, &mut on) {
                 Err(CofactorError::Adjust(error)) => return Err(error),
                 found => found.unwrap_or_default(),
@@ -231,20 +234,22 @@ impl Leverages {
         problem: &AnyProblem<'_>,
         (observation_sd, sd): (&[f64], &[f64]),
         locals: &[usize],
-        terms: impl Fn(usize) -> Vec<f64> + Sync,
+        terms: impl Fn(usize) -> Vec<Function> + Sync,
         threads: &Threads,
     ) -> Result<Vec<Vec<f64>>, AdjustError> {
         let layout = problem.layout();
         let unknowns = || locals.iter().flat_map(|&local| layout.local_range(local));
-        let (_, asked, mut prior) = self.equations(problem, observation_sd, threads);
-        let asked = asked.with_unknowns(unknowns(), sd);
+        let asked = self.equations(problem, threads).with_deviations(observation_sd);
+        let (asked, mut prior) = (asked.with_unknowns(unknowns(), sd), self.prior(problem));
         for unknown in unknowns() {
             let own = sd[unknown];
             prior.weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
         }
         let of = |&local: &usize| {
-            let own_terms = terms(local);
-            problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &own_terms)
+            let (of_groups, of_ties) = rows_of_local(&asked, local);
+            let rows = [of_groups.clone(), terms(local)].concat();
+            let formed = [of_groups, of_ties].concat();
+            problem.system.local_cofactors(&self.selected, (&formed, &prior), &rows, local)
         };
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
         let mut found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -267,7 +272,10 @@ impl Leverages {
         ties: &[usize],
         threads: &Threads,
     ) -> Vec<Vec<Function>> {
-        let (_, asked, _) = self.equations(problem, observation_sd, threads);
+        if ties.is_empty() {
+            return vec![];
+        }
+        let asked = self.equations(problem, threads).with_deviations(observation_sd);
         let mut buffers = Buffers::default();
         let mut of_tie = |&tie: &usize| {
             let mut rows = vec![];
@@ -320,20 +328,24 @@ impl Leverages {
         })
     }
 
-    /// Returns the included equations, the requested equations and the priors.
-    fn equations<'a>(
-        &self,
-        problem: &'a AnyProblem<'a>,
-        observation_sd: &'a [f64],
-        threads: &Threads,
-    ) -> (ObservationEquations<'a>, ObservationEquations<'a>, Prior) {
-        let at = || ObservationEquations::new(problem, None, &self.values, &self.held, threads);
-        (
-            at(),
-            at().with_deviations(observation_sd),
-            problem.prior_equations(&problem.terms(&self.values), &self.held),
-        )
+    /// Returns the equations at these values.
+    fn equations<'a>(&self, problem: &'a AnyProblem<'a>, threads: &Threads) -> ObservationEquations<'a> {
+        ObservationEquations::new(problem, None, &self.values, &self.held, threads)
     }
+
+    fn prior(&self, problem: &AnyProblem<'_>) -> Prior {
+        problem.prior_equations(&problem.terms(&self.values), &self.held)
+    }
+}
+
+/// Returns the equations of the groups and of the ties of a local block.
+fn rows_of_local(equations: &ObservationEquations<'_>, local: usize) -> (Vec<Function>, Vec<Function>) {
+    let (mut of_groups, mut of_ties, mut buffers) = (vec![], vec![], Buffers::default());
+    equations.each_row(&mut buffers, local, |row| of_groups.push(row.taken().collect()));
+    for &tie in equations.problem().layout().ties_of(local) {
+        equations.each_row_of_tie(&mut buffers, tie as usize, |row| of_ties.push(row.taken().collect()));
+    }
+    (of_groups, of_ties)
 }
 
 /// Returns the rows of groups of a fixed local block whose residuals may have correlations above a limit.

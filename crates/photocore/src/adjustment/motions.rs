@@ -11,7 +11,6 @@ use faer::{Mat, Side};
 use super::equations::{ObservationEquations, Row};
 use super::problem::{AnyProblem, Motions};
 use super::walk::Buffers;
-use crate::normals::{Equations, TieRows};
 use crate::{Threads, parallel};
 
 /// Free combinations of motions at some values of the unknowns.
@@ -126,25 +125,23 @@ impl<'a> Candidates<'a> {
         &self,
         sums: &mut Sums,
         equations: &ObservationEquations<'_>,
+        buffers: &mut Buffers,
         tie: usize,
-        rows: &mut TieRows<'_>,
     ) {
-        equations.write_tie(tie, rows);
         let layout = equations.problem().layout();
         let carried = equations.at().carried(tie);
         let first = layout.groups() * layout.rows() + layout.tie_rows(tie).start;
-        let width = layout.tie_columns(tie).count();
-        for (k, row) in rows.coefficients.chunks_exact(width.max(1)).enumerate() {
+        equations.each_row_of_tie(buffers, tie, |row| {
             sums.along.fill([0.0; LANES]);
             if let Some((motion, carried)) = &carried {
                 let along = sums.along.as_flattened_mut()[*motion..].iter_mut();
-                let sd = equations.deviation(first + k);
+                let sd = equations.deviation(row.number);
                 if sd.is_finite() {
-                    along.zip(&carried[k]).for_each(|(along, by)| *along = by / sd);
+                    along.zip(&carried[row.number - first]).for_each(|(along, by)| *along = by / sd);
                 }
             }
-            self.add_to_row(sums, layout.tie_columns(tie).zip(row.iter().copied()));
-        }
+            self.add_to_row(sums, row.taken());
+        });
     }
 
     /// Adds a row to the current changes in `sums.along`.
@@ -258,7 +255,10 @@ impl AnyProblem<'_> {
             .iter()
             .for_each(|part| sums.add(part));
         sums.multiply(stride as f64);
-        self.each_tie(|tie, rows| candidates.add_tie(&mut sums, &equations, tie, rows));
+        let mut buffers = Buffers::default();
+        for tie in 0..layout.ties().len() {
+            candidates.add_tie(&mut sums, &equations, &mut buffers, tie);
+        }
         for term in
             self.terms(values).within(0..values.len()).filter(|term| term.unknowns().all(|i| stays(&i)))
         {
@@ -332,9 +332,9 @@ impl AnyProblem<'_> {
                 equations.each_row(&mut buffers, local, |row| candidates.add_row(groups, row.taken()));
             }
         }
-        self.each_tie(|tie, rows| {
-            candidates.add_tie(&mut sums[classes.of_ties[tie]], &equations, tie, rows);
-        });
+        for (tie, &class) in classes.of_ties.iter().enumerate() {
+            candidates.add_tie(&mut sums[class], &equations, &mut buffers, tie);
+        }
         let mut observed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
         self.terms(values).within(0..values.len()).for_each(|term| observed[term.unknowns()].fill(true));
         let mut shares: Vec<f64> = sums.iter().map(|own| own.share(count)).collect();

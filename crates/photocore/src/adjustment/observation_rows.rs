@@ -1,6 +1,6 @@
 //! Sparse rows of unit weight for all observation equations.
 
-use super::equations::ObservationEquations;
+use super::equations::{ObservationEquations, Row};
 use super::problem::AnyProblem;
 use crate::{Threads, parallel};
 
@@ -18,20 +18,16 @@ impl ObservationRows {
     /// Creates the rows at given values, without columns of fixed or constrained unknowns.
     pub fn new(problem: &AnyProblem<'_>, values: &[f64], held: &[usize], threads: &Threads) -> Self {
         let equations = ObservationEquations::new(problem, None, values, held, threads);
-        let of_locals = problem.for_locals(threads, |buffers, local| {
-            let mut found = Self::empty();
-            equations.each_row(buffers, local, |row| found.push(row.taken(), row.constant));
-            found
-        });
+        let add = |found: &mut Self, row: &Row<'_>| found.push(row.taken(), row.constant);
         let mut all = Self::empty();
-        of_locals.into_iter().for_each(|part| all.append(part));
-        equations.each_row_of_ties(|_, row| all.push(row.taken(), row.constant));
-        let terms = problem.terms(values);
-        let fixed = problem.fixed(held);
-        for unknown in 0..values.len() {
-            let (row, constant) = terms.row(unknown);
-            all.push(row.into_iter().filter(|&(column, _)| !fixed[column]), constant);
-        }
+        equations.fold_rows(threads, Self::empty, add).into_iter().for_each(|part| all.append(part));
+        equations.each_prior(&problem.terms(values), 0..values.len(), |_, row| {
+            all.starts.resize(row.number + 1, all.unknowns.len());
+            all.constants.resize(row.number, 0.0);
+            add(&mut all, row);
+        });
+        all.starts.resize(problem.equations() + 1, all.unknowns.len());
+        all.constants.resize(problem.equations(), 0.0);
         all
     }
 
@@ -44,19 +40,8 @@ impl ObservationRows {
         threads: &Threads,
     ) -> Vec<f64> {
         let equations = ObservationEquations::new(problem, None, values, held, threads);
-        let of_locals = problem.for_locals(threads, |buffers, local| {
-            let mut found = vec![];
-            equations.each_row(buffers, local, |row| multiply(row.taken(), xs, &mut found));
-            found
-        });
-        let mut all = of_locals.concat();
-        equations.each_row_of_ties(|_, row| multiply(row.taken(), xs, &mut all));
-        let (terms, fixed) = (problem.terms(values), problem.fixed(held));
-        for unknown in 0..values.len() {
-            let (row, _) = terms.row(unknown);
-            multiply(row.into_iter().filter(|&(column, _)| !fixed[column]), xs, &mut all);
-        }
-        all
+        let xs: Vec<&[f64]> = xs.iter().map(Vec::as_slice).collect();
+        equations.times(threads, &problem.terms(values), &xs)
     }
 
     fn empty() -> Self {
@@ -105,14 +90,5 @@ impl ObservationRows {
         let mut right = vec![0.0; unknowns];
         self.row(row).for_each(|(unknown, value)| right[unknown] += value);
         right
-    }
-}
-
-/// Appends the products of a row with each x.
-fn multiply(row: impl Iterator<Item = (usize, f64)>, xs: &[Vec<f64>], found: &mut Vec<f64>) {
-    let start = found.len();
-    found.resize(start + xs.len(), 0.0);
-    for (unknown, value) in row {
-        found[start..].iter_mut().zip(xs).for_each(|(sum, x)| *sum += value * x[unknown]);
     }
 }

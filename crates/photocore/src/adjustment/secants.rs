@@ -90,21 +90,11 @@ impl ObservationEquations<'_> {
             });
             changes
         };
-        let observed = self.problem().for_stretches(threads, |buffers, locals| {
-            let mut sum = zeros();
-            for local in locals {
-                self.each_row(buffers, local, |row| {
-                    let own = changes(&mut row.taken());
-                    add(&mut sum, 1.0, &own, &own);
-                });
-            }
-            sum
+        let observed = self.fold_rows(threads, zeros, |sum, row| {
+            let own = changes(&mut row.taken());
+            add(sum, 1.0, &own, &own);
         });
         let mut sum = observed.into_iter().fold(zeros(), |sum, part| sum + part);
-        self.each_row_of_ties(|_, row| {
-            let own = changes(&mut row.taken());
-            add(&mut sum, 1.0, &own, &own);
-        });
         for (unknown, &weight) in prior.weight.iter().enumerate().filter(|&(_, &weight)| weight != 0.0) {
             let own = of_unknown(unknown);
             add(&mut sum, weight, own, own);

@@ -3,8 +3,6 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use smallvec::SmallVec;
-
 use super::loss::Loss;
 use super::problem::{AnyProblem, Evaluated, Problem};
 use super::terms::weighted_among;
@@ -138,7 +136,7 @@ impl AnyProblem<'_> {
     pub(super) fn residuals_at(&self, threads: &Threads, at: &dyn Evaluated) -> Vec<f64> {
         let layout = self.layout();
         let rows = layout.rows();
-        let by_stretch = self.for_stretches(threads, |buffers, locals| {
+        let by_stretch = self.for_locals(threads, |buffers, locals| {
             let groups = layout.groups_of(locals.start).start..layout.groups_of(locals.end - 1).end;
             let mut residuals = vec![0.0; groups.len() * rows];
             let mut own = residuals.chunks_exact_mut(rows.max(1));
@@ -153,12 +151,17 @@ impl AnyProblem<'_> {
             }
             residuals
         });
-        let by_tie = self.for_ties(threads, |tie, rows| {
-            at.observe_tie(tie, rows);
-            SmallVec::<[f64; 3]>::from_slice(rows.constant)
+        let by_tie = self.for_ties(threads, |buffers, ties| {
+            let mut residuals = vec![];
+            for tie in ties {
+                let mut rows = buffers.tie.rows(layout, tie);
+                at.observe_tie(tie, &mut rows);
+                residuals.extend_from_slice(rows.constant);
+            }
+            residuals
         });
         let mut residuals = by_stretch.concat();
-        by_tie.iter().for_each(|of_tie| residuals.extend_from_slice(of_tie));
+        residuals.extend(by_tie.concat());
         residuals
     }
 }

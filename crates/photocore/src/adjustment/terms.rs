@@ -40,12 +40,8 @@ impl<'a> Terms<'a> {
         })
     }
 
-    /// Calls `take` for each weighted unknown, ascending, with its row: (unknown, coefficients of unknowns, observed minus computed).
-    pub fn each_row(&self, take: impl FnMut(usize, &mut dyn Iterator<Item = (usize, f64)>, f64)) {
-        self.rows_within(0..self.sd.len(), take);
-    }
-
-    /// Calls `take` for the rows of terms whose first unknown is in a range.
+    /// Calls `take` for each weighted unknown of terms whose first unknown is in a range, ascending, with its row: (unknown, coefficients
+    /// of unknowns, observed minus computed).
     pub fn rows_within(
         &self,
         of: Range<usize>,

@@ -1,22 +1,10 @@
 //! Levenberg-Marquardt method with damping by the gain ratio of actual to predicted decrease (Nielsen 1999; Madsen, Nielsen and Tingleff
 //! 2004, section 3.2).
-//!
-//! Geodesic acceleration: second-order term of a step (Transtrum and Sethna 2012, "Improvements to the Levenberg-Marquardt algorithm for
-//! nonlinear least-squares minimization").
-//!
-//! If a combination of unknowns is determined weakly, the sum of squares has a curved valley, and straight steps along it are short. Let r
-//! be the residuals, v the step and r_vv their second derivative along it. With (N + damping) a = A^T r_vv, v + a/2 is accurate to second
-//! order. Finite differences suffice: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
 
-use super::equations::{GroupStep, ObservationEquations};
 use super::options::{FIRST_DAMPING, Iteration, Status, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;
 use super::run::{End, Iterate, Run};
-use super::statistics::weighted;
-use super::walk::Buffers;
-use crate::normals::Equations;
-use crate::{Threads, parallel};
 
 /// Minimum damping; with less, the seven null pivots of a network without datum would be rounding errors.
 const LEAST_DAMPING: f64 = 1e-10;
@@ -115,7 +103,9 @@ impl<'a> Run<'a, '_> {
             };
             let (unknowns, trial) = self.trial(state, &step, lowest, damping.bends)?;
             let whole = used <= FIRST_DAMPING;
-            let last = whole && (stop.at_change(trial.change) || stop.at_decrease(trial.predicted, lowest));
+            let rounding = trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE);
+            let last = whole
+                && (stop.at_change(trial.change) || stop.at_decrease(trial.predicted, lowest) || rounding);
             let gain = trial.gain(lowest);
             damping.bends &= trial.bend.is_none_or(|bend| bend > STRAIGHT);
             damping.bends |=
@@ -135,7 +125,7 @@ impl<'a> Run<'a, '_> {
                     return self.rest_in_valley(trial.unknowns, Status::Converged);
                 }
                 state = self.formed(trial.unknowns, trial.at, damping.value)?;
-            } else if last || trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
+            } else if last || rounding {
                 return self.rest(unknowns, Status::Converged);
             } else {
                 damping.rise();
@@ -178,16 +168,6 @@ impl<'a> Run<'a, '_> {
             }
         };
         Ok((before, found))
-    }
-
-    /// Returns the second-order term a of a step, and a^T (N + damping) a.
-    fn second_order(&mut self, state: &Iterate<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
-        let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
-        let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
-        let right = state.equations.bending(self.threads, &ahead, step);
-        let term = self.solve_again(state, &right)?;
-        let square = right.iter().zip(&term).map(|(right, value)| right * value).sum();
-        Ok((term, square))
     }
 
     fn is_network(&self) -> bool {
@@ -263,66 +243,4 @@ impl<'a> Run<'a, '_> {
         let end = self.stay(state, status)?;
         Ok(End { status, ..end })
     }
-}
-
-/// Fraction h of the step at which residuals are compared with their linearization.
-pub(super) const PART: f64 = 0.1;
-/// Maximum number of separately summed parts, for identical results with any number of threads.
-const PARTS: usize = 64;
-/// Minimum number of local blocks in a part.
-const AT_LEAST: usize = 64;
-
-impl ObservationEquations<'_> {
-    /// Returns A^T r_vv over all unknowns; the few ties are regarded as linear.
-    ///
-    /// * `ahead`: r(x + h v), in the units of the observations.
-    pub fn bending(&self, threads: &Threads, ahead: &[f64], step: &[f64]) -> Vec<f64> {
-        let problem = self.problem();
-        let layout = problem.layout();
-        let first = layout.all_locals().end;
-        let each = layout.locals().div_ceil(PARTS).max(AT_LEAST);
-        let part = |start: usize| {
-            let locals = start..(start + each).min(layout.locals());
-            let mut own = Vec::with_capacity(locals.len() * layout.local_dim());
-            let mut others = vec![0.0; layout.unknowns() - first];
-            let mut buffers = Buffers::default();
-            for local in locals {
-                let begin = own.len();
-                own.resize(begin + layout.local_dim(), 0.0);
-                for group in layout.groups_of(local) {
-                    let mut rows = buffers.rows(layout, group);
-                    self.write(local, group, &mut rows);
-                    let of_group = GroupStep::of(step, layout, local, group);
-                    let retained = layout.retained_range(layout.retained_of(group)).start - first;
-                    for row in 0..layout.rows() {
-                        let observation = group * layout.rows() + row;
-                        let difference =
-                            weighted(ahead[observation], self.deviation(observation)) - rows.constant[row];
-                        let bend = 2.0 / PART * (difference / PART + of_group.change(&rows, row));
-                        add_row(&mut own[begin..], rows.local, row, of_group.local.len(), bend);
-                        add_row(&mut others[retained..], rows.retained, row, of_group.retained.len(), bend);
-                        let shared = &rows.shared[row * of_group.shared.len()..];
-                        let columns = layout.shared_columns(group);
-                        columns.zip(shared).for_each(|(k, a)| others[k - first] += a * bend);
-                    }
-                }
-            }
-            (own, others)
-        };
-        let starts: Vec<usize> = (0..layout.locals()).step_by(each).collect();
-        let found: Vec<(Vec<f64>, Vec<f64>)> = threads.install(|| parallel::map_each(starts, &part));
-        let mut right = Vec::with_capacity(layout.unknowns());
-        found.iter().for_each(|(own, _)| right.extend_from_slice(own));
-        right.resize(layout.unknowns(), 0.0);
-        for (_, others) in &found {
-            right[first..].iter_mut().zip(others).for_each(|(sum, value)| *sum += value);
-        }
-        right
-    }
-}
-
-/// Adds `factor` times a row of `width` coefficients to the target.
-fn add_row(target: &mut [f64], rows: &[f64], row: usize, width: usize, factor: f64) {
-    let row = &rows[row * width..][..width];
-    target.iter_mut().zip(row).for_each(|(sum, a)| *sum += a * factor);
 }

@@ -79,8 +79,10 @@ impl Tests {
             let of_suspects = [&mut statistic, &mut least, &mut shared];
             Part {
                 of_suspects: of_suspects.map(|chunks| chunks.next().unwrap_or_default()),
-                of_rows: of_rows.each_mut().map(|rest| taken(rest, rows)),
-                cofactors: taken(&mut cofactors, block_starts[last] - block_starts[first]),
+                of_rows: of_rows.each_mut().map(|rest| rest.split_off_mut(..rows).unwrap_or_default()),
+                cofactors: cofactors
+                    .split_off_mut(..block_starts[last] - block_starts[first])
+                    .unwrap_or_default(),
                 active,
                 rank,
             }
@@ -92,23 +94,18 @@ impl Tests {
 impl Part<'_> {
     /// Writes the test of the next group with `size` rows.
     fn put(&mut self, size: usize, tested: Option<Tested>) {
-        let (active, rank) = (taken(&mut self.active, 1), taken(&mut self.rank, 1));
-        let own = self.of_suspects.each_mut().map(|rest| taken(rest, 1));
-        let rows = self.of_rows.each_mut().map(|rest| taken(rest, size));
-        let block = taken(&mut self.cofactors, size * size);
+        let (active, rank) = (self.active.split_off_first_mut(), self.rank.split_off_first_mut());
+        let own = self.of_suspects.each_mut().map(|rest| rest.split_off_first_mut());
+        let rows = self.of_rows.each_mut().map(|rest| rest.split_off_mut(..size).unwrap_or_default());
+        let block = self.cofactors.split_off_mut(..size * size).unwrap_or_default();
         let Some(Tested { test, residual, cofactors, error, error_sd }) = tested else { return };
-        (active[0], rank[0]) = (true, test.rank);
-        own.into_iter().zip([test.statistic, test.least, test.shared]).for_each(|(to, value)| to[0] = value);
+        active.into_iter().for_each(|to| *to = true);
+        rank.into_iter().for_each(|to| *to = test.rank);
+        let of_test = [test.statistic, test.least, test.shared];
+        own.into_iter().zip(of_test).for_each(|(to, value)| to.into_iter().for_each(|to| *to = value));
         rows.into_iter().zip([residual, error, error_sd]).for_each(|(to, own)| to.copy_from_slice(&own));
         block.copy_from_slice(&cofactors);
     }
-}
-
-/// Splits the first elements off a slice, which then begins behind them.
-fn taken<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let (first, others) = std::mem::take(rest).split_at_mut(count);
-    *rest = others;
-    first
 }
 
 /// Test of one group, in its units.

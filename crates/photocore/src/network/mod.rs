@@ -16,7 +16,7 @@
 //! | results | `groups`, `covariance`, `solution`, `visibility`, `weak_points`, `adjusted` |
 //! | trials without some observations | `trial`, `suspects` |
 //! | exclusion of points and photos | `screens` |
-//! | problem of least squares | `naming`, `datum`, `problem`, `layout`, `bundle`, `cameras`, `station_values` |
+//! | problem of least squares | `naming`, `datum`, `problem`, `layout`, `bundle`, `station_values` |
 //! | values and equations at given parameters | `evaluated`, `rigid_motions`, `diverging`, `passing`, `composed`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
 //! | unknowns | `model`, `blocks`, `stations` |
 //! | selection of the input | `check`, `selection`, `neighbourhood` |
@@ -63,7 +63,6 @@ mod adjusted;
 mod blocks;
 mod bundle;
 mod camera_priors;
-mod cameras;
 mod check;
 pub mod commons;
 mod composed;

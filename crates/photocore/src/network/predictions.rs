@@ -9,7 +9,7 @@ use super::group_tests::{in_units, misclosure, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
 use crate::adjustment::{Leverages, RowCofactors, Terms};
-use crate::normals::{LocalCofactors, dot};
+use crate::normals::{Function, LocalCofactors, dot};
 use crate::{Threads, parallel};
 
 /// Minimum number of points per thread.
@@ -212,11 +212,10 @@ impl Trial {
     }
 
     /// Returns the equations of observed coordinates of a local point.
-    fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<f64> {
+    fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<Function> {
         let mut own = self.on_place(place).iter().map(|&index| &self.suspects.all[index]);
-        let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
-        let rows = self.term_rows(suspect, terms).unwrap_or_default();
-        rows.into_iter().flatten().map(|(_, coefficient)| coefficient).collect()
+        let control = own.find(|suspect| matches!(suspect.home, Home::Point(_)));
+        control.and_then(|control| self.term_rows(control, terms).ok()).unwrap_or_default()
     }
 
     /// Returns the equation index of each row of the groups at a local point, and its whitened misclosure.

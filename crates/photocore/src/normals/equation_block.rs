@@ -1,15 +1,13 @@
 //! Joint cofactors of the equations of one local block, from the selected inverse.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use super::batch::TieSums;
-use super::equations::{Equations, GroupRows, Prior, TieBuffer};
+use super::equations::Prior;
 use super::functions::Function;
-use super::layout::LayoutError;
+use super::layout::{Layout, LayoutError};
 use super::panels::SelectedInverse;
 use super::system::System;
 
@@ -17,8 +15,51 @@ use super::system::System;
 struct Own {
     local: Mat<f64>,
     others: Mat<f64>,
-    /// First column in B of each other block.
-    blocks: BTreeMap<usize, usize>,
+}
+
+/// First column in B of each retained block.
+type Blocks = BTreeMap<usize, usize>;
+
+impl Own {
+    /// Returns the retained blocks of some rows.
+    fn blocks(layout: &Layout, rows: &[Function]) -> Blocks {
+        let (first, mut last, mut blocks) = (layout.all_locals().end, 0..0, Blocks::new());
+        for &(unknown, _) in rows.iter().flatten().filter(|own| own.0 >= first) {
+            if !last.contains(&unknown) {
+                let block = layout.retained_with(unknown);
+                last = layout.retained_range(block);
+                blocks.insert(block, 0);
+            }
+        }
+        let mut width = 0;
+        for (&block, first) in &mut blocks {
+            *first = width;
+            width += layout.retained_dim(block);
+        }
+        blocks
+    }
+
+    fn new(layout: &Layout, rows: &[Function], local: usize, blocks: &Blocks) -> Self {
+        let range = layout.local_range(local);
+        let width = blocks.keys().map(|&block| layout.retained_dim(block)).sum();
+        let mut own =
+            Self { local: Mat::zeros(rows.len(), range.len()), others: Mat::zeros(rows.len(), width) };
+        let (mut last, mut first) = (0..0, 0);
+        for (i, row) in rows.iter().enumerate() {
+            for &(unknown, value) in row {
+                if range.contains(&unknown) {
+                    own.local[(i, unknown - range.start)] = value;
+                    continue;
+                }
+                if !last.contains(&unknown) {
+                    let block = layout.retained_with(unknown);
+                    (last, first) = (layout.retained_range(block), blocks[&block]);
+                }
+                own.others[(i, first + unknown - last.start)] = value;
+            }
+        }
+        own
+    }
 }
 
 /// Cofactors of equations a of one local block, included or excluded, with the inverse normal matrix Q.
@@ -48,51 +89,39 @@ impl LocalCofactors {
 }
 
 impl System {
-    /// Computes the cofactors of the equations of a local block: its groups and rows, then additional equations of its own unknowns. NaN if
-    /// the local block is undetermined.
+    /// Computes the cofactors of equations of a local block: rows of its groups, then of its unknowns alone. NaN if the local block is
+    /// undetermined.
     ///
     /// The diagonal is also in [`super::Cofactors::equations`]; here, cofactors between x and y of an image point, or between all
     /// observations of a point, are added. Q_oo is the inverse over all coupled blocks, H = N_ll^-1 N_lo and C = B - A H. Then a Q a^T = C
     /// Q_oo C^T + A N_ll^-1 A^T. Q a^T is Q_oo C^T for the others, N_ll^-1 A^T - H Q_oo C^T for the local block.
     ///
-    /// * `equations`, `prior`: equations and priors of the inverse;
-    /// * `asked`: equations with requested cofactors, possibly with other weights;
-    /// * `terms`: coefficients of additional equations of the local unknowns, one equation after the other.
+    /// * `formed`, `prior`: all equations of the local block in the inverse, with those of its ties, and the priors;
+    /// * `asked`: equations with requested cofactors, possibly with other weights.
     ///
     /// # Errors
     /// [`LayoutError::Block`] or [`LayoutError::Length`] if the inverse or the priors belong to another system.
     pub fn local_cofactors(
         &self,
         selected: &SelectedInverse,
-        equations: &dyn Equations,
-        prior: &Prior,
-        asked: &dyn Equations,
+        (formed, prior): (&[Function], &Prior),
+        asked: &[Function],
         local: usize,
-        terms: &[f64],
     ) -> Result<LocalCofactors, LayoutError> {
         prior.check(&self.layout)?;
-        let groups = self.layout.groups_of(local);
         if self.layout.stands_apart(local) {
-            return self.cofactors_apart(selected, asked, local, groups, terms.len());
+            return self.cofactors_apart(selected, asked, local);
         }
-        let observed = groups.len() * self.layout.rows();
-        // The same equations are formed once.
-        let formed = (!std::ptr::addr_eq(equations, asked))
-            .then(|| self.own_equations(equations, local, groups.clone(), &[]));
-        let Own { local: a, others: b, blocks } = self.own_equations(asked, local, groups, terms);
+        let blocks = Own::blocks(&self.layout, asked);
+        let formed = Own::new(&self.layout, formed, local, &blocks);
+        let Own { local: a, others: b } = Own::new(&self.layout, asked, local, &blocks);
         let (rows, dim) = (a.nrows(), a.ncols());
-        let (formed_local, formed_others) = match &formed {
-            Some(own) => (own.local.as_ref(), own.others.as_ref()),
-            None => (a.subrows(0, observed), b.subrows(0, observed)),
-        };
-        let mut normal = formed_local.transpose() * formed_local;
-        let of_ties = TieSums::of(equations, &self.layout, local, &mut TieBuffer::default()).normal;
-        (0..dim * dim).for_each(|k| normal[(k / dim, k % dim)] += of_ties[k / dim][k % dim]);
+        let mut normal = formed.local.transpose() * &formed.local;
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
         let Ok(factor) = normal.llt(Side::Lower) else {
             return Ok(LocalCofactors::unknown(dim, rows, &blocks));
         };
-        let coupling = factor.solve(formed_local.transpose() * formed_others);
+        let coupling = factor.solve(formed.local.transpose() * &formed.others);
         let by_local = factor.solve(a.transpose());
         let c = &b - &a * &coupling;
         let others = selected.over(blocks.keys().copied())? * c.transpose();
@@ -111,22 +140,21 @@ impl System {
         })
     }
 
-    /// Computes the cofactors of a fixed local block, group by group; the cofactors of `terms` additional coefficients are zero.
+    /// Computes the cofactors of a fixed local block, group by group; those of other equations are zero.
     fn cofactors_apart(
         &self,
         selected: &SelectedInverse,
-        asked: &dyn Equations,
+        asked: &[Function],
         local: usize,
-        groups: Range<usize>,
-        terms: usize,
     ) -> Result<LocalCofactors, LayoutError> {
-        let (rows, dim) = (self.layout.rows(), self.layout.local_dim());
-        let (of_groups, count) = (groups.len() * rows, groups.len() * rows + terms / dim);
+        let (rows, dim, count) = (self.layout.rows(), self.layout.local_dim(), asked.len());
+        let of_groups = rows * self.layout.groups_of(local).len();
         let known = |k: usize| if k / count < of_groups && k % count < of_groups { f64::NAN } else { 0.0 };
         let mut equations: Vec<f64> = (0..count * count).map(known).collect();
         let mut others: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-        for (first, group) in (0..).step_by(rows).zip(groups) {
-            let Own { others: b, blocks, .. } = self.own_equations(asked, local, group..group + 1, &[]);
+        for (first, group) in (0..).step_by(rows).zip(asked[..of_groups].chunks_exact(rows)) {
+            let blocks = Own::blocks(&self.layout, group);
+            let Own { others: b, .. } = Own::new(&self.layout, group, local, &blocks);
             let along = selected.over(blocks.keys().copied())? * b.transpose();
             let found = &b * &along;
             for (i, j) in (0..rows * rows).map(|k| (k / rows, k % rows)) {
@@ -141,65 +169,5 @@ impl System {
         }
         let [by_local, local] = [count * count, count * dim].map(|length| vec![0.0; length]);
         Ok(LocalCofactors { equations, by_local, local, others: others.into_iter().collect() })
-    }
-
-    /// Returns the equations of a local block as functions of the retained unknowns.
-    pub fn local_functions(&self, equations: &dyn Equations, local: usize) -> Vec<Function> {
-        let Own { others, blocks, .. } =
-            self.own_equations(equations, local, self.layout.groups_of(local), &[]);
-        let columns = blocks.keys().flat_map(|&block| self.layout.retained_range(block));
-        let columns: Vec<usize> = columns.collect();
-        let function = |row: usize| {
-            let taken = columns.iter().enumerate().map(|(k, &unknown)| (unknown, others[(row, k)]));
-            taken.filter(|&(_, value)| value != 0.0).collect()
-        };
-        (0..others.nrows()).map(function).collect()
-    }
-
-    /// Gathers the equations of some groups of a local block, and additional equations of its unknowns.
-    fn own_equations(
-        &self,
-        equations: &dyn Equations,
-        local: usize,
-        groups: Range<usize>,
-        terms: &[f64],
-    ) -> Own {
-        let layout = &self.layout;
-        let (rows, l) = (layout.rows(), layout.local_dim());
-        let touched = groups.clone().flat_map(|group| layout.blocks_of(group));
-        let mut blocks: BTreeMap<usize, usize> = touched.map(|block| (block, 0)).collect();
-        let mut width = 0;
-        for (&block, first) in &mut blocks {
-            *first = width;
-            width += layout.retained_dim(block);
-        }
-        let count = groups.len() * rows + terms.len() / l;
-        let mut own = Own { local: Mat::zeros(count, l), others: Mat::zeros(count, width), blocks };
-        for (k, &value) in terms.iter().enumerate() {
-            own.local[(groups.len() * rows + k / l, k % l)] = value;
-        }
-        let (mut constant, mut parts, mut columns) = (vec![0.0; rows], [vec![], vec![], vec![]], vec![]);
-        for (index, group) in groups.enumerate() {
-            let main = layout.retained_dim(layout.retained_of(group));
-            let widths = [l, main, layout.shared_width(group)];
-            parts.iter_mut().zip(widths).for_each(|(part, width)| part.resize(rows * width, 0.0));
-            let [local_part, retained, shared] = &mut parts;
-            let mut written = GroupRows { constant: &mut constant, local: local_part, retained, shared };
-            equations.write(local, group, &mut written);
-            columns.clear();
-            columns.extend(layout.blocks_of(group).flat_map(|block| {
-                let first = own.blocks[&block];
-                first..first + layout.retained_dim(block)
-            }));
-            for row in 0..rows {
-                let at = index * rows + row;
-                let [local_part, retained, shared] =
-                    [0, 1, 2].map(|k| &parts[k][row * widths[k]..][..widths[k]]);
-                local_part.iter().enumerate().for_each(|(k, &value)| own.local[(at, k)] = value);
-                let others = retained.iter().chain(shared).zip(&columns);
-                others.for_each(|(&value, &column)| own.others[(at, column)] = value);
-            }
-        }
-        own
     }
 }

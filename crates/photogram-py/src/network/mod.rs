@@ -10,7 +10,6 @@ pub mod snooping;
 pub mod solution;
 pub mod state;
 pub mod steps;
-pub mod suspects;
 mod tables;
 pub mod trial;
 
