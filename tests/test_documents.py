@@ -17,7 +17,6 @@ from photogram.show.cells import written
 from photogram.show.forms import record, table_text, text, titled_lines, to_json
 from photogram.show.methods import Documented
 from photogram.show.page import (
-    Cell,
     Column,
     Document,
     Fact,
@@ -117,13 +116,10 @@ def test_the_report_has_every_part_of_a_document():
 def test_people_see_the_chosen_rows_and_components():
     whole = table()
     some = written(replace(whole, shown=np.array([1])))
-    assert [row[0].text for row in some.rows] == ["P2"]
+    assert [*some.columns[0].cells] == ["P2"]
     components = written(replace(whole, shown=np.array([[0, 1], [1, 0]])))
-    heads = [column.head for column in components.columns]
-    assert [(row[0].text, row[heads.index("Component")].text) for row in components.rows] == [
-        ("P1", "y"),
-        ("P2", "x"),
-    ]
+    cells = {column.head: [*column.cells] for column in components.columns}
+    assert (cells["Point"], cells["Component"]) == (["P1", "P2"], ["y", "x"])
     assert len(records(replace(whole, shown=np.array([1])).columns)) == 2
 
 
@@ -161,8 +157,8 @@ def test_a_pdf_document_repeats_heads_of_tables_and_begins_annexes_on_pages():
     pytest.importorskip("typst")
     from photogram.show.pdf import page_pdf
 
-    rows = [[Cell(f"P{k}"), Cell("1.000", 1.0)] for k in range(150)]
-    long = Table("Points", [Column("Point", text=True), Column("x", "m")], rows)
+    names = [f"P{k}" for k in range(150)]
+    long = Table("Points", [Column("Point", names, text=True), Column("x", ["1.000"] * 150, "m")])
     parts = [Section("note", "", [Text("One line.")]), Section("points", "Points", [long], annex=True)]
     pages = drawn_pages(page_pdf(Document("Survey", "A", [], [], [], parts)))
     # The rule below a head is the only line of this width.
@@ -177,8 +173,8 @@ def test_a_pdf_document_has_any_name(name):
     pytest.importorskip("typst")
     from photogram.show.pdf import page_pdf
 
-    columns = [Column(name, text=True)] * 80
-    parts = [Table(name, [], []), Table(name, columns, []), Table("", columns, [[Cell(name)] * 80] * 2, name)]
+    empty, columns = [Column(name, [], text=True)] * 80, [Column(name, [name] * 2, text=True)] * 80
+    parts = [Table(name, []), Table(name, empty), Table("", columns, name)]
     parts += [Facts(name, [Fact(name, name, name, name)]), Text(name), Remarks([name]), Layers("l", [*parts])]
     judgement = Judgement(name, name, [name], "bad", name)
     whole = Document(name, name, [judgement], [name], [Fact(name, name)], [Section("s", name, parts, name)])

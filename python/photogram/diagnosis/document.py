@@ -13,7 +13,7 @@ from photogram.results.result import Result
 from photogram.show import page
 from photogram.show.forms import part_lines
 from photogram.show.judgement import judged, verdict_table
-from photogram.show.page import Cell, Column, Document, Fact, Table, Text, Tone
+from photogram.show.page import Column, Document, Fact, Table, Text, Tone
 from photogram.statistics.verdict import Verdict
 
 LEVELS: dict[str, tuple[str, Tone]] = {"grave": ("grave", "bad"), "look": ("to look at", "look")}
@@ -84,12 +84,14 @@ def _section(number: int, section: Section) -> page.Section:
 def _findings_table(findings: Sequence[tuple[Finding, str]]) -> Table:
     """Return the table of findings with section titles, grave findings first."""
     ordered = sorted(findings, key=lambda row: row[0].level != "grave")
-    columns = [Column(head, text=True) for head in ("Level", "Finding", "Photos and points", "Part")]
-    rows: list[list[Cell]] = []
-    for finding, title in ordered[:MAX_FINDINGS]:
-        level, tone = LEVELS[finding.level]
-        names = listed([*finding.photos, *finding.points], MAX_NAMES)
-        rows.append([Cell(level, tone=tone), *map(Cell, (finding.text, names, title))])
-    rest = len(ordered) - len(rows)
-    note = f"The JSON document has {rest} more." if rest else ""
-    return Table("Findings", columns, rows, note)
+    shown, titles = zip(*ordered[:MAX_FINDINGS], strict=True)
+    levels, tones = zip(*(LEVELS[finding.level] for finding in shown), strict=True)
+    names = [listed([*finding.photos, *finding.points], MAX_NAMES) for finding in shown]
+    columns = [
+        Column("Level", levels, text=True, tones=tones),
+        Column("Finding", [finding.text for finding in shown], text=True),
+        Column("Photos and points", names, text=True),
+        Column("Part", titles, text=True),
+    ]
+    rest = len(ordered) - len(shown)
+    return Table("Findings", columns, f"The JSON document has {rest} more." if rest else "")

@@ -1,9 +1,9 @@
-"""Conversion of declared tables to cells of formatted numbers."""
+"""Conversion of declared tables to columns of formatted numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.show import page, quantity
 from photogram.show.angles import degrees_written
-from photogram.show.page import Cell, Column, Document, Drawing, Facts, Part, Remarks, Section, Text
+from photogram.show.page import Column, Document, Drawing, Facts, Part, Remarks, Section, Text, Tone
 from photogram.show.quantity import Axis, Quantity, chosen, long
 from photogram.words import Words, words_of
 
@@ -67,14 +67,14 @@ def _written(parts: Sequence[Part], words: Words, draw: Draw) -> list[Any]:
 def _with_numerals(table: page.Table, words: Words) -> page.Table:
     """Return a table with the numbers of a language."""
     spoken = [
-        [cell if cell.number is None else cell._replace(text=words.numeral(cell.text)) for cell in row]
-        for row in table.rows
+        each if each.text else replace(each, cells=[*map(words.numeral, each.cells)])
+        for each in table.columns
     ]
-    return replace(table, rows=spoken)
+    return replace(table, columns=spoken)
 
 
 def written(part: Any) -> Any:
-    """Return a part of a document; a declared table becomes a table of cells.
+    """Return a part of a document; a declared table becomes a formatted one.
 
     Columns without a head are omitted. The standard deviations of a table define the decimals of its
     components: two digits of the median.
@@ -84,14 +84,13 @@ def written(part: Any) -> Any:
     columns = part.columns
     if part.shown is not None:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
-    pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations)]
-    rows = [*zip(*(cells for _, cells in pairs), strict=True)]
-    return page.Table(part.title, [column for column, _ in pairs], rows, part.note)
+    visible = [column for each in columns if each.head for column in _columns(each, part.deviations)]
+    return page.Table(part.title, visible, part.note)
 
 
-def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, Iterable[Cell]]]:
+def _columns(each: Quantity, by: Floats | None) -> Iterator[Column]:
     if each.kind == "name":
-        yield Column(each.head, text=True), _with_marks(_names(each), each.marked)
+        yield Column(each.head, _names(each), text=True, tones=_tones(each.marked), link=each.link)
         return
     axes, of = each.axes or (Axis(""),), each.of
     mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
@@ -101,13 +100,14 @@ def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, Iterab
     for k, column in enumerate(values.T):
         axis, rows = axes[k], np.full(len(column), k) if of is None else of
         cells = [
-            _cell(each, value, axes[row], decimals[row])
+            _written_number(each, value, axes[row], decimals[row])
             for value, row in zip(column.tolist(), rows.tolist(), strict=True)
         ]
         head = each.head.format(axis.label or axis.name) if of is None else each.head
         unit = "° ′ ″" if each.kind == "value" and axis.angle == "dms" else unit_written(each.unit(axis))
-        own = None if marked is None else marked[:, k]
-        yield Column(head, "" if mixed else unit), _with_marks(cells, own)
+        yield Column(
+            head, cells, "" if mixed else unit, tones=_tones(None if marked is None else marked[:, k])
+        )
 
 
 def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:
@@ -130,32 +130,26 @@ def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None
     return found
 
 
-def _names(each: Quantity) -> list[Cell]:
+def _names(each: Quantity) -> list[str]:
     if each.axes and each.of is not None:  # Components with units if these differ
         mixed = len({axis.small for axis in each.axes}) > 1
         names = [
             f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
             for axis in each.axes
         ]
-        return [Cell(names[k]) for k in each.of.tolist()]
-    names = [str(name) for name in np.asarray(each.values).tolist()]
-    if each.link is None:
-        return [Cell(name) for name in names]
-    pairs = zip(names, (f"{each.link.kind}-{row}" for row in each.link.rows.tolist()), strict=True)
-    return [Cell(name, id=own) if each.link.here else Cell(name, goes_to=own) for name, own in pairs]
+        return [names[k] for k in each.of.tolist()]
+    return [*map(str, np.asarray(each.values).tolist())]
 
 
-def _cell(each: Quantity, value: Any, axis: Axis, decimals: int | None) -> Cell:
+def _written_number(each: Quantity, value: Any, axis: Axis, decimals: int | None) -> str:
     if each.words and value in each.words:
-        return Cell(each.words[value])
+        return each.words[value]
     if each.kind == "probability":
-        return Cell(page.probability_written(value), value) if math.isfinite(value) else Cell("")
+        return page.probability_written(value) if math.isfinite(value) else ""
     if each.kind == "value" and axis.angle == "dms" and math.isfinite(value):
-        return Cell(degrees_written(value, decimals or 0), math.degrees(value))
-    return Cell(page.number_text(value, decimals, each.figures), None if isinstance(value, str) else value)
+        return degrees_written(value, decimals or 0)
+    return page.number_text(value, decimals, each.figures)
 
 
-def _with_marks(cells: list[Cell], marked: Bools | None) -> Iterable[Cell]:
-    if marked is None:
-        return cells
-    return [cell._replace(tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]
+def _tones(marked: Bools | None) -> Sequence[Tone]:
+    return () if marked is None else ["look" if mark else "" for mark in marked]

@@ -114,7 +114,7 @@ def _spaced(parts: Iterable[list[str]]) -> list[str]:
 def part_lines(part: Part, title: str = "") -> list[str]:
     """Return the lines of a part with a title; empty for plots."""
     match written(part):
-        case Table() as table if table.rows:
+        case Table() as table if any(column.cells for column in table.columns):
             head = [table.title] if table.title not in ("", title) else []
             return [*head, *table_text(table), *textwrap.wrap(table.note, WIDTH)]
         case Facts(caption=caption, facts=facts) if facts:
@@ -131,24 +131,20 @@ def part_lines(part: Part, title: str = "") -> list[str]:
 
 def table_text(table: Table) -> list[str]:
     """Return table lines: names left, numbers right, `*` after marked numbers."""
-    columns = [[f"{column.head} {column.unit}".rstrip().translate(PLAIN)] for column in table.columns]
-    for row in table.rows:
-        for texts, column, cell in zip(columns, table.columns, row, strict=True):
-            mark = "*" if cell.tone == "look" and not column.text else ""
-            text = cell.text if cell.text.isascii() else cell.text.translate(PLAIN)
-            texts.append(text + mark)
-    longest = max(len(text) for texts in columns for text in texts)
-    if longest > WIDTH // 2 and all(
-        column.text for column in table.columns
-    ):  # sentences: rows are paragraphs
-        rows = ("; ".join(filter(None, row)) for row in zip(*(texts[1:] for texts in columns), strict=True))
-        return [textwrap.fill(row, WIDTH, subsequent_indent="  ") for row in rows]
-    padded = [
-        [f"{text:{layout}}" for text in texts]
-        for column, texts in zip(table.columns, columns, strict=True)
-        for layout in [f"{'<' if column.text else '>'}{max(map(len, texts))}"]
-    ]
-    return ["  ".join(row).rstrip() for row in zip(*padded, strict=True)]
+    lines: list[list[str]] = []
+    for column in table.columns:
+        texts = [f"{column.head} {column.unit}".rstrip(), *column.cells]
+        if not column.text:
+            texts[1:] = [f"{text}{'*' * (tone == 'look')}" for text, tone in column.toned]
+        texts = [text if text.isascii() else text.translate(PLAIN) for text in texts]
+        width = max(map(len, texts))
+        lines.append([text.ljust(width) if column.text else text.rjust(width) for text in texts])
+    rows = [*zip(*lines, strict=True)]
+    if all(column.text for column in table.columns) and max(map(len, rows[0])) > WIDTH // 2:
+        # Sentences: rows are paragraphs.
+        paragraphs = ("; ".join(filter(None, map(str.rstrip, row))) for row in rows[1:])
+        return [textwrap.fill(row, WIDTH, subsequent_indent="  ") for row in paragraphs]
+    return ["  ".join(row).rstrip() for row in rows]
 
 
 def fact_lines(facts: Sequence[Fact]) -> list[str]:

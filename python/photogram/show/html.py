@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Set
 from dataclasses import replace
 from html import escape
 from importlib.resources import files
+from itertools import repeat
 
 from photogram import _photocore
 from photogram.show import page as parts
 from photogram.show.cells import formatted
-from photogram.show.page import Cell, Column, Document, Drawing, Fact, Judgement, Section, Table
+from photogram.show.page import Column, Document, Drawing, Fact, Judgement, Section, Table
 from photogram.words import Words
 
 LONG = 16  # Characters; longer words may be broken
-NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # Numbers that the script of a page can read
 
 
 def page_html(page: Document) -> bytes:
     """Return a page as self-contained HTML (UTF-8)."""
     page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title), details=()), inlined)
     tables = (part for part in page.parts(layers=True) if isinstance(part, Table))
-    known = {cell.id for table in tables for row in table.rows for cell in row if cell.id}
-    links = [("verdict", page.first), *((each.key, each.title) for each in page.sections if each.title)]
+    links = [each.link for table in tables for each in table.columns if each.link and each.link.here]
+    known = {target for link in links for target in link.targets}
+    places = [("verdict", page.first), *((each.key, each.title) for each in page.sections if each.title)]
     text = _file("report.html").format(
         language=page.words.language,
         version=_photocore.__version__,
         style=_file("style.css"),
         contents=escape(page.words("page.contents")),
-        links=_list("ol", (_element("a", escape(title), href=f"#{key}") for key, title in links)),
+        links=_list("ol", (_element("a", escape(title), href=f"#{key}") for key, title in places)),
         title=escape(page.title or page.what),
         what=_element("p", escape(page.what), class_="what") if page.title else "",
         head=_facts("facts", page.head),
@@ -133,28 +133,25 @@ def _table(table: Table, within: str, known: Set[str]) -> str:
         _element("th", escape(each.head) + _unit(each.unit), scope="col", class_="text" * each.text)
         for each in columns
     )
-    rows = (
-        "".join(_cell(cell, column, known) for cell, column in zip(row, columns, strict=True))
-        for row in table.rows
-    )
-    body = "".join(f"<tr>{row}</tr>\n" for row in rows)
+    rows = zip(*(_cells(column, known) for column in columns), strict=True)
+    body = "".join(f"<tr>{''.join(row)}</tr>\n" for row in rows)
     content = f"{caption}\n<thead><tr>{''.join(heads)}</tr></thead>\n<tbody>\n{body}</tbody>"
     return f'<div class="table" tabindex="0">\n<table>\n{content}\n</table>\n</div>'
 
 
-def _cell(cell: Cell, column: Column, known: Set[str]) -> str:
-    text, number = cell.text, cell.number
-    readable = number is not None and NUMBER.fullmatch(text)
-    if readable and not (column.text or cell.tone or cell.id or cell.goes_to):
-        return f"<td>{text}</td>"  # Most cells
-    long = column.text and any(len(word) > LONG for word in text.split())
-    kinds = " ".join(filter(None, ("text" * column.text, "long" * long, cell.tone)))
-    # Columns are sorted by these numbers if the texts of cells are not numbers.
-    sorts = number is not None and math.isfinite(number) and not readable
-    value = f' data-value="{number:.9g}"' if sorts else ""
-    content = _element("a", escape(text), href=f"#{cell.goes_to}") if cell.goes_to in known else escape(text)
-    start = "".join(f' {key}="{escape(each)}"' for key, each in (("class", kinds), ("id", cell.id)) if each)
-    return f"<td{start}{value}>{content}</td>"
+def _cells(column: Column, known: Set[str]) -> Iterable[str]:
+    if not (column.text or column.tones):
+        return [f"<td>{escape(text)}</td>" for text in column.cells]  # Most cells
+    targets = column.link.targets if column.link else repeat("")
+    here = column.link is not None and column.link.here
+    cells = []
+    for (text, tone), target in zip(column.toned, targets, strict=False):
+        long = column.text and any(len(word) > LONG for word in text.split())
+        kinds = " ".join(filter(None, ("text" * column.text, "long" * long, tone)))
+        linked = target in known and not here
+        content = _element("a", escape(text), href=f"#{target}") if linked else escape(text)
+        cells.append(_element("td", content, class_=kinds, id=target * here))
+    return cells
 
 
 def inlined(drawing: Drawing) -> Drawing | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -28,32 +28,28 @@ MOST_DECIMALS = 12  # Maximum number of decimals of a fixed-point column
 LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 
-class Cell(NamedTuple):
-    """A formatted cell."""
-
-    text: str
-    number: float | None = None  # Value of the text
-    id: str = ""  # Target of links
-    goes_to: str = ""  # `id` of the linked cell, if the page has one
-    tone: Tone = ""  # Marked cells have the tone `look`
-
-
 @dataclass(frozen=True)
 class Column:
-    """Head of a column: its name, and the unit of its numbers."""
+    """A formatted column."""
 
     head: str
+    cells: Sequence[str]
     unit: str = ""
     text: bool = False  # Whether the column contains texts, aligned left
+    tones: Sequence[Tone] = ()  # Of the cells, `look` if marked; empty: none
+    link: quantity.Link | None = None  # Target of the cells on a page
+
+    @property
+    def toned(self) -> list[tuple[str, Tone]]:
+        return [*zip(self.cells, self.tones or [""] * len(self.cells), strict=True)]
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of formatted cells; `note` describes missing rows."""
+    """A formatted table; `note` describes missing rows."""
 
     title: str
     columns: Sequence[Column]
-    rows: Sequence[Sequence[Cell]]
     note: str = ""
 
 

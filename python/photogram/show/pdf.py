@@ -24,7 +24,7 @@ from photogram.words import Phrase
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts included in the library; for other letters it uses fonts of the machine."""
 
-OMITTED = ("members", "phases", "words", "sketch")  # Fields that pages do not show
+OMITTED = ("members", "phases", "words", "sketch", "cells", "tones", "link")  # Fields that pages do not show
 LONGEST = 30  # Longest word that is not broken, characters
 
 
@@ -55,21 +55,10 @@ def _record(part: Any) -> Any:
         # Width and height follow from the view box.
         record["markup"] = re.sub('^(<svg[^>]*) width="[^"]*"', r"\1", part.markup).replace(LETTERS, FONTS[0])
     elif isinstance(part, Table):
-        record["rows"] = [[{"tone": cell.tone, "text": cell.text} for cell in row] for row in part.rows]
-        record["columns"] = [
-            _column(column, [row[k].text for row in part.rows]) for k, column in enumerate(part.columns)
-        ]
+        record["rows"] = [*zip(*(column.toned for column in part.columns), strict=True)]
+    elif isinstance(part, Column):
+        size, words = partial(width, size=1.0), " ".join(part.cells).split() if part.text else part.cells
+        record["heads"] = [*part.head.split(), *part.unit.split()]
+        record["widest"] = max(part.cells, key=size, default="")
+        record["word"] = max((word[:LONGEST] for word in words), key=size, default="")
     return record
-
-
-def _column(column: Column, texts: list[str]) -> dict[str, object]:
-    words = [word for text in texts for word in text.split()] if column.text else texts
-    size = partial(width, size=1.0)
-    return {
-        "head": column.head,
-        "unit": column.unit,
-        "heads": [*column.head.split(), *column.unit.split()],
-        "text": column.text,
-        "widest": max(texts, key=size, default=""),
-        "word": max((word[:LONGEST] for word in words), key=size, default=""),
-    }

@@ -56,6 +56,10 @@ class Link:
     rows: Indices
     here: bool = False
 
+    @property
+    def targets(self) -> list[str]:
+        return [f"{self.kind}-{row}" for row in self.rows.tolist()]
+
 
 @dataclass(frozen=True, eq=False)
 class Quantity:

@@ -3,24 +3,30 @@
 for (const table of document.querySelectorAll("table")) {
   const body = table.tBodies[0];
   if (body.rows.length < 2) continue;
-  const value = (row, column) => row.cells[column].dataset.value ?? row.cells[column].textContent;
+  const text = (row, column) => row.cells[column].textContent;
+  // Bounds such as "< 1e-99", decimal commas, and degrees, minutes and seconds are numbers, too.
+  const number = (row, column) => {
+    const string = text(row, column).replace(/^< /, "").replace(",", ".");
+    const [degrees, minutes = 0, seconds = 0] = string.split(" ").map(parseFloat);
+    return (Math.abs(degrees) + minutes / 60 + seconds / 3600) * (string.startsWith("-") ? -1 : 1);
+  };
   [...table.tHead.rows[0].cells].forEach((head, column) => {
     const button = document.createElement("button");
     button.append(...head.childNodes);
     head.append(button);
     button.addEventListener("click", () => {
-      const text = head.classList.contains("text");
+      const words = head.classList.contains("text");
       const before = head.getAttribute("aria-sort");
-      const up = before ? before === "descending" : text;
+      const up = before ? before === "descending" : words;
       for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
       head.setAttribute("aria-sort", up ? "ascending" : "descending");
       const rows = [...body.rows];
-      const known = (row) => text || !Number.isNaN(parseFloat(value(row, column)));
+      const known = (row) => words || !Number.isNaN(number(row, column));
       rows.sort((a, b) => {
         if (!known(a) || !known(b)) return known(b) - known(a);
-        const order = text
-          ? value(a, column).localeCompare(value(b, column), document.documentElement.lang, { numeric: true })
-          : parseFloat(value(a, column)) - parseFloat(value(b, column));
+        const order = words
+          ? text(a, column).localeCompare(text(b, column), document.documentElement.lang, { numeric: true })
+          : number(a, column) - number(b, column);
         return up ? order : -order;
       });
       body.append(...rows);
