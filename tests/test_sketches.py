@@ -12,7 +12,7 @@ import pytest
 from example_scripts import load
 from photogram import adjust, collection, formats, simulate
 from photogram.giant import read_project
-from photogram.show.sketch.layout import laid_out
+from photogram.show.sketch.layout import LABEL, laid_out
 from photogram.show.sketch.letters import ticks, width, wrapped
 from photogram.show.sketch.marks import (
     Ellipses,
@@ -22,6 +22,7 @@ from photogram.show.sketch.marks import (
     Panel,
     Shades,
     Sketch,
+    Texts,
     contours,
     horizontal_line,
     rgb,
@@ -253,15 +254,18 @@ def test_equal_ratios_are_equally_long_along_logarithmic_axes():
     assert placed.across.texts == ["1", "2", "5", "10", "20", "50", "100"]
 
 
-def test_legends_are_beside_or_in_the_emptiest_corner():
-    marks = [Markers(np.array([[0.05, 0.95], [0.95, 0.95], [0.95, 0.05]]), "o", 3.0, label="point")]
-    limits = [[0.0, 0.0], [1.0, 1.0]]
-    placed = {name: placed_on(limits, marks, legend=name) for name in ("beside", "best")}
-    assert placed["beside"].legend[0] > placed["beside"].box[2]
-    left, top, right, low = placed["best"].box
-    x, y, *_ = placed["best"].legend
-    assert left < x < (left + right) / 2
-    assert (top + low) / 2 < y < low
+def test_legends_are_beside_or_below_the_panel():
+    marks = [Markers(np.array([[0.05, 0.95], [0.95, 0.05]]), "o", 3.0, label="point")]
+    for legend in ("beside", "below"):
+        placed = placed_on([[0.0, 0.0], [1.0, 1.0]], marks, legend=legend, across="across")
+        [at] = [mark.places[0] for mark in placed.frame if isinstance(mark, Texts) and "point" in mark.texts]
+        left, top, right, low = placed.box
+        if legend == "beside":
+            assert at[0] > right
+            assert top < at[1] < low
+        else:
+            assert left < at[0] < right
+            assert at[1] > low + LABEL
 
 
 def test_centred_names_are_on_their_points_if_there_is_space():

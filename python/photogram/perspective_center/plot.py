@@ -63,7 +63,7 @@ def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:
         marks.append(Line(_means(places[radius > 0]), MARKED, 1.8, label="mean of equal radii"))
     limits = np.array([[0.0, -reach], [right, reach]])
     axes = "radius on the plate, mm", "distortion, µm, positive outward"
-    return Panel(limits, marks, "Radial distortion on the plate", *axes, legend="best")
+    return Panel(limits, marks, "Radial distortion on the plate", *axes, legend="below")
 
 
 def _means(places: Floats) -> Floats:

@@ -67,10 +67,10 @@ def _column(curves: Curves) -> list[Panel]:
         title = curve.name if number else f"Radial distortion of {curves.camera}"
         below = "" if banded or number + 1 < len(curves.curves) else named
         limits = np.column_stack([across, _reach(curves, curve)])
-        found.append(Panel(limits, marks, title, below, unit, legend="best" if curve.bands else ""))
+        found.append(Panel(limits, marks, title, below, unit, legend="below" if curve.bands else ""))
     if banded:
         limits = np.column_stack([across, (0.0, spread(*sizes)[1])])
-        found.append(Panel(limits, deviations, "", named, f"sd, {unit}", legend="best"))
+        found.append(Panel(limits, deviations, "", named, f"sd, {unit}", legend="below"))
     return found
 
 

@@ -80,7 +80,7 @@ def _histogram(values: Floats, unit_weight: float) -> Panel:
         "test value w",
         "density",
         notes=[f"{beyond:,} test values lie beyond ±{reach:.1f}" if beyond else ""],
-        legend="best",
+        legend="below",
     )
 
 
@@ -120,7 +120,7 @@ def _quantiles(values: Floats, marked: Bools, worst: list[tuple[float, str]], un
         f"Quantiles: limit of {n:,} tests ±{limit:.2f} (dotted)",
         "normal quantile",
         "test value w",
-        legend="best",
+        legend="below",
     )
 
 

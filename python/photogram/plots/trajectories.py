@@ -59,7 +59,7 @@ def trajectory(result: Any, *, name: str | None = None) -> Plot:
         _panel(times, corrections[part], sd[:, 3 * part : 3 * part + 3], records, head)
         for part, head in enumerate(heads)
     ]
-    panels[0] = replace(panels[0], title=name, legend="best")
+    panels[0] = replace(panels[0], title=name, legend="below")
     return Plot(9.0, 3.4, panels, 2)
 
 

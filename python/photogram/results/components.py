@@ -283,7 +283,7 @@ class VarianceFunction(Documented, Brief):
         ]
         unit = f", {getattr(self.network, 'image_unit', 'px')}" if self.name == "radius" else ""
         limits = np.column_stack([across, (0.0, spread(0.0, 1.0, curve, places[:, 1], high)[1])])
-        panel = Panel(limits, marks, "", f"{self.name}{unit}", "factor of the given variance", legend="best")
+        panel = Panel(limits, marks, "", f"{self.name}{unit}", "factor of the given variance", legend="below")
         return Plot(6.4, 4.0, [panel])
 
     def table(self) -> pd.DataFrame:

@@ -28,7 +28,7 @@ def curves(marks: Sequence[Mark], across: str, up: str, title: str = "") -> Pane
     x, y = np.concatenate(lines).T
     bands = [outline[:, 1] for mark in marks if isinstance(mark, Polygons) for outline in mark.places]
     limits = np.column_stack([spread(x), spread(y, *bands)])
-    return Panel(limits, marks, title, across, up, legend="best")
+    return Panel(limits, marks, title, across, up, legend="below")
 
 
 def vectors(

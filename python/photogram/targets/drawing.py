@@ -98,7 +98,7 @@ def plot_uncertainty_curve(found: UncertaintyCurve) -> Plot:
         title,
         f"distance from the camera, {found.unit}",
         "px",
-        legend="best",
+        legend="below",
         log_across=True,
         log_up=True,
     )

@@ -39,7 +39,6 @@ class Placed:
     up: Ticks = Ticks(np.empty(0), [])
     frame: Sequence[Mark] = ()  # Axes, text, legend and colour bar, in points
     sides: Box = (0.0, 0.0, 0.0, 0.0)  # Widths and heights that these require around the box
-    legend: Box | None = None
 
     def at(self, places: Floats) -> Floats:
         """Return (..., 2) positions in the units of the axes as points of the plot."""
@@ -100,18 +99,19 @@ def _framed(panel: Panel, box: Box, room: float, numbered: bool, margin: float =
     across, up = _ticks(panel, right - left, low - top)
     placed = Placed(panel, box, across, up)
     marks, wide, down = _axes(placed, margin, numbered)
-    legend, entries = _legend(placed, down)
-    side = right + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
-    if legend and panel.legend == "beside":
-        side = legend[2] + GAP
-    elif legend and panel.legend == "below":
-        down = legend[3] + GAP / 2
+    side, foot = right + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER)), down
+    if panel.legend == "beside" and panel.labelled:
+        entries, (side, foot) = _legend(panel, right + GAP, top)
+        marks += entries
+    elif panel.legend and panel.labelled:
+        entries, (_, down) = _legend(panel, left, down)
+        marks += entries
     if panel.shades:
         marks += _colour_bar(panel.shades, side + GAP, top, low, panel.decimal)
         side += COLOUR_BAR
     notes = [line for note in panel.notes for line in wrapped(note, NOTE, room)]
     marks.append(_lines(left, down + 0.5 * LEADING * NOTE, notes, NOTE))
-    down = max(down + LEADING * NOTE * len(notes), legend[3] if legend else 0.0) + GAP
+    down = max(down + LEADING * NOTE * len(notes), foot) + GAP
     scale = (right - left) / float(abs(panel.limits[1, 0] - panel.limits[0, 0]))
     for length, colour, meaning in reversed(panel.bars):
         end = left + scale * length
@@ -121,7 +121,7 @@ def _framed(panel: Panel, box: Box, room: float, numbered: bool, margin: float =
     above -= LEADING * TITLE * len(title)
     marks.append(_lines(left, above + LEADING * TITLE - 4.0, title, TITLE))
     sides = wide, top - above - 2.0, side + GAP - right, down - low
-    return replace(placed, frame=[*marks, *entries], sides=sides, legend=legend)
+    return replace(placed, frame=marks, sides=sides)
 
 
 def _axes(placed: Placed, margin: float, numbered: bool) -> tuple[list[Mark], float, float]:
@@ -152,24 +152,13 @@ def _axes(placed: Placed, margin: float, numbered: bool) -> tuple[list[Mark], fl
     return found, wide, down
 
 
-def _legend(placed: Placed, down: float) -> tuple[Box | None, list[Mark]]:
-    """Return the legend, one mark per line: outside the box, or in its emptiest corner."""
-    marks, (left, top, right, low) = placed.panel.labelled, placed.box
-    if not placed.panel.legend or not marks:
-        return None, []
-    names, line = [mark.label for mark in marks], LEADING * LEGEND
-    size = np.array([SWATCH + 6.0 + widest(names, LEGEND), line * len(marks)])
-    at, found = [right + GAP, top] if placed.panel.legend == "beside" else [left, down], list[Mark]()
-    if placed.panel.legend == "best":
-        curves = placed.at(np.concatenate([shapes.NOWHERE, *_curves(placed.panel)]))
-        corners = np.array([[right, top], [left, top], [right, low], [left, low]])
-        corners = corners + np.where(corners > placed.box[:2], -GAP / 2 - size, GAP / 2)
-        inside = ((curves > corners[:, None]) & (curves < (corners + size)[:, None])).all(axis=2)
-        at = corners[inside.sum(axis=1).argmin()].tolist()
-        found.append(Polygons(boxes(_at(*at), _at(*at) + size), "white", 0.85))
-    found += [_sample(mark, _at(at[0], at[1] + line * (k + 0.5))) for k, mark in enumerate(marks)]
-    found.append(_lines(at[0] + SWATCH + 6.0, at[1] + 0.5 * line, names, LEGEND))
-    return (*at, *(at + size).tolist()), found
+def _legend(panel: Panel, left: float, top: float) -> tuple[list[Mark], tuple[float, float]]:
+    """Return a legend, one mark per line, and its right and lower end with a margin."""
+    names, line = [mark.label for mark in panel.labelled], LEADING * LEGEND
+    found = [_sample(mark, _at(left, top + line * (k + 0.5))) for k, mark in enumerate(panel.labelled)]
+    beside = left + SWATCH + 6.0
+    found.append(_lines(beside, top + 0.5 * line, names, LEGEND))
+    return found, (beside + widest(names, LEGEND) + GAP, top + line * len(names) + GAP / 2)
 
 
 def _sample(mark: Mark, left: Floats) -> Mark:
@@ -260,17 +249,3 @@ def _ticks(panel: Panel, wide: float, high: float) -> list[Ticks]:
         else ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log, decimal=panel.decimal)
         for axis, (names, length, log) in enumerate(sides)
     ]
-
-
-def _curves(panel: Panel) -> list[Floats]:
-    """Return (n, 2) points that a legend should not cover; straight lines have points between their ends."""
-    limits, found = np.sort(panel.limits, axis=0), list[Floats]()
-    for mark in panel.marks:
-        if isinstance(mark, Line):
-            lines = (np.clip(line, *limits) for line in mark.lines)
-            found += [np.linspace(line[0], line[-1], 60) if len(line) == 2 else line for line in lines]
-        elif isinstance(mark, shapes.Markers):
-            found.append(mark.places)
-        elif isinstance(mark, Polygons):
-            found.extend(mark.places)
-    return found

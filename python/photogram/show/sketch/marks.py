@@ -272,7 +272,7 @@ class Panel:
     equal: bool = False  # Whether both axes have the same scale
     notes: Sequence[str] = ()  # Notes below the panel
     bars: Sequence[ScaleBar] = ()  # Scale bars of enlarged marks, below the title
-    legend: Literal["", "beside", "below", "best"] = ""  # Outside the panel, or in its emptiest corner
+    legend: Literal["", "beside", "below"] = ""  # Position of the legend, outside the panel
     # Names at 0, 1, 2 ... instead of numbers
     across_names: Sequence[str] = ()
     up_names: Sequence[str] = ()

@@ -17,7 +17,6 @@ MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and
 LEGENDS: dict[str, dict[str, Any]] = {
     "beside": {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0},
     "below": {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "borderaxespad": 4.5},
-    "best": {"loc": "best"},
 }
 TICKS: dict[str, Any] = {"color": FAINT, "labelsize": NUMBER, "labelcolor": INK}
 ALIGNED = {"start": "left", "middle": "center", "end": "right"}

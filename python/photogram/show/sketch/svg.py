@@ -244,10 +244,9 @@ def _texts(mark: marks.Texts, placed: Placed, **look: str | float) -> str:
 
 
 def _names(placed: Placed) -> str:
-    """Return the names on a panel, without overlaps with its legend."""
     left, top, right, low = placed.box
     # With y upwards, so that positions above the points are tried first.
-    found, taken = [], [(box[0], -box[3], box[2], -box[1]) for box in [placed.legend] if box]
+    found, taken = list[str](), list[tuple[float, float, float, float]]()
     for mark in placed.panel.marks:
         if isinstance(mark, marks.Names):
             at, avoid = (placed.at(each) * [1.0, -1.0] for each in (mark.places, mark.avoid))
