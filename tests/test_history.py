@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.statistics.history import history
+from photogram.history.changes import history
 
 YEARS = np.array([0.0, 0.2, 0.5, 0.6, 1.1, 1.3, 1.9, 2.4])
 C = np.array([[4.0, 1.5], [1.5, 1.0]])

@@ -32,7 +32,7 @@ FLOORS = (
     ("adjustment",),
     ("results",),
     ("network",),
-    ("plots",),
+    ("plots", "history"),
     ("show",),
     ("io",),
     ("statistics",),

@@ -25,12 +25,12 @@ from photogram.comparator.polynomial import Frame, Polynomial
 from photogram.comparator.years.joint import Together, adjust_together
 from photogram.comparator.years.record import RecordedCalibration
 from photogram.errors import InputError
+from photogram.history.changes import History, dates_of, history
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
-from photogram.statistics.history import History, dates_of, history
 from photogram.words import phrase
 
 DEGREE = 4

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.tables import UM, XY
-from photogram.show.history import history_document
+from photogram.history.document import history_document, history_findings
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity, Table, members, of_each
 from photogram.statistics.findings import Findings, Tested
-from photogram.statistics.history import changed_of, unchanged_of
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -84,15 +83,12 @@ def comparison_findings(comparison: Comparison) -> Findings:
 
     test = comparison.together.test
     wrong = test.problem() is not None
-    return Findings(
-        status="converged",
+    return history_findings(
+        comparison.histories,
         observations=[Tested(phrase("comparators.all-readings"), values, name, "w")],
         degrees_of_freedom=test.degrees_of_freedom,
         global_test=test,
         spoiled=phrase("harmful.grids") if wrong else "",
-        changed=changed_of(comparison.histories),
-        systematic=[own.systematic(whose) for whose, own in comparison.histories.items()],
-        remarks=unchanged_of(comparison.histories),
         if_usable=[phrase("advice.adjusted-grid")],
         if_withheld=[phrase("advice.grids-withheld" if wrong else "advice.comparator-changed")],
     )

@@ -19,13 +19,13 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.film.certificate import Certificate
+from photogram.history.changes import History, dates_of, history
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
-from photogram.statistics.history import History, dates_of, history
 from photogram.words import Phrase, phrase
 
 NODES = 9  # radii, Gauss-Legendre nodes

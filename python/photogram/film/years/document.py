@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.show.history import history_document
+from photogram.history.document import history_document, history_findings
 from photogram.show.page import Document, Fact
 from photogram.show.quantity import Axis, Quantity, Table
 from photogram.statistics.findings import Findings, Tested
-from photogram.statistics.history import changed_of, unchanged_of
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
@@ -50,14 +49,12 @@ def comparison_findings(comparison: CameraComparison) -> Findings:
         for occasion in history.occasions
     ]
     values = np.concatenate([own.off / own.off_sd for *_, own in quiet] or [np.zeros(0)])
-    return Findings(
-        status="converged",
+    return history_findings(
+        histories,
         observations=[Tested("values beside those of the others", values, lambda at: places[at[0]], "w")],
         degrees_of_freedom=sum(own.constancy.degrees_of_freedom for own in histories.values()),
         untested=Phrase("untested.constancy"),
-        changed=changed_of(histories),
-        systematic=[own.systematic(whose) for whose, own in histories.items()],
-        remarks=[*unchanged_of(histories), *comparison.remarks],
+        remarks=comparison.remarks,
         if_withheld=[Phrase("advice.certificate-of-time")],
     )
 

@@ -41,6 +41,8 @@ MOST = 3  # Largest number of changes of one quantity
 
 @dataclass(frozen=True)
 class Change:
+    """An accepted change of a quantity."""
+
     kind: str  # `drift`, `step`, `single`, or the name of a regressor
     # size, sd: per unit of time, after minus before, off, or per unit of the regressor
     size: float
@@ -129,28 +131,6 @@ def dates_of(days: Sequence[date], names: Sequence[str]) -> Dates:
         for day, name in zip(written, names, strict=True)
     ]
     return Dates([day.year + (day - date(day.year, 1, 1)).days / YEAR for day in days], called)
-
-
-def changed_of(histories: Mapping[str, History]) -> list[Phrase | str]:
-    """Return messages on the changes, or on an unexplained change, by name."""
-    found: list[Phrase | str] = []
-    for whose, own in histories.items():
-        found += [f"{whose}: {text}" for text in own.sentences]
-        failed = None if own.sentences else own.constancy.problem()
-        if failed:
-            found.append(Phrase("part.unexplained-change", {"whose": whose, "failed": failed}))
-    return found
-
-
-def unchanged_of(histories: Mapping[str, History]) -> list[Phrase]:
-    """Return messages on things without changes."""
-    found = []
-    for whose, own in histories.items():
-        if not own.has_changed:
-            fields = {"whose": whose, "first": own.occasions[0], "last": own.occasions[-1]}
-            counts = {"n": len(own.occasions), "quantities": len(own.series)}
-            found.append(Phrase("line.unchanged", {**fields, **counts}))
-    return found
 
 
 @dataclass(frozen=True, eq=False)

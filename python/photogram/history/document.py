@@ -1,4 +1,4 @@
-"""Values on several occasions as tables and control charts, for any quantities."""
+"""Findings and document of values on several occasions: tables and control charts, for any quantities."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.history.changes import Change, History, Series
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.forms import record
@@ -18,10 +20,10 @@ from photogram.show.quantity import Axis, Quantity, Table, component, members_of
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, error_bars, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
+from photogram.statistics.findings import Findings
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.statistics.history import Change, History, Series
     from photogram.statistics.verdict import Verdict
 
 ACROSS = 3  # Number of charts in a row
@@ -78,6 +80,30 @@ def values(history: History) -> Table:
 
 def _deviations(history: History) -> Floats:
     return np.array([each.sd for each in history.series]).T
+
+
+def history_findings(
+    histories: Mapping[str, History], *, remarks: Sequence[Phrase] = (), **fields: Any
+) -> Findings:
+    """Return the findings of histories by name; `fields` are further fields."""
+    changed: list[Phrase | str] = []
+    unchanged = []
+    for whose, own in histories.items():
+        changed += [f"{whose}: {text}" for text in own.sentences]
+        failed = None if own.sentences else own.constancy.problem()
+        if failed:
+            changed.append(Phrase("part.unexplained-change", {"whose": whose, "failed": failed}))
+        if not own.has_changed:
+            ends = {"whose": whose, "first": own.occasions[0], "last": own.occasions[-1]}
+            counts = {"n": len(own.occasions), "quantities": len(own.series)}
+            unchanged.append(Phrase("line.unchanged", ends | counts))
+    return Findings(
+        status="converged",
+        changed=changed,
+        systematic=[own.systematic(whose) for whose, own in histories.items()],
+        remarks=[*unchanged, *remarks],
+        **fields,
+    )
 
 
 def history_document(

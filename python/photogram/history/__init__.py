@@ -1,0 +1,1 @@
+"""Values on several occasions: tests for changes, their document and control charts."""
