@@ -14,7 +14,7 @@ from photogram.show import page, quantity
 from photogram.show.angles import degrees_written
 from photogram.show.page import Column, Document, Drawing, Facts, Part, Remarks, Section, Text, Tone
 from photogram.show.quantity import Axis, Quantity, chosen, long
-from photogram.words import Words, words_of
+from photogram.words import Words
 
 _SIGNS = {
     "arc seconds": "″",
@@ -58,37 +58,26 @@ def _written(parts: Sequence[Part], words: Words, draw: Draw) -> list[Any]:
             case quantity.Table(visible=False) | Facts(facts=[]) | Remarks(sentences=[]) | Text(text=""):
                 continue
             case _:
-                made = written(part)
-                foreign = made is not part and words is not words_of("en")
-                found.append(_with_numerals(made, words) if foreign else made)
+                found.append(written(part, words.numeral if words.language != "en" else str))
     return found
 
 
-def _with_numerals(table: page.Table, words: Words) -> page.Table:
-    """Return a table with the numbers of a language."""
-    spoken = [
-        each if each.text else replace(each, cells=[*map(words.numeral, each.cells)])
-        for each in table.columns
-    ]
-    return replace(table, columns=spoken)
-
-
-def written(part: Any) -> Any:
+def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
     """Return a part of a document; a declared table becomes a formatted one.
 
     Columns without a head are omitted. The standard deviations of a table define the decimals of its
-    components: two digits of the median.
+    components: two digits of the median. `numeral` converts numbers to the format of a language.
     """
     if not isinstance(part, quantity.Table):
         return part
     columns = part.columns
     if part.shown is not None:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
-    visible = [column for each in columns if each.head for column in _columns(each, part.deviations)]
+    visible = [column for each in columns if each.head for column in _columns(each, part.deviations, numeral)]
     return page.Table(part.title, visible, part.note)
 
 
-def _columns(each: Quantity, by: Floats | None) -> Iterator[Column]:
+def _columns(each: Quantity, by: Floats | None, numeral: Callable[[str], str]) -> Iterator[Column]:
     if each.kind == "name":
         yield Column(each.head, _names(each), text=True, tones=_tones(each.marked), link=each.link)
         return
@@ -100,7 +89,7 @@ def _columns(each: Quantity, by: Floats | None) -> Iterator[Column]:
     for k, column in enumerate(values.T):
         axis, rows = axes[k], np.full(len(column), k) if of is None else of
         cells = [
-            _written_number(each, value, axes[row], decimals[row])
+            numeral(_written_number(each, value, axes[row], decimals[row]))
             for value, row in zip(column.tolist(), rows.tolist(), strict=True)
         ]
         head = each.head.format(axis.label or axis.name) if of is None else each.head

@@ -13,6 +13,7 @@ from photogram import _photocore
 from photogram.show import page as parts
 from photogram.show.cells import formatted
 from photogram.show.page import Column, Document, Drawing, Fact, Judgement, Section, Table
+from photogram.show.sketch.svg import element, svg_of
 from photogram.words import Words
 
 LONG = 16  # Characters; longer words may be broken
@@ -30,9 +31,9 @@ def page_html(page: Document) -> bytes:
         version=_photocore.__version__,
         style=_file("style.css"),
         contents=escape(page.words("page.contents")),
-        links=_list("ol", (_element("a", escape(title), href=f"#{key}") for key, title in places)),
+        links=_list("ol", (element("a", escape(title), href=f"#{key}") for key, title in places)),
         title=escape(page.title or page.what),
-        what=_element("p", escape(page.what), class_="what") if page.title else "",
+        what=element("p", escape(page.what), class_="what") if page.title else "",
         head=_facts("facts", page.head),
         judgements="".join(map(_judgement, page.judgements)),
         advice=_advice(page),
@@ -47,15 +48,9 @@ def _file(name: str) -> str:
     return files("photogram.show").joinpath("templates", name).read_text(encoding="utf-8")
 
 
-def _element(name: str, content: str, /, **attributes: str) -> str:
-    """Return an element without empty attributes; its content is HTML."""
-    written = [f' {key.rstrip("_")}="{escape(value)}"' for key, value in attributes.items() if value]
-    return f"<{name}{''.join(written)}>{content}</{name}>"
-
-
 def _list(name: str, items: Iterable[str], **attributes: str) -> str:
     lines = "".join(f"<li>{item}</li>\n" for item in items)
-    return _element(name, f"\n{lines}", **attributes) if lines else ""
+    return element(name, f"\n{lines}", **attributes) if lines else ""
 
 
 def _coded(text: str) -> str:
@@ -64,37 +59,37 @@ def _coded(text: str) -> str:
 
 
 def _unit(unit: str) -> str:
-    return " " + _element("span", escape(unit), class_="unit") if unit else ""
+    return " " + element("span", escape(unit), class_="unit") if unit else ""
 
 
 def _facts(kind: str, facts: Iterable[Fact], value: str = "", caption: str = "") -> str:
     """Return named values; `value` is an element for the values."""
     lines = []
     for fact in facts:
-        text, note = escape(fact.value), _element("small", escape(fact.note)) if fact.note else ""
-        content = f"{_element(value, text) if value else text}{_unit(fact.unit)}{note}"
-        name = _element("dt", escape(fact.name))
-        lines.append(_element("div", name + _element("dd", content), class_=fact.tone) + "\n")
-    return _element("dl", f"{caption}\n{''.join(lines)}", class_=kind) if lines else ""
+        text, note = escape(fact.value), element("small", escape(fact.note)) if fact.note else ""
+        content = f"{element(value, text) if value else text}{_unit(fact.unit)}{note}"
+        name = element("dt", escape(fact.name))
+        lines.append(element("div", name + element("dd", content), class_=fact.tone) + "\n")
+    return element("dl", f"{caption}\n{''.join(lines)}", class_=kind) if lines else ""
 
 
 def _judgement(one: Judgement) -> str:
-    on = " " + _element("span", escape(one.on)) if one.on else ""
-    mark = _element("p", escape(one.mark) + on, class_="mark")
+    on = " " + element("span", escape(one.on)) if one.on else ""
+    mark = element("p", escape(one.mark) + on, class_="mark")
     lines = _list("ul", (escape(line[:1].upper() + line[1:]) for line in one.lines))
-    return _element("div", mark + _element("h2", escape(one.headline)) + lines, class_=f"verdict {one.tone}")
+    return element("div", mark + element("h2", escape(one.headline)) + lines, class_=f"verdict {one.tone}")
 
 
 def _advice(page: Document) -> str:
     steps = _list("ol", (_coded(str(sentence)) for sentence in page.advice))
-    return _element("div", _element("h3", "What to do next") + steps, class_="advice") if steps else ""
+    return element("div", element("h3", "What to do next") + steps, class_="advice") if steps else ""
 
 
 def _section(section: Section, known: Set[str], words: Words) -> str:
-    title = _element("h2", escape(section.title)) if section.title else ""
-    intro = _element("p", escape(section.intro), class_="intro") if section.intro else ""
+    title = element("h2", escape(section.title)) if section.title else ""
+    intro = element("p", escape(section.intro), class_="intro") if section.intro else ""
     content = [title, intro, *(_part(part, section.title, known, words) for part in section.parts)]
-    return _element("section", "\n".join(content), id=section.key, class_="annex" * section.annex)
+    return element("section", "\n".join(content), id=section.key, class_="annex" * section.annex)
 
 
 def _part(part: parts.Part, within: str, known: Set[str], words: Words) -> str:
@@ -104,33 +99,33 @@ def _part(part: parts.Part, within: str, known: Set[str], words: Words) -> str:
             return _table(part, within, known)
         case parts.Facts():
             again = " again" * (part.caption == within)
-            caption = _element("div", escape(part.caption), class_=f"caption{again}")
+            caption = element("div", escape(part.caption), class_=f"caption{again}")
             return _facts("facts", part.facts, caption=caption)
         case Drawing():
-            caption = _element("figcaption", escape(part.caption))
-            return _element("figure", f"\n{part.markup}\n{caption}", id=part.name)
+            caption = element("figcaption", escape(part.caption))
+            return element("figure", f"\n{part.markup}\n{caption}", id=part.name)
         case parts.Layers():
             layers = (
                 f'<div class="layer" data-title="{escape(one.title)}">{_part(one, "", known, words)}</div>'
                 for one in part.parts
             )
-            return _element("div", "\n".join(layers), class_="layers", id=part.name)
+            return element("div", "\n".join(layers), class_="layers", id=part.name)
         case parts.Text():
-            return _element("p", _coded(part.text))
+            return element("p", _coded(part.text))
         case parts.Remarks():
             shown, hidden = part.sentences[: part.most], part.sentences[part.most :]
             first, others = (_list("ul", map(escape, each), class_="remarks") for each in (shown, hidden))
-            summary = _element("summary", escape(words("page.more", count=len(hidden))))
-            return first + (_element("details", summary + others) if hidden else "")
+            summary = element("summary", escape(words("page.more", count=len(hidden))))
+            return first + (element("details", summary + others) if hidden else "")
     raise TypeError(f"a page does not show {type(part).__name__}")
 
 
 def _table(table: Table, within: str, known: Set[str]) -> str:
     columns, again = table.columns, "again" * (table.title == within)
-    note = " " + _element("small", escape(table.note)) if table.note else ""
-    caption = _element("caption", _element("span", escape(table.title)) + note, class_=again)
+    note = " " + element("small", escape(table.note)) if table.note else ""
+    caption = element("caption", element("span", escape(table.title)) + note, class_=again)
     heads = (
-        _element("th", escape(each.head) + _unit(each.unit), scope="col", class_="text" * each.text)
+        element("th", escape(each.head) + _unit(each.unit), scope="col", class_="text" * each.text)
         for each in columns
     )
     rows = zip(*(_cells(column, known) for column in columns), strict=True)
@@ -149,15 +144,13 @@ def _cells(column: Column, known: Set[str]) -> Iterable[str]:
         long = column.text and any(len(word) > LONG for word in text.split())
         kinds = " ".join(filter(None, ("text" * column.text, "long" * long, tone)))
         linked = target in known and not here
-        content = _element("a", escape(text), href=f"#{target}") if linked else escape(text)
-        cells.append(_element("td", content, class_=kinds, id=target * here))
+        content = element("a", escape(text), href=f"#{target}") if linked else escape(text)
+        cells.append(element("td", content, class_=kinds, id=target * here))
     return cells
 
 
 def inlined(drawing: Drawing) -> Drawing | None:
     """Draw a plot; return None if it is empty."""
-    from photogram.show.sketch.svg import svg_of
-
     sketch = drawing.sketch()
     markup = svg_of(sketch, drawing.name, drawing.title) if sketch is not None else ""
     return replace(drawing, markup=markup) if markup else None

@@ -58,14 +58,14 @@ def _panel(placed: Placed, name: str) -> str:
     return clip + inside + "".join(svg(mark, POINTS) for mark in placed.frame) + _names(placed)
 
 
-def element(name: str, content: str = "", /, **attributes: str | float) -> str:
-    """Return an element without empty attributes and full opacities."""
+def element(name: str, content: str | None = None, /, **attributes: str | float) -> str:
+    """Return an element without empty attributes and full opacities; its content is SVG or HTML."""
     written = "".join(
-        f' {key.replace("_", "-")}="{escape(value) if isinstance(value, str) else number(value)}"'
+        f' {key.rstrip("_").replace("_", "-")}="{escape(value) if isinstance(value, str) else number(value)}"'
         for key, value in attributes.items()
         if value != "" and not (value == 1.0 and "opacity" in key)
     )
-    return f"<{name}{written}>{content}</{name}>" if content else f"<{name}{written}/>"
+    return f"<{name}{written}/>" if content is None else f"<{name}{written}>{content}</{name}>"
 
 
 def number(value: float) -> str:
