@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
-
-import numpy as np
 
 from photogram.arguments.arrays import natural_order, truth_value
 from photogram.errors import InputError
@@ -17,8 +15,6 @@ from photogram.formats.control_lists import SYSTEMS
 from photogram.formats.metadata.pictures import ENDINGS, said_by_picture, time_of_picture
 from photogram.formats.metadata.record import (
     FIXED,
-    Event,
-    Exposure,
     Said,
     is_events,
     number_of,
@@ -42,7 +38,7 @@ EXPOSURES = ".mrk"
 
 
 @dataclass
-class Found:
+class _Sources:
     """Metadata of each photo by relative path or name, and the files read.
 
     `said` contains its sources in order of priority; `flights` its folder, and its .MRK file if the folder
@@ -53,7 +49,7 @@ class Found:
     said: dict[str, list[Said]] = field(default_factory=dict)
     flights: dict[str, str] = field(default_factory=dict)
     tables: list[Path] = field(default_factory=list)
-    pictures: list[Path] = field(default_factory=list)
+    pictures: dict[str, Path] = field(default_factory=dict)
     messages: list[Message] = field(default_factory=list)
 
     def metadata(self) -> Metadata:
@@ -69,47 +65,21 @@ class Found:
         if without_height:
             remark = phrase("photos.heightless", n=len(without_height), names=without_height)
             remarks.append(Message(remark, self.path))
-        return Metadata(self.path, photos, tuple(self.tables), tuple(self.pictures), tuple(remarks))
+        return Metadata(self.path, photos, tuple(self.tables), tuple(self.pictures.values()), tuple(remarks))
 
 
-def found_in(directory: Path, *, antenna: bool) -> Found:
-    """Read all files with photo positions in a folder and its subfolders.
-
-    If `antenna`, positions of .MRK files are antenna positions.
-    """
-    with reading(directory):
-        if not directory.is_dir():
-            raise InputError(phrase("photos.folder"), file=directory)
-        files = list(files_of(directory))
-    found = Found(directory)
-    pictures = {_key(directory, path): path for path in files if path.suffix.lower() in ENDINGS}
-    found.pictures = list(pictures.values())
-    given = _tables(directory, files, found)
-    exposures = {path: read_exposures(path) for path in files if path.suffix.lower() == EXPOSURES}
-    found.tables += exposures
-    if not (pictures or given or exposures):
-        raise InputError(
-            phrase("photos.sources", names=[*ENDINGS, "*_Timestamp.MRK", GEO_TXT]), file=directory
-        )
-    for key in dict.fromkeys([*pictures, *given]):
-        found.said[key] = [given[key]] if key in given else []
-        folder = PurePosixPath(key).parent.as_posix()
-        found.flights[key] = directory.resolve().name if folder == "." else folder
-    _add_exposures(directory, exposures, found, antenna=antenna)
-    for key, path in pictures.items():
-        found.said[key] += said_by_picture(path)
+def _files_of(directory: Path) -> dict[str, Path]:
+    """Return the visible files of a folder and its subfolders, in order, by their relative paths."""
+    found = {}
+    for folder, folders, names in os.walk(directory):
+        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        for path in (Path(folder) / name for name in sorted(names) if not name.startswith(".")):
+            found[path.relative_to(directory).as_posix()] = path
     return found
 
 
-def files_of(directory: Path) -> Iterator[Path]:
-    """Yield the visible files of a folder and its subfolders in order."""
-    for folder, folders, names in os.walk(directory):
-        folders[:] = sorted(each for each in folders if not each.startswith("."))
-        yield from (Path(folder) / name for name in sorted(names) if not name.startswith("."))
-
-
-def _key(directory: Path, path: Path) -> str:
-    return path.relative_to(directory).as_posix()
+def _with_suffix(files: Mapping[str, Path], *suffixes: str) -> dict[str, Path]:
+    return {key: path for key, path in files.items() if path.suffix.lower() in suffixes}
 
 
 class Photos:
@@ -139,12 +109,12 @@ class Photos:
         return []
 
 
-def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, Said]:
+def _tables(files: Mapping[str, Path], found: _Sources) -> dict[str, Said]:
     """Return metadata of geo.txt (with priority) and reference tables."""
-    photos = Photos(_key(directory, path) for path in found.pictures)
-    texts = [path for path in files if path.suffix.lower() in _TEXTS and path.stem not in TABLES]
+    photos = Photos(found.pictures)
+    texts = {path: key for key, path in files.items() if path.stem not in TABLES}
     given: dict[str, Said] = {}
-    again: dict[Path, int] = {}
+    again = Counter[Path]()
     for path in sorted(texts, key=lambda each: (each.name.lower() != GEO_TXT, each)):
         if path.name.lower() == GEO_TXT:
             rows = read_geo_txt(path)
@@ -153,63 +123,52 @@ def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, S
         else:
             continue
         found.tables.append(path)
-        folder = _key(directory, path.parent)
+        folder = PurePosixPath(texts[path]).parent.as_posix()
         for name, said in rows.items():
             keys = photos.meant(name, folder)
             if len(keys) > 1:
                 raise said.place.error(phrase("photos.ambiguous", photo=name, names=keys))
             key = keys[0] if keys else (PurePosixPath(folder) / name).as_posix()
-            if given.setdefault(key, said) is not said:
-                again[path] = again.get(path, 0) + 1
-    for path, count in again.items():
-        found.messages.append(Message(phrase("photos.other-table", n=count), path))
+            again[path] += given.setdefault(key, said) is not said
+    found.messages += [Message(phrase("photos.other-table", n=n), path) for path, n in again.items() if n]
     return given
 
 
-def _add_exposures(
-    directory: Path, exposures: Mapping[Path, Mapping[int, Exposure]], found: Found, *, antenna: bool
-) -> None:
-    """Add exposures of .MRK files to the photos of their folders."""
+def _add_exposures(files: Mapping[str, Path], found: _Sources, *, antenna: bool) -> None:
+    """Add exposures of .MRK files to the photos of their folders, or of subfolders without such files."""
+    exposures = {path: read_exposures(path, antenna=antenna) for path in files.values()}
+    found.tables += exposures
     of_folder: dict[str, list[Path]] = {}
-    for path in exposures:
-        of_folder.setdefault(_key(directory, path.parent), []).append(path)
+    for key, path in files.items():
+        of_folder.setdefault(PurePosixPath(key).parent.as_posix(), []).append(path)
     used: dict[Path, set[int]] = {path: set() for path in exposures}
     for key, sources in found.said.items():
-        number, folder = number_of(PurePosixPath(key).stem), _nearest(key, of_folder)
+        photo = PurePosixPath(key)
+        number = number_of(photo.stem)
+        folder = next((each.as_posix() for each in photo.parents if each.as_posix() in of_folder), None)
         if number is None or folder is None:
             continue
-        own = _of_flight(key, of_folder[folder], number, exposures)
-        if own is None:
-            continue
-        if len(of_folder[folder]) > 1:
-            found.flights[key] = f"{folder}/{prefix_of(own)}".removeprefix("./")
-        if number in exposures[own]:
-            sources.append(exposures[own][number].said(antenna))
-            used[own].add(number)
+        paths = of_folder[folder]
+        if len(paths) > 1:
+            # The file with the prefix of the photo, otherwise the one with its number.
+            named = [each for each in paths if photo.name.startswith(f"{prefix_of(each)}_")]
+            paths = named or [each for each in paths if number in exposures[each]]
+            if len(paths) > 1:
+                names = [path.name for path in paths]
+                raise InputError(phrase("photos.flight", photo=key, names=names), file=paths[0].parent)
+            if not paths:
+                continue
+            found.flights[key] = f"{folder}/{prefix_of(paths[0])}".removeprefix("./")
+        if number in exposures[paths[0]]:
+            sources.append(exposures[paths[0]][number])
+            used[paths[0]].add(number)
     for path, numbers in used.items():
-        if left := len(exposures[path]) - len(numbers):
-            found.messages.append(Message(phrase("photos.unused", n=left, total=len(exposures[path])), path))
+        found.messages += _unused(path, len(exposures[path]), len(numbers))
 
 
-def _nearest(key: str, folders: Mapping[str, object]) -> str | None:
-    """Return the folder of a photo, or its nearest parent, among some folders."""
-    above = (each.as_posix() for each in PurePosixPath(key).parents)
-    return next((each for each in above if each in folders), None)
-
-
-def _of_flight(
-    key: str, paths: Sequence[Path], number: int, exposures: Mapping[Path, Mapping[int, Exposure]]
-) -> Path | None:
-    """Return the .MRK file of a photo: the only one, or the one with its prefix."""
-    if len(paths) == 1:
-        return paths[0]
-    named = [each for each in paths if PurePosixPath(key).name.startswith(f"{prefix_of(each)}_")]
-    likely = named or [each for each in paths if number in exposures[each]]
-    if len(likely) > 1:
-        raise InputError(
-            phrase("photos.flight", photo=key, names=[path.name for path in likely]), file=paths[0].parent
-        )
-    return likely[0] if likely else None
+def _unused(path: Path, total: int, used: int) -> list[Message]:
+    """Return a message on exposures of a file without a photo."""
+    return [Message(phrase("photos.unused", n=total - used, total=total), path)] if used < total else []
 
 
 WITHOUT = "without"
@@ -346,7 +305,26 @@ def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = Fals
     Section 6 of the specification of accuracy statements.
     """
     truth_value("mrk_antenna", mrk_antenna)
-    return found_in(Path(directory), antenna=mrk_antenna).metadata()
+    directory = Path(directory)
+    with reading(directory):
+        if not directory.is_dir():
+            raise InputError(phrase("photos.folder"), file=directory)
+        files = _files_of(directory)
+    found = _Sources(directory, pictures=_with_suffix(files, *ENDINGS))
+    exposures = _with_suffix(files, EXPOSURES)
+    given = _tables(_with_suffix(files, *_TEXTS), found)
+    if not (found.pictures or given or exposures):
+        raise InputError(
+            phrase("photos.sources", names=[*ENDINGS, "*_Timestamp.MRK", GEO_TXT]), file=directory
+        )
+    for key in dict.fromkeys([*found.pictures, *given]):
+        found.said[key] = [given[key]] if key in given else []
+        folder = PurePosixPath(key).parent.as_posix()
+        found.flights[key] = directory.resolve().name if folder == "." else folder
+    _add_exposures(exposures, found, antenna=mrk_antenna)
+    for key, path in found.pictures.items():
+        found.said[key] += said_by_picture(path)
+    return found.metadata()
 
 
 def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
@@ -378,7 +356,7 @@ def read_gnss_file(
     `directory`: folder of all photographs; None: the photos of the project. The order of photos assigns
     events to them. `mrk_antenna`: whether positions of .MRK files are antenna positions.
     """
-    found = Found(path, tables=[path])
+    found = _Sources(path, tables=[path])
     first = next((place.text or "" for place in filled_lines(path)), "").strip()
     if path.suffix.lower() == EXPOSURES:
         said = _of_exposures(path, photos, found.messages, antenna=mrk_antenna)
@@ -398,64 +376,38 @@ def _of_exposures(
     path: Path, photos: Sequence[str], messages: list[Message], *, antenna: bool
 ) -> Mapping[str, Said]:
     """Return exposures of an .MRK file by photo, by number in its name."""
-    exposures = read_exposures(path)
+    exposures = read_exposures(path, antenna=antenna)
     if not exposures:
         raise InputError(phrase("format.missing", what="exposures"), file=path)
     names: dict[int, str] = {}
     for photo in photos:
         number = number_of(PurePosixPath(photo).stem)
-        if number is None or number not in exposures:
-            continue
-        if number in names:
+        if number is not None and number in exposures and names.setdefault(number, photo) != photo:
             raise InputError(
                 phrase("photos.exposure", number=number, names=[names[number], photo]), file=path
             )
-        names[number] = photo
     if not names:
         raise InputError(phrase("photos.numbers", numbers=list(exposures), names=list(photos)), file=path)
-    if left := len(exposures) - len(names):
-        messages.append(Message(phrase("photos.unused", n=left, total=len(exposures)), path))
-    return {photo: exposures[number].said(antenna) for number, photo in names.items()}
+    messages += _unused(path, len(exposures), len(names))
+    return {photo: exposures[number] for number, photo in names.items()}
 
 
 def _of_events(path: Path, photos: Sequence[str], directory: Path | None) -> Mapping[str, Said]:
     """Return events by photo, matched in order of time, or in order of photo names."""
     events = read_events(path)
-    names, times = _in_order(photos, directory)
+    pictures = {} if directory is None else _with_suffix(_files_of(directory), *ENDINGS)
+    names = sorted(photos if directory is None else pictures, key=natural_order)
+    times = {name: time for name in pictures if (time := time_of_picture(pictures[name])) is not None}
+    if len(times) == len(names):
+        names.sort(key=times.__getitem__)
     if len(names) != len(events):
         counts = {"events": len(events), "photos": len(names)}
         source = phrase("photos.project") if directory is None else directory.name
         raise InputError(phrase("photos.events-count", **counts, source=source), file=path)
-    if times:
-        _check_intervals(path, events, names, times)
+    if len(times) == len(names):
+        for (first, second), (before, after) in zip(pairwise(events), pairwise(names), strict=True):
+            elapsed, taken = second.seconds - first.seconds, times[after] - times[before]
+            if abs(elapsed - taken) > MAX_INTERVAL_DIFFERENCE:
+                fields = {"elapsed": elapsed, "photo": after, "taken": taken}
+                raise second.said.place.error(phrase("photos.interval", **fields))
     return {name: event.said for name, event in zip(names, events, strict=True)}
-
-
-def _in_order(photos: Sequence[str], directory: Path | None) -> tuple[list[str], list[float]]:
-    """Return photos and times (seconds) in the order of exposure; empty without EXIF."""
-    if directory is None:
-        return sorted(photos, key=natural_order), []
-    pictures = {
-        path.relative_to(directory).as_posix(): path
-        for path in files_of(directory)
-        if path.suffix.lower() in ENDINGS
-    }
-    names = sorted(pictures, key=natural_order)
-    times = [time_of_picture(pictures[name]) for name in names]
-    known = [time for time in times if time is not None]
-    if len(known) < len(times):
-        return names, []
-    order = np.argsort(known, kind="stable").tolist()
-    return [names[row] for row in order], [known[row] for row in order]
-
-
-def _check_intervals(
-    path: Path, events: Sequence[Event], names: Sequence[str], times: Sequence[float]
-) -> None:
-    """Reject events whose intervals do not fit the image files."""
-    for (first, second), (before, after), name in zip(
-        pairwise(events), pairwise(times), names[1:], strict=True
-    ):
-        elapsed, taken = second.seconds - first.seconds, after - before
-        if abs(elapsed - taken) > MAX_INTERVAL_DIFFERENCE:
-            raise second.said.place.error(phrase("photos.interval", elapsed=elapsed, photo=name, taken=taken))

@@ -117,46 +117,6 @@ _NAMED = ("N", "E", "V", "Lat", "Lon", "Ellh", "Q")
 LARGEST_FLAG = 1000
 
 
-@dataclass(frozen=True)
-class Exposure:
-    """An exposure of an .MRK file: number, from 1, and GPS seconds of week.
-
-    `offset` is the vector from antenna to camera: north, east, down, metres; `position` is longitude,
-    latitude (degrees) and ellipsoidal height of the camera; `sd` are standard deviations of east, north and
-    height, metres; `flag` is the code of the solution, see `fix_of`.
-    """
-
-    number: int
-    gps_seconds: float
-    week: int
-    offset: Triple
-    position: Triple | None
-    sd: Triple | None
-    flag: int
-    place: Place
-
-    def said(self, antenna: bool) -> Said:
-        """Return the metadata; `antenna`: the position is an antenna position."""
-        position = self.position
-        if antenna and position is not None:
-            position = _moved(position, self.offset)
-        rtk = fix_of(self.flag) != "none"
-        return Said(".MRK", self.place, ELLIPSOIDAL, "", position, self.sd, rtk, self.flag)
-
-
-def _moved(position: Triple, offset: Triple) -> Triple:
-    """Return a position shifted north, east and down by metres."""
-    longitude, latitude, height = position
-    known = np.array([[math.radians(longitude), math.radians(latitude), height]])
-    lengths = lengths_of_units(known, Spheroid.wgs84())[0]
-    north, east, down = offset
-    return (
-        longitude + math.degrees(east / float(lengths[0])),
-        latitude + math.degrees(north / float(lengths[1])),
-        height - down,
-    )
-
-
 def number_of(stem: str) -> int | None:
     """Return the exposure number of `DJI_0042`, `..._0042_V`; None without."""
     found = _NUMBER.findall(stem)
@@ -169,56 +129,60 @@ def prefix_of(path: Path) -> str:
     return match[1] if match else path.stem
 
 
-def read_exposures(path: Path) -> dict[int, Exposure]:
+def read_exposures(path: Path, *, antenna: bool) -> dict[int, Said]:
     """Read the exposures of an .MRK file by number.
 
     Section 6 of the specification: tab-separated number, seconds of the week, `[week]`, `dN,N`, `dE,E`,
-    `dV,V` in millimetres, `lat,Lat`, `lon,Lon`, `h,Ellh`, `sN, sE, sV` in metres, and `flag,Q`.
+    `dV,V` (antenna to camera, millimetres, north, east, down), `latitude,Lat`, `longitude,Lon`,
+    `height,Ellh`, `sN, sE, sV` (standard deviations, metres), `flag,Q`. The position is the position of the
+    camera. If `antenna`, it is the position of the antenna.
     """
-    found: dict[int, Exposure] = {}
+    found: dict[int, Said] = {}
     for record, line in enumerate(read_lines(path), 1):
-        if not line.strip():
-            continue
-        each = _exposure(Place(path, record, line))
-        if each.number in found:
-            raise each.place.error(phrase("format.repeated", what="exposure", name=str(each.number)))
-        found[each.number] = each
+        if line.strip():
+            place = Place(path, record, line)
+            number, said = _exposure(place, antenna)
+            if number in found:
+                raise place.error(phrase("format.repeated", what="exposure", name=str(number)))
+            found[number] = said
     return found
 
 
-def _exposure(place: Place) -> Exposure:
+def _exposure(place: Place, antenna: bool) -> tuple[int, Said]:
+    """Return number and metadata of an exposure."""
     cells = [each.strip() for each in (place.text or "").split("\t")]
     if len(cells) < 11:
         raise place.error(phrase("format.words", n=len(cells), required="11 words between tabs"))
     number, seconds, week, *rest = cells
     if not (week.startswith("[") and week.endswith("]")):
         raise place.error(phrase("photos.week", value=week))
-    named: dict[str, str] = {}
-    accuracies: list[str] = []
-    for cell in rest:
-        parts = [each.strip() for each in cell.split(",")]
-        if len(parts) == 2 and parts[1] in _NAMED:
-            named[parts[1]] = parts[0]
-        elif len(parts) == 3:
-            accuracies = parts
+    parts = [[each.strip() for each in cell.split(",")] for cell in rest]
+    named = {part[1]: part[0] for part in parts if len(part) == 2}
+    accuracies = [part for part in parts if len(part) == 3]
     missing = [each for each in _NAMED if each not in named] + ([] if accuracies else ["sN, sE, sV"])
     if missing:
         raise place.error(phrase("format.member", name=missing[0]))
-    north, east, up = (place.number(each, "standard deviation") for each in accuracies)
+    north, east, up = (place.number(each, "standard deviation") for each in accuracies[-1])
     flag = place.whole(named["Q"], "Q", highest=LARGEST_FLAG)
-    offset = [place.number(named[each], each) / 1000 for each in ("N", "E", "V")]
+    to_north, to_east, down = (place.number(named[each], each) / 1000 for each in "NEV")
     position = geographic_position(
         place, [place.number(named[each], each) for each in ("Lon", "Lat", "Ellh")]
     )
-    return Exposure(
-        place.whole(number, "number", highest=10**6),
-        place.number(seconds, "seconds"),
-        place.whole(week[1:-1].strip(), "week", highest=10**5),
-        (offset[0], offset[1], offset[2]),
-        position,
-        usable_deviations(east, north, up) if flag else None,
-        flag,
-        place,
+    place.number(seconds, "seconds")
+    place.whole(week[1:-1].strip(), "week", highest=10**5)
+    if antenna and position is not None:
+        longitude, latitude, height = position
+        known = np.array([[math.radians(longitude), math.radians(latitude), height]])
+        per_radian = lengths_of_units(known, Spheroid.wgs84())[0]
+        position = (
+            longitude + math.degrees(to_east / float(per_radian[0])),
+            latitude + math.degrees(to_north / float(per_radian[1])),
+            height - down,
+        )
+    sd = usable_deviations(east, north, up) if flag else None
+    rtk = fix_of(flag) != "none"
+    return place.whole(number, "number", highest=10**6), Said(
+        ".MRK", place, ELLIPSOIDAL, "", position, sd, rtk, flag
     )
 
 
