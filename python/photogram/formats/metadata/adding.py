@@ -44,56 +44,39 @@ DETERMINED = 3.0  # Smallest ratio of spread across the line to misfit for posit
 
 
 def with_photo_positions(project: Project, options: ReadOptions) -> Project:
-    """Return a project with positions of `--gnss` and of photo files."""
+    """Return a project with positions of `--gnss` and of photo files as observations.
+
+    Positions of `--gnss` replace observed positions; photos whose position is observed otherwise are
+    unchanged. RTK positions with standard deviations share a shift (0.05 m a priori) and a lever arm (0.01 m)
+    per flight. These represent errors of the base and of the shutter time. A model without georeference is
+    transformed to the positions.
+    """
     settings = project.details.get("settings")
     own = settings if isinstance(settings, Settings) else None
     files = options if options.photos_dir or own is None else own.photo_files
     sd = options.sd if own is None else own.sd
-    project = with_gnss_file(project, options, sd, None if files is None else files.photos_dir)
-    return project if files is None else with_photo_files(project, files, sd)
-
-
-def with_gnss_file(
-    project: Project,
-    options: ReadOptions,
-    sd: Mapping[str, tuple[float, ...]],
-    directory: Path | None = None,
-) -> Project:
-    """Return a project whose positions are replaced by those in the file `options.gnss`.
-
-    `sd` are standard deviations by table; `gnss` applies to positions without one. `directory` is the folder
-    of all photographs, whose order assigns events to photos.
-    """
-    path, antenna = options.gnss, options.gnss_antenna
-    if path is None:
-        return project
-    metadata = read_gnss_file(path, project.block.photo_ids, directory, mrk_antenna=options.mrk_antenna)
-    keys = _keys(project, metadata, weighted_only=True)
-    others = [
-        each for each in project.block.observations if not (isinstance(each, Position) and each.photo in keys)
-    ]
-    messages = list(project.messages)
-    if replaced := len(project.block.observations) - len(others):
-        messages.append(Message(phrase("photos.replaced", n=replaced), path))
-    if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
-        code = "photos.events" if antenna else "photos.events-without-lever"
-        messages.append(Message.of(code, path))
-    project = project.replace(block=project.block.replace(observations=others), messages=tuple(messages))
-    return _with_positions(project, metadata, keys, options.gnss_crs, sd, GNSS_CRS, antenna)
-
-
-def with_photo_files(project: Project, options: ReadOptions, sd: Mapping[str, tuple[float, ...]]) -> Project:
-    """Return a project with positions in photo files as observations.
-
-    Photos with an observed position are unchanged. RTK positions with standard deviations share a shift (0.05
-    m a priori) and a lever arm (0.01 m) per flight. These represent errors of the base and of the shutter
-    time. A model without georeference is transformed to the positions. `sd` are standard deviations by table;
-    `gnss` applies to positions without one.
-    """
-    if options.photos_dir is None:
-        return project
-    metadata = read_metadata(options.photos_dir, mrk_antenna=options.mrk_antenna)
-    return _with_positions(project, metadata, _keys(project, metadata), options.photos_crs, sd, PHOTOS_CRS)
+    path, antenna, directory = options.gnss, options.gnss_antenna, None if files is None else files.photos_dir
+    if path is not None:
+        metadata = read_gnss_file(path, project.block.photo_ids, directory, mrk_antenna=options.mrk_antenna)
+        keys = _keys(project, metadata, weighted_only=True)
+        others = [
+            each
+            for each in project.block.observations
+            if not (isinstance(each, Position) and each.photo in keys)
+        ]
+        messages = list(project.messages)
+        if replaced := len(project.block.observations) - len(others):
+            messages.append(Message(phrase("photos.replaced", n=replaced), path))
+        if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
+            code = "photos.events" if antenna else "photos.events-without-lever"
+            messages.append(Message.of(code, path))
+        project = project.replace(block=project.block.replace(observations=others), messages=tuple(messages))
+        project = _with_positions(project, metadata, keys, options.gnss_crs, sd, GNSS_CRS, antenna)
+    if files is not None and directory is not None:
+        metadata = read_metadata(directory, mrk_antenna=files.mrk_antenna)
+        keys = _keys(project, metadata)
+        project = _with_positions(project, metadata, keys, files.photos_crs, sd, PHOTOS_CRS)
+    return project
 
 
 def _with_positions(
@@ -367,65 +350,52 @@ def _systems(said: Sequence[Said], crs: str | None, option: str) -> list[str]:
 def _check_heights(
     records: Sequence[PhotoRecord], said: Sequence[Said], systems: Sequence[str], option: str
 ) -> None:
+    """Reject heights of different or unknown reference surfaces."""
+    from photogram.formats.crs import has_geoid_heights
+
+    surfaces = {
+        system: ABOVE[system != ELLIPSOIDAL and has_geoid_heights(system)] if system else _UNKNOWN
+        for system in dict.fromkeys(systems)
+    }
     kinds: dict[str, list[str]] = {}
     for record, own, system in zip(records, said, systems, strict=True):
-        kinds.setdefault(_kind(own, system), []).append(f"{record.photo} ({own.source})")
+        kind = ABOVE[True] if own.heights == SEA_LEVEL else surfaces[system]
+        kinds.setdefault(kind, []).append(f"{record.photo} ({own.source})")
     if len(kinds) > 1:
         (one, first), (other, second), *_ = kinds.items()
         raise InputError(phrase("photos.heights", one=one, first=first, other=other, second=second))
     for own, system in zip(said, systems, strict=True):
-        if own.heights == SEA_LEVEL and not _is_above_geoid(system):
+        if own.heights == SEA_LEVEL and surfaces[system] != ABOVE[True]:
             raise own.place.error(phrase("photos.sea-level", option=option))
     if "" in systems:
         raise said[0].place.error(phrase("photos.height-kind", option=option))
 
 
-def _kind(said: Said, system: str) -> str:
-    """Return the reference surface of heights."""
-    if said.heights == SEA_LEVEL:
-        return ABOVE[True]
-    return ABOVE[_is_above_geoid(system)] if system else _UNKNOWN
-
-
-def _is_above_geoid(system: str) -> bool:
-    from photogram.formats.crs import has_geoid_heights
-
-    return system not in ("", ELLIPSOIDAL) and has_geoid_heights(system)
-
-
 def gnss_files(
     metadata: Metadata, path: Path, crs: str | None = None, sd: Sequence[float] | None = None
 ) -> dict[Path, bytes]:
-    """Return a table `gnss` of a plain project, and `gnss_groups` if needed."""
+    """Return a table `gnss` of a plain project, and `gnss_groups` if needed.
+
+    Photo names have folders only if necessary.
+    """
     known = located(list(metadata.photos.values()), crs, sd)
     if not known.records:
         raise InputError(phrase("format.missing", what="positions of photos"), file=metadata.directory)
-    files = {path: csv_text(_positions(known), [_COMMENT])}
-    flights = list(dict.fromkeys(each for each in known.flights if each))
-    if flights:
-        files[path.with_name(GROUPS)] = csv_text(_groups(flights))
-    return files
-
-
-def _positions(known: Located) -> dict[str, Any]:
-    """Return the columns of positions; photo names have folders only if necessary."""
-    xyz, sd = known.geographic()
+    xyz, deviations = known.geographic()
     names = {each.photo: PurePosixPath(each.photo).name for each in known.records}
     often = Counter(names.values())
-    return {
+    columns = {
         "photo": [photo if often[name] > 1 else name for photo, name in names.items()],
         **dict(zip(("longitude", "latitude", "height"), xyz.T, strict=True)),
-        **dict(zip(deviation_columns(AXES), sd.T, strict=True)),
+        **dict(zip(deviation_columns(AXES), deviations.T, strict=True)),
         "group": known.flights,
         "source": [each.position.source if each.position else "" for each in known.records],
         "sd_source": [each.deviations.source if each.deviations else "" for each in known.records],
     }
-
-
-def _groups(flights: Sequence[str]) -> dict[str, Any]:
-    """Return the columns of the shared parameters of flights."""
-    count = len(flights)
-    columns: dict[str, Any] = {"group": list(flights), "shift": ["true"] * count}
-    for kind, deviation in (("lever", LEVER_SD), ("shift", SHIFT_SD)):
-        columns |= {f"sd_{kind}_{axis}": [deviation] * count for axis in AXES}
-    return columns
+    files = {path: csv_text(columns, [_COMMENT])}
+    if flights := list(dict.fromkeys(each for each in known.flights if each)):
+        groups: dict[str, Any] = {"group": flights, "shift": ["true"] * len(flights)}
+        for kind, deviation in (("lever", LEVER_SD), ("shift", SHIFT_SD)):
+            groups |= {f"sd_{kind}_{axis}": [deviation] * len(flights) for axis in AXES}
+        files[path.with_name(GROUPS)] = csv_text(groups)
+    return files

@@ -104,64 +104,55 @@ def said_by_tags(tags: Mapping[int, Any], place: Place) -> Said | None:
     sea level up to EXIF 2.32 and the ellipsoid from EXIF 3.0, which has 2 and 3 for sea level. The reference
     of heights with 0 and 1 is therefore unknown, and the user must specify it.
     """
-    error = _tag(tags, ERROR, place)
+    error = _number_of_tag(tags, ERROR, place)
     each = error / math.sqrt(2)
     sd = usable_deviations(each, each, 2 * each)
-    position = _position_of_tags(tags, place)
+    reference = tags.get(ALTITUDE_REFERENCE, 0)
+    if isinstance(reference, bytes) and len(reference) == 1:
+        reference = reference[0]
+    position: Triple | None = None
+    if _word_of_tag(tags, STATUS) != "V":  # V: the receiver had no solution
+        latitude = _angle_of_tag(tags, LATITUDE, "NS", place)
+        longitude = _angle_of_tag(tags, LONGITUDE, "EW", place)
+        if not math.isnan(latitude + longitude):
+            height = _number_of_tag(tags, ALTITUDE, place)
+            height = -height if reference in (1, 3) else height
+            position = geographic_position(place, (longitude, latitude, height))
     if position is None and sd is None:
         return None
-    remark = RADIAL if sd is not None else DOP_ALONE if not math.isnan(_tag(tags, DOP, place)) else ""
-    heights = UNSAID if _reference(tags, place) < 2 else SEA_LEVEL
+    if reference not in (0, 1, 2, 3):
+        raise place.error(phrase("photos.altitude-reference", value=str(reference)))
+    without = math.isnan(_number_of_tag(tags, DOP, place))
+    remark = RADIAL if sd is not None else "" if without else DOP_ALONE
+    heights = UNSAID if reference < 2 else SEA_LEVEL
     return Said("EXIF", place, UNSAID_SYSTEM, heights, position, sd, remark=remark)
 
 
-def _tag(tags: Mapping[int, Any], tag: int, place: Place) -> float:
+def _number_of_tag(tags: Mapping[int, Any], tag: int, place: Place) -> float:
     """Return a tag as a number; NaN if it is missing or its denominator is 0."""
     value = tags.get(tag)
-    return math.nan if value is None else _as_tag(value, place, tag)
-
-
-def _as_tag(value: Any, place: Place, tag: int) -> float:
     try:
-        found = float(value)
+        found = math.nan if value is None else float(value)
     except (TypeError, ValueError, OverflowError, ZeroDivisionError):
-        raise place.error(phrase("photos.tag", tag=tag, value=str(value))) from None
+        found = math.inf
     if math.isinf(found):
         raise place.error(phrase("photos.tag", tag=tag, value=str(value)))
     return found
 
 
-def _reference(tags: Mapping[int, Any], place: Place) -> int:
-    """Return the altitude reference 0, 1, 2 or 3; default 0."""
-    value = tags.get(ALTITUDE_REFERENCE, 0)
-    if isinstance(value, bytes) and len(value) == 1:
-        value = value[0]
-    if value not in (0, 1, 2, 3):
-        raise place.error(phrase("photos.altitude-reference", value=str(value)))
-    return int(value)
+def _word_of_tag(tags: Mapping[int, Any], tag: int) -> str:
+    return str(tags.get(tag, "")).strip("\0 ").upper()
 
 
-def _position_of_tags(tags: Mapping[int, Any], place: Place) -> Triple | None:
-    if str(tags.get(STATUS, "")).strip("\0 ").upper() == "V":  # The receiver had no solution
-        return None
-    latitude = _angle(tags, LATITUDE, "NS", place)
-    longitude = _angle(tags, LONGITUDE, "EW", place)
-    if math.isnan(latitude) or math.isnan(longitude):
-        return None
-    height = _tag(tags, ALTITUDE, place)
-    signed = -height if _reference(tags, place) in (1, 3) else height
-    return geographic_position(place, (longitude, latitude, signed))
-
-
-def _angle(tags: Mapping[int, Any], tag: int, letters: str, place: Place) -> float:
+def _angle_of_tag(tags: Mapping[int, Any], tag: int, letters: str, place: Place) -> float:
     """Return a latitude or longitude in degrees; NaN if it is missing."""
     value = tags.get(tag)
     if value is None:
         return math.nan
     if not isinstance(value, Sequence) or isinstance(value, str | bytes) or len(value) != 3:
         raise place.error(phrase("photos.angle", tag=tag, value=str(value)))
-    degrees, minutes, seconds = (_as_tag(each, place, tag) for each in value)
-    letter = str(tags.get(tag - 1, "")).strip("\0 ").upper()
+    degrees, minutes, seconds = (_number_of_tag({tag: each}, tag, place) for each in value)
+    letter = _word_of_tag(tags, tag - 1)
     if letter not in tuple(letters):
         raise place.error(phrase("photos.letter", tag=tag - 1, value=letter, names=list(letters)))
     size = degrees + minutes / 60 + seconds / 3600
