@@ -1,13 +1,21 @@
-"""Records of a COLMAP model."""
+"""Records of a COLMAP model.
+
+The fields of a record are declared in the order of the files. Text and binary files, reading and writing use
+the same declarations.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.io.places import Place
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field, fields
 
 MODELS: dict[str, int] = {
     "SIMPLE_PINHOLE": 3,
@@ -35,23 +43,106 @@ CAMERA = "CAMERA"
 SENSORS = (CAMERA, "IMU")  # Types of sensors in the order of their numbers
 
 
-@dataclass(frozen=True)
-class Pose:
-    """R and t of a rigid motion: w, x, y, z of its quaternion, and its translation."""
+WORDS: dict[str, Sequence[str]] = {"model": tuple(MODELS), "sensor": SENSORS}
+"""Words of text files by form; binary files have their index."""
+FEATURE = np.dtype([("xy", "<f8", 2), ("point", "<i8")])
+POINT = np.dtype([("number", "<u8"), ("xyz", "<f8", 3), ("rgb", "u1", 3), ("error", "<f8"), ("track", "<u8")])
+"""Features of images, and points up to their tracks, in binary files."""
 
-    quaternion: tuple[float, ...]
-    translation: tuple[float, ...]
+
+class Form(NamedTuple):
+    """Form of a field: a character of `struct`, a key of `WORDS`, `name`, `features`, or a record.
+
+    `count` is the number of values, of groups with these names, or of records: a function of the previous
+    fields. None: one value for each name.
+    """
+
+    kind: str | type
+    names: tuple[str, ...]
+    count: Callable[[dict[str, Any]], int] | None
+
+
+def _stored(kind: str | type, names: str = "", count: Callable[[dict[str, Any]], int] | None = None) -> Any:
+    return field(metadata={"form": Form(kind, tuple(names.split()), count)})
+
+
+@cache
+def layout(kind: type) -> dict[str, Form]:
+    """Return the stored fields of a record with their forms."""
+    return {each.name: each.metadata["form"] for each in fields(kind) if each.metadata}
+
+
+_POSE = "QW QX QY QZ TX TY TZ"
+"""R and t of a rigid motion: w, x, y, z of its quaternion, and its translation."""
 
 
 @dataclass(frozen=True)
 class Camera:
     """A record of cameras."""
 
-    number: int
-    model: str
-    width: int
-    height: int
-    parameters: tuple[float, ...]
+    number: int = _stored("I", "CAMERA_ID")
+    model: str = _stored("model", "MODEL")
+    width: int = _stored("Q", "WIDTH")
+    height: int = _stored("Q", "HEIGHT")
+    parameters: tuple[float, ...] = _stored("d", "parameter", lambda own: MODELS.get(own["model"], 0))
+    place: Place = Place()
+
+
+@dataclass(frozen=True)
+class Image:
+    """A record of images; its pose is camera from world."""
+
+    number: int = _stored("I", "IMAGE_ID")
+    pose: tuple[float, ...] = _stored("d", _POSE)
+    camera: int = _stored("I", "CAMERA_ID")
+    name: str = _stored("name", "NAME")
+    features: np.ndarray[Any, Any] = _stored("features", "POINTS2D")
+    place: Place = Place()
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor of a rig."""
+
+    kind: str = _stored("sensor", "SENSOR_TYPE")
+    number: int = _stored("I", "SENSOR_ID")
+
+
+@dataclass(frozen=True)
+class MountedSensor(Sensor):
+    """A sensor with its pose, sensor from rig, if it is known."""
+
+    has_pose: bool = _stored("?", "HAS_POSE")
+    pose: tuple[float, ...] = _stored("d", _POSE, lambda own: own["has_pose"])
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig: number of sensors, its reference sensor, if any, and others."""
+
+    number: int = _stored("I", "RIG_ID")
+    count: int = _stored("I", "NUM_SENSORS")
+    reference: tuple[Sensor, ...] = _stored(Sensor, count=lambda own: min(own["count"], 1))
+    sensors: tuple[MountedSensor, ...] = _stored(MountedSensor, count=lambda own: own["count"] - 1)
+    place: Place = Place()
+
+
+@dataclass(frozen=True)
+class SensorImage(Sensor):
+    """An image of a sensor."""
+
+    image: int = _stored("Q", "DATA_ID")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame: the pose of its rig, rig from world, and the images of its sensors."""
+
+    number: int = _stored("I", "FRAME_ID")
+    rig: int = _stored("I", "RIG_ID")
+    pose: tuple[float, ...] = _stored("d", _POSE)
+    count: int = _stored("I", "NUM_DATA_IDS")
+    data: tuple[SensorImage, ...] = _stored(SensorImage, count=lambda own: own["count"])
     place: Place = Place()
 
 
@@ -79,27 +170,6 @@ class Points:
     colours: Indices  # (n, 3)
     tracks: Indices  # (n,) images in the track of each point
     places: Sequence[Place] = ()
-
-
-@dataclass(frozen=True)
-class Rig:
-    """A rig: its reference sensor, and others with poses sensor from rig."""
-
-    number: int
-    reference: tuple[str, int] | None
-    sensors: tuple[tuple[str, int, Pose | None], ...]
-    place: Place = Place()
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A frame: the pose of its rig, rig from world, and the images of its sensors."""
-
-    number: int
-    rig: int
-    pose: Pose
-    data: tuple[tuple[str, int, int], ...]
-    place: Place = Place()
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model, Pose
+from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model
 from photogram.formats.colmap.files import read_model
 from photogram.formats.images import Y_DOWN
 from photogram.formats.names import NAMES, NamedValues, renamed
@@ -134,11 +134,11 @@ def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, In
     return np.array(rows).transpose(2, 0, 1), np.flatnonzero(differences > NORMALISED)
 
 
-def _rigid(pose: Pose, place: Place) -> tuple[Floats, Floats]:
-    translation = np.array(pose.translation)
+def _rigid(pose: Sequence[float], place: Place) -> tuple[Floats, Floats]:
+    translation = np.array(pose[4:])
     if not np.isfinite(translation).all():
         raise place.error(phrase("format.finite", name="the translation"))
-    return _rotations(np.array([pose.quaternion]), [place])[0][0], translation
+    return _rotations(np.array([pose[:4]]), [place])[0][0], translation
 
 
 def _composed(
@@ -158,7 +158,7 @@ def _composed(
             raise place.error(phrase("format.undefined", what="rig", name=str(frame.rig)))
         turn, shift = _rigid(frame.pose, place)
         photos: dict[str, int] = {}
-        for sensor, image in ((sensor, image) for kind, sensor, image in frame.data if kind == CAMERA):
+        for sensor, image in ((own.number, own.image) for own in frame.data if own.kind == CAMERA):
             if image not in rows:
                 raise place.error(phrase("format.undefined", what="image", name=str(image)))
             row = rows[image]
@@ -190,16 +190,16 @@ def _mounted_sensors(
     rigs: dict[int, Rig] = {}
     for rig in model.rigs:
         sensors: dict[str, Sensor] = {}
-        for number, pose in ((number, pose) for kind, number, pose in rig.sensors if kind == CAMERA):
+        for number, pose in ((own.number, own.pose) for own in rig.sensors if own.kind == CAMERA):
             if number not in cameras:
                 raise rig.place.error(phrase("format.undefined", what="camera", name=str(number)))
-            rigid = poses[rig.number, number] = None if pose is None else _rigid(pose, rig.place)
+            rigid = poses[rig.number, number] = _rigid(pose, rig.place) if pose else None
             if rigid is not None:
                 name = f"rig {rig.number}, camera {number}"
                 sensors[cameras[number]] = Sensor.from_colmap(name, *rigid)
-        if rig.reference is not None and rig.reference[0] == CAMERA:
-            poses[rig.number, rig.reference[1]] = np.eye(3), np.zeros(3)
-            rigs[rig.number] = Rig(str(rig.number), cameras.get(rig.reference[1], ""), sensors)
+        for reference in (own.number for own in rig.reference if own.kind == CAMERA):
+            poses[rig.number, reference] = np.eye(3), np.zeros(3)
+            rigs[rig.number] = Rig(str(rig.number), cameras.get(reference, ""), sensors)
     return poses, rigs
 
 

@@ -91,10 +91,7 @@ def _written(project: Project) -> _Written:
     translations = -np.einsum("nij,nj->ni", Y_DOWN @ matrices.transpose(0, 2, 1), block.photo_positions[rows])
     quaternions = Attitudes(matrices).values("quaternion_to_vision")
     camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in rows], dtype=np.int64)
-    poses = [
-        content.Pose(tuple(quaternion), tuple(translation))
-        for quaternion, translation in zip(quaternions.tolist(), translations.tolist(), strict=True)
-    ]
+    poses = map(tuple, np.hstack([quaternions, translations]).tolist())
     of_photo = dict(zip(photos, camera_numbers.tolist(), strict=True))
     rigs, frames = _rigs(project, dict(zip(photos, poses, strict=True)), photos, of_photo, numbers)
 
@@ -145,13 +142,13 @@ def _camera(camera: Camera, size: Size, number: int) -> content.Camera:
 
 def _rigs(
     project: Project,
-    poses: Mapping[str, content.Pose],
+    poses: Mapping[str, tuple[float, ...]],
     photos: Mapping[str, int],
     cameras: Mapping[str, int],
     numbers: Mapping[str, int],
 ) -> tuple[list[content.Rig], list[content.Frame]]:
     """Return rigs and frames: of mounts, and one for each other camera and photo."""
-    sensors: dict[int, dict[int, content.Pose]] = {}
+    sensors: dict[int, dict[int, tuple[float, ...]]] = {}
     members: dict[str, list[str]] = {name: [name] for name in poses}
     mounts = [each for each in project.block.mounts if each.photo in poses and each.frame in poses]
     for mount in mounts if _told_by_cameras(mounts, cameras) else []:
@@ -159,32 +156,27 @@ def _rigs(
         own.setdefault(cameras[mount.photo], _sensor_pose(mount.sensor.position, mount.sensor.attitude))
         members[mount.frame].append(mount.photo)
         del members[mount.photo]
-    rigs = [
-        content.Rig(
-            number,
-            (content.CAMERA, number),
-            tuple((content.CAMERA, other, pose) for other, pose in sorted(sensors.get(number, {}).items())),
+    mounted = {number for own in sensors.values() for number in own}
+    rigs = []
+    for number in sorted(set(numbers.values()) - mounted):
+        reference = content.Sensor(content.CAMERA, number)
+        others = tuple(
+            content.MountedSensor(content.CAMERA, other, True, pose)
+            for other, pose in sorted(sensors.get(number, {}).items())
         )
-        for number in sorted(numbers.values())
-        if all(number not in own for own in sensors.values())
-    ]
-    frames = [
-        content.Frame(
-            photos[name],
-            cameras[name],
-            poses[name],
-            tuple((content.CAMERA, cameras[each], photos[each]) for each in own),
-        )
-        for name, own in members.items()
-    ]
+        rigs.append(content.Rig(number, 1 + len(others), (reference,), others))
+    frames = []
+    for name, own in members.items():
+        data = tuple(content.SensorImage(content.CAMERA, cameras[each], photos[each]) for each in own)
+        frames.append(content.Frame(photos[name], cameras[name], poses[name], len(data), data))
     return rigs, sorted(frames, key=lambda each: each.number)
 
 
-def _sensor_pose(position: Floats, axes: Floats) -> content.Pose:
+def _sensor_pose(position: Floats, axes: Floats) -> tuple[float, ...]:
     """Return sensor from rig: R = F A' F and t = -R (F c)."""
     turn = Y_DOWN @ axes.T @ Y_DOWN
     quaternion = Attitudes(turn[np.newaxis]).values("quaternion")[0]
-    return content.Pose(tuple(quaternion.tolist()), tuple((-turn @ Y_DOWN @ position).tolist()))
+    return *quaternion.tolist(), *(-turn @ Y_DOWN @ position).tolist()
 
 
 def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
