@@ -23,7 +23,7 @@ from photogram.network.attitudes import angles_form, known_angles
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
-from photogram.network.observations import Control, Observation, Position
+from photogram.network.observations import Control, Observation, Observations, Position
 from photogram.network.rigs import Mount
 from photogram.words import Phrase, option_sd, phrase
 
@@ -51,7 +51,7 @@ class BlockBuilder:
     def __init__(self, path: Path, title: str) -> None:
         self.path, self.place, self.title, self.frame = path, Place(path), title, Frame()
         self.messages, self.lacks = list[Message](), list[Phrase]()
-        self.observations: list[Observation] = []
+        self.observations: list[Observation | Observations[Any]] = []
         self.mounts: list[Mount] = []
         self.cameras: list[Camera] = []
         self.sizes: list[Size | None] = []

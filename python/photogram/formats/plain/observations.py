@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
+from photogram.errors import InputError
 from photogram.formats.plain.rigs import read_bases
 from photogram.formats.plain.schema import (
     ANGULAR,
@@ -42,7 +44,7 @@ from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
 from photogram.network import observations
 from photogram.network.block import Block
-from photogram.network.observations import Observation, Position
+from photogram.network.observations import Observation, Observations, Position
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
@@ -67,8 +69,8 @@ class Known:
 
 def read_observations(
     tables: Tables, transform: Transform, known: Known, rigs: Mapping[str, Rig]
-) -> list[Observation]:
-    """Read all tables of additional observations."""
+) -> list[Observation | Observations[Any]]:
+    """Read all tables of additional observations: parts of the observations of a block."""
     shared = {name: dict[str, Any]() for name in _GROUPS}
     for name in _GROUPS:
         table = tables.rows(name)
@@ -96,7 +98,7 @@ def read_observations(
 
 def _read(
     tables: Tables, transform: Transform, known: Known, name: str, shared: Mapping[str, dict[str, Any]]
-) -> Iterator[Observation]:
+) -> Iterator[Observation | Observations[Any]]:
     """Yield the observations of a table; `shared` contains unknowns and groups by table and name."""
     table = tables.read(name)
     if table is None:
@@ -137,6 +139,7 @@ def _read(
         positions, covariances = transform.positions(name, fields[place], fields["covariance"], table)
         fields |= {place: positions, "covariance": covariances}
     times = table.numbers("time").tolist() if make is Position else []
+    rows, arguments = list[int](), list[dict[str, Any]]()
     for row, (subject, group, *values) in enumerate(zip(of, members, *fields.values(), strict=True)):
         if subject is None:
             continue
@@ -150,7 +153,28 @@ def _read(
             if math.isnan(time) and given.get("drift") is not None:
                 raise table.error(row, phrase("plain.drift-without-time"))
             given["time"] = 0.0 if math.isnan(time) else time
-        yield made(table, row, make, **given)
+        rows.append(row)
+        arguments.append(given)
+    yield from _made(table, make, rows, arguments)
+
+
+def _made(
+    table: ColumnTable, make: type[Observation], rows: Sequence[int], arguments: Sequence[dict[str, Any]]
+) -> Iterator[Observation | Observations[Any]]:
+    """Yield observations of rows from their arguments; rows with the same types of arguments together."""
+
+    def types(given: dict[str, Any]) -> list[tuple[str, bool]]:
+        return [(name, isinstance(value, Unknown)) for name, value in given.items()]
+
+    pairs = zip(rows, arguments, strict=True)
+    for _, group in groupby(pairs, lambda pair: types(pair[1])):
+        same = list(group)
+        columns = {name: [given[name] for _, given in same] for name in same[0][1]}
+        try:
+            yield make.from_arrays(**columns)
+        except InputError:
+            # The first invalid row raises an error with its location.
+            yield from (made(table, row, make, **given) for row, given in same)
 
 
 def _subjects(tables: Tables, table: ColumnTable, known: Known) -> list[dict[str, Any] | None]:

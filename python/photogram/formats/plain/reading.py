@@ -48,7 +48,7 @@ from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed
-from photogram.network.observations import Control, Observation, of_records
+from photogram.network.observations import Control, Observation, Observations, of_records
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
@@ -101,11 +101,11 @@ def read_tables(tables: Tables, options: ReadOptions) -> Project:
     places = points.places
     photo_rows = {name: row for row, name in enumerate(photos.names)}
     known_objects = Known(places, photo_rows, photos.times.tolist(), trajectories)
-    observations = read_observations(tables, transform, known_objects, rigs)
+    observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
     boards = read_boards(tables)
     bends = read_bends(tables, boards)
     common = [*_unknowns(observations, block.mounts, timed), *(each.bend for each in bends)]
-    observations += read_covariances(tables).priors(common)
+    priors = read_covariances(tables).priors(common)
     if trajectories and transform.frame != settings.frame:
         message = phrase("plain.trajectory-frame", frame=str(transform.frame))
         raise InputError(message, file=settings.path)
@@ -118,7 +118,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> Project:
         point_check_sd=points.check_sd,
     )
     block.images(images.photos, images.points, xy, sd)
-    block.observations += [*observations, *photos.observed, *points.observed, *scanned.observations]
+    block.observations += [observations, *priors, *photos.observed, *points.observed, *scanned.observations]
     block.frame, block.messages = transform.frame, list(tables.messages)
     if assumed and sd is not None:
         block.lacks.append(Phrase("read.levels", {"number": 1.0, "option": option_sd("images")}))
@@ -187,10 +187,10 @@ def _with_cameras(tables: Tables, path: Path) -> Tables:
 
 
 def _unknowns(
-    observations: Sequence[Observation], mounts: Sequence[Mount], timed: Sequence[Timed]
+    observations: Observations[Observation], mounts: Sequence[Mount], timed: Sequence[Timed]
 ) -> list[Unknown]:
     """Return the shared parameters that may have covariances."""
-    found = [unknown for each in observations for unknown in each.unknowns if unknown is not None]
+    found = [one for own in dict.fromkeys(observations.column("unknowns")) for one in own if one is not None]
     found += of_records(observations)
     found += [each.sensor for each in mounts]
     for each in timed:
