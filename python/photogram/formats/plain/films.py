@@ -71,7 +71,8 @@ class Scanned:
 def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
     """Read which photos are scanned films or plates, and their films and marks."""
     photos = seen.photos
-    films = [photos.table.texts("film")[row] for row in photos.rows.tolist()]
+    texts = photos.table.texts("film")
+    films = [texts[row] for row in photos.rows.tolist()]
     scanned = np.array([bool(name) for name in films], dtype=bool)
     for table in ("fiducial_images", "fiducials", "films", "scanners"):
         if table in tables.settings.tables and not scanned.any():
