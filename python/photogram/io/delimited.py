@@ -10,9 +10,11 @@ from __future__ import annotations
 import codecs
 import itertools
 import re
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,8 @@ from photogram.words import Phrase, phrase
 
 LARGE = 1 << 16  # Size (bytes) of a table above which the extension module reads it
 PIECE = 1 << 22  # Bytes of a large table per read
+BATCH = 1 << 25  # Approximate bytes of a batch
+ROW = 1 << 5  # Bytes of a row of Parquet in a batch
 COMMENT = "#"
 TITLES = 30  # Number of lines below titles that are searched for a header
 NAMELESS = "?"  # The first column if each row has one cell more than the header
@@ -50,15 +54,31 @@ def read_columns(
     reader of large tables requires the columns of `numbers`. `spelling` returns the names of all columns from
     those in the file (in small letters). `hint` returns the error of a first record without a known column.
     """
+    return next(read_batches(path, known=known, numbers=numbers, spelling=spelling, hint=hint, size=None))
+
+
+def read_batches(
+    path: Path,
+    *,
+    known: Collection[str] = (),
+    numbers: Collection[str] = (),
+    spelling: Spelling = tuple,
+    hint: Callable[[Sequence[str]], str | Phrase] | None = None,
+    size: int | None = BATCH,
+) -> Iterator[ColumnTable]:
+    """Yield a table in batches of about `size` bytes; arguments as in :func:`read_columns`.
+
+    There is at least one batch. A table with decimal commas or irregular lines is one batch.
+    """
     if path.suffix == ".parquet":
-        return _parquet(path, spelling, numbers)
+        return _parquet(path, spelling, numbers, size)
 
     def header(text: str) -> _Header:
         head, delimiter = _head(path, text, known, spelling, hint)
         own = tuple(cell.strip().lower() for cell in _split(head, delimiter))
         return head, own, _named(head, own, spelling, settled=hint is not None), delimiter
 
-    return _read(path, header, numbers)
+    return _read(path, header, numbers, size)
 
 
 def read_head(path: Path, known: Collection[str] = (), spelling: Spelling = tuple) -> list[str]:
@@ -101,21 +121,30 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
         sample = Place(path, first + 1, lines[first])
         return Place(path, first), tuple(columns), tuple(columns), _delimiter(sample)
 
-    return _read(path, header, numbers)
+    return next(_read(path, header, numbers, None))
 
 
 _Header = tuple[Place, tuple[str, ...], tuple[str, ...], str]
 
 
-def _read(path: Path, header: Callable[[str], _Header], numbers: Collection[str]) -> ColumnTable:
-    """Read a table; a large regular one in pieces, if its header is at the beginning."""
+class _IrregularError(Exception):
+    """The extension module cannot read a table."""
+
+
+def _read(
+    path: Path, header: Callable[[str], _Header], numbers: Collection[str], size: int | None
+) -> Iterator[ColumnTable]:
+    """Yield a table whose header is at the beginning."""
     if path.suffix.lower() != ".xlsx" and path.is_file() and path.stat().st_size > LARGE:
         begin = read_beginning(path, LARGE).rpartition("\n")[0]
         # If the header is not at the beginning, the whole text is searched.
-        with suppress(InputError):
-            table = _regular(path, header(begin), numbers)
-            if table is not None:
-                return table
+        with suppress(InputError, _IrregularError):
+            found = header(begin)
+            if size is not None:
+                # No batch may precede an irregular line.
+                deque(_regular(path, found, numbers, size), maxlen=0)
+            yield from _regular(path, found, numbers, size)
+            return
     text = read_text(path)
     head, own, columns, delimiter = header(text)
     assert head.record is not None
@@ -124,7 +153,7 @@ def _read(path: Path, header: Callable[[str], _Header], numbers: Collection[str]
         own, columns = ("", *own), (NAMELESS, *columns)
     cells = {name: [row[k] for row in rows] for k, name in enumerate(columns) if name}
     numeric = frozenset(numbers).intersection(columns)
-    return ColumnTable(path, head, columns, len(rows), cells, records, delimiter, {}, numeric, own)
+    yield ColumnTable(path, head, columns, len(rows), cells, records, delimiter, {}, numeric, own)
 
 
 def _head(
@@ -244,31 +273,50 @@ def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[s
     return shifted and (not as_is or len(numeric) == len(columns))
 
 
-def _regular(path: Path, header: _Header, numbers: Collection[str]) -> ColumnTable | None:
-    """Read a large table; None if a line is irregular."""
-    head, own, columns, delimiter = header
+def _regular(
+    path: Path, header: _Header, numbers: Collection[str], size: int | None
+) -> Iterator[ColumnTable]:
+    """Yield a large table in batches; `_IrregularError` if a line is irregular."""
+    head, _, columns, delimiter = header
     assert head.record is not None
     if delimiter == " " or not all(columns):
-        return None
-    reader = _photocore.TableReader(ord(delimiter), [column in numbers for column in columns])
+        raise _IrregularError
+    first, length, reader = head.record + 1, 0, None
     with reading(path), path.open("rb") as file:
         mark = codecs.BOM_UTF8
         file.seek(len(mark) if file.read(len(mark)) == mark else 0)
         above = b"".join(itertools.islice(file, head.record))
         # A single carriage return ends a line, too.
         if b"\r" in above.replace(b"\r\n", b""):
-            return None
+            raise _IrregularError
         while lines := file.read(PIECE) + file.readline():
-            if not reader.add(lines):
-                return None
+            reader = reader or _photocore.TableReader(ord(delimiter), [name in numbers for name in columns])
+            # All batches must have the same decimal mark.
+            if not reader.add(lines) or (size is not None and delimiter != "," and b"," in lines):
+                raise _IrregularError
+            length += len(lines)
+            # The reader rejects lines below a blank one.
+            if size is not None and length >= size and len(lines) - len(lines.rstrip()) < 3:
+                yield (table := _of_reader(path, header, reader, first))
+                first, length, reader = first + table.count, 0, None
+    if reader is not None:
+        yield _of_reader(path, header, reader, first)
+    elif first == head.record + 1:
+        raise _IrregularError
+
+
+def _of_reader(path: Path, header: _Header, reader: _photocore.TableReader, first: int) -> ColumnTable:
+    """Return the table of a reader, from its first record."""
+    head, own, columns, delimiter = header
     contents = dict(zip(columns, reader.columns(), strict=True))
     ready = _decoded(contents, "utf-8") or _decoded(contents, "cp1252")
     if ready is None:
-        return None
+        raise _IrregularError
     values = next(iter(ready.values()))
     count = len(values.rows if isinstance(values, Names) else values)
-    records = range(head.record + 1, head.record + 1 + count)
-    return ColumnTable(path, head, columns, count, {}, records, delimiter, ready, own=own) if count else None
+    if not count:
+        raise _IrregularError
+    return ColumnTable(path, head, columns, count, {}, range(first, first + count), delimiter, ready, own=own)
 
 
 def _decoded(
@@ -291,28 +339,53 @@ def _decoded(
     return ready
 
 
-def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> ColumnTable:
+def _parquet(
+    path: Path, spelling: Spelling, numbers: Collection[str], size: int | None
+) -> Iterator[ColumnTable]:
     import pyarrow
-    import pyarrow.parquet
+
+    first = 1
+    try:
+        for part in _parts_of_parquet(path, size):
+            yield _of_arrow(path, part, spelling, numbers, first)
+            first += len(part)
+    except (OSError, pyarrow.ArrowException) as error:
+        raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
+
+
+def _parts_of_parquet(path: Path, size: int | None) -> Iterator[Any]:
+    """Yield a table of Arrow in batches, at least one."""
+    import pyarrow
+    from pyarrow import parquet
+
+    if size is None:
+        yield parquet.read_table(path)
+        return
+    with parquet.ParquetFile(path) as file:
+        if not file.metadata.num_rows:
+            yield file.read()
+        for batch in file.iter_batches(max(size // ROW, 1)):
+            yield pyarrow.Table.from_batches([batch])
+
+
+def _of_arrow(
+    path: Path, table: Any, spelling: Spelling, numbers: Collection[str], first: int
+) -> ColumnTable:
+    """Return a table from the table of Arrow, from its first record."""
+    from pyarrow import types
 
     from photogram.io.parquet import coded
 
-    try:
-        table = pyarrow.parquet.read_table(path)
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
-    head = Place(path)
-    own = tuple(name.strip().lower() for name in table.column_names)
+    head, own = Place(path), tuple(name.strip().lower() for name in table.column_names)
     columns = _named(head, own, spelling)
     ready: dict[str, Floats | Names] = {}
     cells: dict[str, Sequence[str]] = {}
     for name, column in zip(columns, table.columns, strict=True):
-        kind = pyarrow.types
-        is_number = kind.is_floating(column.type) or kind.is_integer(column.type)
-        is_text = kind.is_string(column.type) or kind.is_large_string(column.type)
+        is_number = types.is_floating(column.type) or types.is_integer(column.type)
+        is_text = types.is_string(column.type) or types.is_large_string(column.type)
         # Names may consist of digits.
-        digits = kind.is_integer(column.type) and name not in numbers
-        if is_text or digits or kind.is_dictionary(column.type):
+        digits = types.is_integer(column.type) and name not in numbers
+        if is_text or digits or types.is_dictionary(column.type):
             texts, codes = coded(column)
             empty = [""] * bool((codes < 0).any())  # The last name
             ready[name] = merged(codes % (len(texts) + 1), [*(str(text).strip() for text in texts), *empty])
@@ -320,5 +393,5 @@ def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> Column
             ready[name] = column.to_numpy().astype(float)
         else:
             cells[name] = ["" if each is None else str(each) for each in column.to_pylist()]
-    records = range(1, table.num_rows + 1)
+    records = range(first, first + table.num_rows)
     return ColumnTable(path, head, columns, table.num_rows, cells, records, ready=ready, own=own)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -27,7 +27,7 @@ from photogram.formats.plain.schema import (
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Frame
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
-from photogram.io.delimited import read_columns, read_rows
+from photogram.io.delimited import BATCH, read_batches, read_rows
 from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
@@ -106,38 +106,43 @@ class Tables:
     messages: list[Message]  # Remarks
     names: Collection[str] = ()  # Observed points, if they are known before the tables are read
     shared: Shared = field(default_factory=Shared)  # Shared parameters in rows of all tables
-    _tables: dict[str, ColumnTable | None] = field(default_factory=dict, init=False)
+    parsed: dict[str, ColumnTable | None] = field(default_factory=dict)
 
     def read(self, name: str) -> ColumnTable | None:
         """Return a table if it exists, parsed once except images."""
-        if name in self._tables:
-            return self._tables[name]
-        table = self._parsed(name)
+        if name in self.parsed:
+            return self.parsed[name]
+        table = next(self.batches(name, None), None)
+        if table is None and name == "photos" and "images" in self.settings.tables:
+            table = self._photos_of_images()
         if name != "images":
-            self._tables[name] = table
+            self.parsed[name] = table
         return table
 
-    def _parsed(self, name: str) -> ColumnTable | None:
+    def batches(self, name: str, size: int | None = BATCH) -> Iterator[ColumnTable]:
+        """Yield a table in batches of about `size` bytes; nothing if it does not exist."""
         if name not in self.settings.tables:
-            return self._photos_of_images() if name == "photos" and "images" in self.settings.tables else None
+            return
         schema, path = TABLES[name], self.settings.tables[name]
         known, numbers, own = schema.columns, schema.numbers, self.settings
         units = column_units(name, own.length, own.angle, own.image)
-        if not schema.has_system:
-            table = read_columns(path, known=known, numbers=numbers, spelling=partial(_spelled, known))
-            table.require(*schema.needed(table.columns))
-            table = in_units(table, units, name, self.messages)
-            check_unread(table, PLAIN, known, name, self.messages)
-            return table
-        given = self.settings.columns.get(name, PLAIN)
+        given = own.columns.get(name, PLAIN)
+        spelling, hint = (given.spelled, nameless) if schema.has_system else (_spelled, None)
         if given.order:
-            table = read_rows(path, ["" if each == "-" else each for each in given.order], numbers=numbers)
+            order = ["" if each == "-" else each for each in given.order]
+            tables = iter([read_rows(path, order, numbers=numbers)])
         else:
-            table = read_columns(
-                path, known=known, numbers=numbers, spelling=partial(given.spelled, known), hint=nameless
-            )
-        required = schema.needed(table.columns)
-        return settled(table, given, known, units, required, self.names, name, self.messages)
+            spelled = partial(spelling, known)
+            tables = read_batches(path, known=known, numbers=numbers, spelling=spelled, hint=hint, size=size)
+        for table in tables:
+            required = schema.needed(table.columns)
+            if schema.has_system:
+                yield settled(table, given, known, units, required, self.names, name, self.messages)
+                continue
+            table.require(*required)
+            converted = in_units(table, units, name, self.messages)
+            check_unread(converted, PLAIN, known, name, self.messages)
+            yield converted
 
     def _photos_of_images(self) -> ColumnTable | None:
         """Return a table of photos from the images, for a project without one."""
