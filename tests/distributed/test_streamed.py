@@ -1,4 +1,4 @@
-"""Parts of a project on disk, read batch by batch: those of the same project read whole."""
+"""Parts of a project on disk, read in batches: those of the same project read as a whole."""
 
 import shutil
 
@@ -7,12 +7,14 @@ import pandas as pd
 import pytest
 from test_parts import OPTIONS, tied_block
 
-from message_codes import raises
+from message_codes import rejected
 from photogram import Distance, InputError, Position
+from photogram.adjustment.first_features import started
 from photogram.distributed.run import partition, read_manifest, read_node
 from photogram.formats import Project, ReadOptions, read, to_files
 from photogram.formats.plain import batches
 from photogram.formats.plain.batches import Streamed, streamable
+from photogram.io import delimited
 from photogram.network import Relative
 
 
@@ -39,14 +41,62 @@ def project(tmp_path_factory):
     return project_of(tied_block(), tmp_path_factory.mktemp("project") / "tied")
 
 
-@pytest.mark.parametrize("rows", [10**6, 700])
-def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatch, rows):
-    monkeypatch.setattr(batches, "BUCKET", rows)
-    monkeypatch.setattr(batches, "BATCH", 500)
+def copied(project, folder):
+    shutil.copytree(project, folder)
+    return folder
+
+
+def in_text(project, folder):
+    """Copy a project with its image observations as text."""
+    copied(project, folder)
+    pd.read_parquet(folder / "images.parquet").to_csv(folder / "images.csv", index=False)
+    (folder / "images.parquet").unlink()
+    return folder
+
+
+def omitted(project, folder):
+    """Copy a project with an omitted photo and omitted image observations."""
+    copied(project, folder)
+    table = pd.read_parquet(folder / "images.parquet")
+    table.assign(use=["off" if row % 7 == 3 else "" for row in range(len(table))]).to_parquet(
+        folder / "images.parquet"
+    )
+    return folder
+
+
+def weighted(project, folder):
+    """Copy a project with points, of which some are weighted, and more observations of points."""
+    copied(project, folder)
     block = read(project).block
-    expected = partition(block, tmp_path / "whole", 4, OPTIONS, "")
-    assert streamable(project)
-    own = Streamed(project, ReadOptions(), tmp_path / "parts")
+    tied = [name for name in block.point_ids if name[0] not in "CK"]
+    lines = [f"{name},{k},{2 * k},3,{'0.5' if k % 5 == 0 else ''}" for k, name in enumerate(tied[:60])]
+    (folder / "points.csv").write_text("\n".join(["point,x,y,z,sd", *lines, ""]))
+    (folder / "levels.csv").write_text("level,z\nlake,3\n")
+    rows = [f"lake,{name},0.1" for name in (*tied[7:9], *tied[-2:])]
+    (folder / "level_points.csv").write_text("\n".join(["level,point,sd", *rows, ""]))
+    (folder / "lengths.csv").write_text(f"line,from,to,length,sd\nL,{tied[20]},{tied[30]},4,1\n")
+    return folder
+
+
+def of_each_photo(project, folder):
+    """Copy a project in which each photo has a camera."""
+    copied(project, folder)
+    table = pd.read_csv(folder / "cameras.csv", dtype={"camera": str}, comment="#")
+    table.assign(for_each="photo").to_csv(folder / "cameras.csv", index=False)
+    return folder
+
+
+@pytest.mark.parametrize("changed", [copied, in_text, omitted, weighted, of_each_photo])
+@pytest.mark.parametrize("size", [1 << 30, 20_000])
+def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatch, changed, size):
+    monkeypatch.setattr(batches, "BUCKET", size)
+    monkeypatch.setattr(delimited, "LARGE", 1000)
+    monkeypatch.setattr(delimited, "PIECE", 3000)
+    project = changed(project, tmp_path / "project")
+    block = read(project).block
+    expected = partition(started(block), tmp_path / "whole", 4, OPTIONS, "")
+    assert streamable(project) == (changed is not in_text)
+    own = Streamed(project, ReadOptions(), tmp_path / "parts", size=size)
     np.testing.assert_array_equal(own.images, np.bincount(block.image_photos))
     assert own.source(OPTIONS) == own.source(OPTIONS)
     tree, counts = own.counted(4)
@@ -56,7 +106,7 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
     assert not (tmp_path / "parts" / "buckets").exists()
     assert found.tree == expected.tree
     assert found.outer == expected.outer
-    for name in ("middle", "weighted", "photos", "points", "images", "held"):
+    for name in ("middle", "weighted", "photos", "images", "held"):
         assert getattr(found, name) == getattr(expected, name)
     for node in range(len(tree)):
         one, other = (
@@ -65,16 +115,15 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
         same(one, other)
 
 
-def test_names_may_come_with_all_that_the_file_has(project, tmp_path, monkeypatch):
-    monkeypatch.setattr(batches, "BATCH", 100)
-    folder = tmp_path / "categories"
-    folder.mkdir()
-    for each in project.iterdir():
-        (folder / each.name).write_bytes(each.read_bytes())
+def test_names_may_come_with_all_that_the_file_has(project, tmp_path):
+    folder = copied(project, tmp_path / "categories")
     table = pd.read_parquet(project / "images.parquet")
     names = [*(f"unseen {row}" for row in range(1000)), *sorted(set(table["point"]))]
     table.assign(point=pd.Categorical(table["point"], names)).to_parquet(folder / "images.parquet")
-    of_names, of_texts = (Streamed(each, ReadOptions(), tmp_path / each.name) for each in (folder, project))
+    of_names, of_texts = (
+        Streamed(each, ReadOptions(), tmp_path / f"parts of {each.name}", size=3200)
+        for each in (folder, project)
+    )
     np.testing.assert_array_equal(of_names.images, of_texts.images)
     found = of_names.divided(tmp_path / "parts", 4, OPTIONS, "")
     expected = of_texts.divided(tmp_path / "others", 4, OPTIONS, "")
@@ -103,19 +152,34 @@ def same(one, other):
         np.testing.assert_array_equal(mine.observed, theirs.observed)
 
 
-def test_a_photo_that_is_not_there_is_named(project, tmp_path):
-    folder = tmp_path / "copy"
-    folder.mkdir()
-    for each in project.iterdir():
-        (folder / each.name).write_bytes(each.read_bytes())
+@pytest.mark.parametrize("form", [copied, in_text])
+def test_a_photo_that_is_not_there_is_named(project, tmp_path, form):
+    folder = copied(project, tmp_path / "copy")
     table = pd.read_parquet(folder / "images.parquet")
     table.loc[7, "photo"] = "nowhere"
     table.to_parquet(folder / "images.parquet")
-    with raises(InputError, "error.unknown") as raised:
+    folder = form(folder, tmp_path / "form")
+    with rejected("error.column photo: error.unknown photo nowhere") as raised:
         Streamed(folder, ReadOptions(), tmp_path / "parts").counted(2)
-    assert raised.value.file.name == "images.parquet"
-    fields = raised.value.phrase.fields
-    assert (fields["kind"], fields["name"]) == ("photo", "nowhere")
+    assert raised.value.file.stem == "images"
+    assert raised.value.record == (8 if form is copied else 9)
+
+
+def test_a_repeated_image_is_named_with_both_records(project, tmp_path):
+    folder = copied(project, tmp_path / "copy")
+    table = pd.read_parquet(folder / "images.parquet")
+    pd.concat([table, table[40:41]]).to_parquet(folder / "images.parquet")
+    with rejected("plain.image-twice 41") as raised:
+        Streamed(folder, ReadOptions(), tmp_path / "parts", size=3200).counted(2)
+    assert raised.value.record == len(table) + 1
+
+
+def test_a_tied_point_that_is_not_there_is_named(project, tmp_path):
+    folder = copied(project, tmp_path / "copy")
+    (folder / "levels.csv").write_text("level,z\nlake,3\n")
+    (folder / "level_points.csv").write_text("level,point,sd\nlake,nowhere,0.1\n")
+    with rejected("error.column point: error.unknown point nowhere"):
+        Streamed(folder, ReadOptions(), tmp_path / "parts")
 
 
 def test_features_are_refused(project, tmp_path):
@@ -138,11 +202,6 @@ def test_a_free_project_is_refused_before_its_images_are_read(tmp_path):
         Streamed(project, ReadOptions(), tmp_path / "parts")
 
 
-def test_what_has_to_be_read_whole_is_not_streamed(project, tmp_path):
-    folder = tmp_path / "copy"
-    folder.mkdir()
-    for each in project.iterdir():
-        (folder / each.name).write_bytes(each.read_bytes())
-    (folder / "levels.csv").write_text("level,z\nlake,3\n")
-    assert not streamable(folder)
-    assert not streamable(folder / "images.parquet")
+def test_other_files_are_not_streamed(project):
+    assert streamable(project / "project.toml")
+    assert not streamable(project / "images.parquet")

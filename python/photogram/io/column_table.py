@@ -36,6 +36,11 @@ class Names:
     rows: Indices
     distinct: bool = False
 
+    def some(self, rows: Sequence[int]) -> Names:
+        """Return the names of selected rows, in this order."""
+        kept, codes = np.unique(self.rows[rows], return_inverse=True)
+        return Names([self.names[code] for code in kept.tolist()], codes.reshape(-1), self.distinct)
+
 
 class TableRow(NamedTuple):
     """A row, whose location is found on demand."""
@@ -118,11 +123,25 @@ class ColumnTable:
         """Return the table with selected rows, in this order."""
         cells = {column: [own[row] for row in rows] for column, own in self.cells.items()}
         ready = {
-            column: replace(own, rows=own.rows[rows]) if isinstance(own, Names) else own[rows]
+            column: own.some(rows) if isinstance(own, Names) else own[rows]
             for column, own in self.ready.items()
         }
         records = [self.records[row] for row in rows]
         return replace(self, count=len(rows), cells=cells, ready=ready, records=records)
+
+    def joined(self, other: ColumnTable) -> ColumnTable:
+        """Return the table with the rows of another batch of its file."""
+        cells = {column: [*own, *other.cells[column]] for column, own in self.cells.items()}
+        ready: dict[str, Floats | Names] = {}
+        for column, own in self.ready.items():
+            more = other.ready[column]
+            if isinstance(own, Names) and isinstance(more, Names):
+                codes = np.append(own.rows, more.rows + len(own.names))
+                ready[column] = merged(codes, [*own.names, *more.names])
+            else:
+                ready[column] = np.append(own, more)  # type: ignore[arg-type]
+        records = [*self.records, *other.records]
+        return replace(self, count=self.count + other.count, cells=cells, ready=ready, records=records)
 
     def with_texts(self, column: str, texts: Sequence[str]) -> ColumnTable:
         """Return the table with new texts in a column."""

@@ -1,57 +1,73 @@
-"""Parts of a plain project with images in Parquet, read in batches.
+"""Parts of a plain project whose image observations are read in batches.
 
-Photos, control and ties are few and remain in memory. Image observations are read twice: first into buckets
-by point name, so that a bucket contains all observations of its points, then into the parts.
+All other tables are in memory; of the points, only those with control, weights or other observations. Image
+observations are read once into buckets by point name, so that a bucket contains all observations of its
+points, and then divided into parts.
 """
 
 from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterator
-from dataclasses import replace
-from functools import cached_property
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property, reduce
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from photogram.adjustment.first_features import started
-from photogram.arguments.types import Floats, Indices
-from photogram.distributed.cut import Counts, Incidence, Tree, counted_work, cut, homes, joined
+from photogram.arguments.arrays import repeated_pairs
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.distributed.cut import (
+    Counts,
+    Incidence,
+    Tree,
+    alone_of,
+    counted_work,
+    cut,
+    homes,
+    joined,
+    photos_of,
+    vertices_of,
+)
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.parts import AtHome, Names, Part, assembled_part
-from photogram.distributed.run import Manifest, divided, places_of
+from photogram.distributed.run import Manifest, divided, places_of, with_flights
 from photogram.errors import InputError
 from photogram.formats.builder import ASSUMED_SD
 from photogram.formats.plain import SETTINGS
-from photogram.formats.plain.cameras import read_cameras
-from photogram.formats.plain.photos import image_coordinates, read_images, read_photos
+from photogram.formats.plain.photos import images_of
 from photogram.formats.plain.reading import read_tables
-from photogram.formats.plain.settings import Settings, read_settings
-from photogram.formats.plain.tables import Tables, Transform
+from photogram.formats.plain.schema import SD_AXES, TABLES
+from photogram.formats.plain.settings import read_settings
+from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
-from photogram.io.delimited import read_head
-from photogram.io.parquet import coded
-from photogram.messages import missing_columns, unknown_name
+from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import BATCH
+from photogram.io.places import Place
 from photogram.network.block import checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
+from photogram.network.films import Scan
+from photogram.network.observations import Fiducial, KnownFilm, KnownTogether, Prior
 from photogram.network.observations.photos import with_epochs
 from photogram.words import phrase
 
-TIES = ("distances", "height_differences", "coordinate_differences")  # Tables of observations between points
-HELD = (
-    *("cameras", "photos", "control", "gnss", "gnss_groups", "attitudes", "attitude_groups"),
-    *("relative_poses", "instruments", *TIES),
-)
-"""Tables that are loaded into memory."""
-BATCH = 2**18  # Rows per read
-BUCKET = 2**22  # Approximate rows of a bucket, which is loaded completely
+BUCKET = 2**26  # Bytes of the table of images in a bucket, which is loaded completely
+_Arrays = dict[str, np.ndarray]
+_INDICES, _PAIRS = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
+_EMPTY: _Arrays = {
+    **dict.fromkeys(("photos", "points", "rows", "records"), _INDICES),
+    **dict.fromkeys(("xy", "sd"), _PAIRS),
+}
+"""Arrays of image observations; further arrays are the names of points."""
+_INNER = (Fiducial, KnownFilm, KnownTogether, Prior)  # Observations that do not define a datum
 
 
 def streamable(path: Path) -> bool:
-    """Return whether the images of a project can be read batch by batch."""
+    """Return whether the images of a project are in Parquet, and are read in batches."""
     place = path / SETTINGS if path.is_dir() else path
     if place.suffix != ".toml" or not place.is_file():
         return False
@@ -59,50 +75,65 @@ def streamable(path: Path) -> bool:
     tables = settings.tables
     return (
         settings.photo_files is None
-        and {"images", "photos"} <= set(tables)
+        and {"images", "photos"} <= tables.keys()
         and tables["images"].suffix == ".parquet"
-        and set(tables) <= {"images", "points", *HELD}
     )
 
 
 class Streamed:
-    """A project that is read batch by batch."""
+    """A project whose image observations are read in batches of about `size` bytes."""
 
-    def __init__(self, path: Path, options: ReadOptions, folder: Path) -> None:
+    def __init__(self, path: Path, options: ReadOptions, folder: Path, *, size: int = BATCH) -> None:
         settings = read_settings(path / SETTINGS if path.is_dir() else path, options)
         if settings.features:
             raise InputError(phrase("plain.parts-features"), file=settings.path)
-        self._folder = folder / "buckets"
+        self._folder, self._size = folder / "buckets", size
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
-        self._settings = settings
-        held = self._without_images()
-        self.project: Project = read_tables(Tables(held, []), options)
-        if self.project.options.datum in ("inner", "minimum"):
-            raise InputError(phrase("plain.parts-datum"), file=settings.path)
-        if self.project.block.timed:
-            photo = self.project.block.timed[0].photo
-            raise InputError(phrase("plain.parts-moving", photo=photo), file=settings.path)
-        refuse_passages(self.project.block, "blocks in parts")
-        block = started(checked(self.project.block))
+        self._tables = tables = Tables(settings, [])
+        tied = _tied_names(tables)
+        control = set(tables.rows("control").texts("point"))
+
+        def are_tied(table: ColumnTable) -> Bools:
+            return np.array([name in tied for name in table.texts("point")], dtype=bool)
+
+        def are_known(table: ColumnTable) -> Bools:
+            known = [name in control for name in table.texts("point")]
+            sd = tables.deviations(table, "points", SD_AXES, np.inf)
+            return are_tied(table) | np.array(known, dtype=bool) | np.isfinite(sd).any(axis=1)
+
+        images = islice(tables.batches("images", size), None if tied else 1)
+        tables.parsed["images"] = _selected(images, are_tied)
+        tables.parsed["points"] = _selected(tables.batches("points", size), are_known)
+        self.project: Project
+        self.project, self._source = read_tables(tables, options)
+        self._check()
+        block = with_flights(started(checked(self.project.block)))
         # A node has only some of the observations of a drift.
         self.block = block.replace(observations=with_epochs(block.observations))
-        tables = Tables(replace(settings, frame=self.project.frame), [])
-        self._cameras = read_cameras(tables)
-        self._photos = read_photos(tables, Transform(tables.settings, tables.messages), self._cameras)
-        if self._photos.names != self.block.photo_ids or len(self._cameras.cameras) != len(
-            self.block.cameras
-        ):
-            raise InputError(phrase("plain.parts-cameras"), file=settings.path)
-        known = (self.block.point_sd, self.block.photo_position_sd)
-        if not (self.block.observations or any(np.isfinite(each).any() for each in known)):
-            raise InputError(phrase("plain.parts-free"), file=settings.path)
         named = {name for each in self.block.observations for name in each.points}
         self._tied = {name: row for row, name in enumerate(sorted(named))}
+        self._vertices = vertices_of(self.block)
+
+    def _check(self) -> None:
+        """Reject a project that requires all image observations together."""
+        block, path = self.project.block, self.project.path
+        if self.project.options.datum in ("inner", "minimum"):
+            raise InputError(phrase("plain.parts-datum"), file=path)
+        if block.timed:
+            raise InputError(phrase("plain.parts-moving", photo=block.timed[0].photo), file=path)
+        refuse_passages(block, "blocks in parts", but=Scan)
+        for each in self.project.messages:
+            if each.phrase.code == "plain.side-unknown":
+                raise InputError(phrase("plain.parts-film", **each.phrase.fields), file=path)
+        known = (block.point_sd, block.photo_position_sd)
+        outer = (each for each in block.observations if not isinstance(each, _INNER))
+        if not (any(outer) or any(np.isfinite(each).any() for each in known)):
+            raise InputError(phrase("plain.parts-free"), file=path)
 
     @property
     def images(self) -> Floats:
-        """(P,) number of image observations of each photo."""
+        """(P,) number of image observations of each photo, or of all on its trajectory or frame."""
         return self._spread_out[1]
 
     def close(self) -> None:
@@ -111,8 +142,8 @@ class Streamed:
 
     def source(self, options: CoreOptions) -> str:
         """Return a fingerprint of options, settings, sizes and times of files."""
-        digest = hashlib.sha256(repr((options, self._settings)).encode())
-        for name, table in sorted(self._settings.tables.items()):
+        digest = hashlib.sha256(repr((options, self._tables.settings)).encode())
+        for name, table in sorted(self._tables.settings.tables.items()):
             found = table.stat()
             digest.update(f"{name} {found.st_size} {found.st_mtime_ns}".encode())
         return digest.hexdigest()
@@ -132,133 +163,92 @@ class Streamed:
             if not number:
                 observed = home[of_observations]
             seen |= set(bucket["names"].tolist()) & self._given.keys()
-            self._into_pieces(number, bucket, home[of_points])
+            of_images = home[of_points][bucket["points"]]
+            self._divide(bucket, of_images, [f"node-{node}" for node in range(root + 1)], number)
         unseen = [name for name in self._given if name not in seen]
+        owners = found.owners[self._vertices]
 
         def part_at(node: int, below: Names) -> Part:
             own = np.flatnonzero(observed == node)
             at_home = self._at_home(node, unseen if node == root else [], own)
-            return assembled_part(self.block, found.owners, node, at_home, below)
+            return assembled_part(self.block, owners, node, at_home, below)
 
         manifest = divided(self.block, run, found.tree, part_at, options, source, [])
         self.close()
         return manifest
 
-    def _without_images(self) -> Settings:
-        """Return settings with nearly empty tables of points and images."""
-        import pyarrow
-        import pyarrow.parquet
-
-        settings = self._settings
-        schema = pyarrow.parquet.read_schema(settings.tables["images"])
-        columns = {name.strip().lower(): name for name in schema.names}
-        if not {"photo", "point"} <= columns.keys():
-            message = missing_columns(["photo", "point"], schema.names)
-            raise InputError(message, file=settings.tables["images"])
-        if "use" in columns:
-            message = phrase("plain.parts-column", column="use")
-            raise InputError(message, file=settings.tables["images"])
-        named = read_head(settings.tables["points"]) if "points" in settings.tables else []
-        if any(name.startswith("sd") for name in named):
-            message = phrase("plain.parts-column", column="sd_x")
-            raise InputError(message, file=settings.tables["points"])
-        self._columns = columns
-        images, points = self._folder / "images.parquet", self._folder / "points.parquet"
-        pyarrow.parquet.write_table(schema.empty_table(), images)
-        tables = Tables(settings, [])
-        ties = [table for kind in TIES if (table := tables.read(kind)) is not None]
-        names = sorted({name for table in ties for end in ("from", "to") for name in table.texts(end)})
-        nothing = np.full(len(names), np.nan)
-        pyarrow.parquet.write_table(
-            pyarrow.table({"point": pyarrow.array(names, pyarrow.string())} | dict.fromkeys("xyz", nothing)),
-            points,
-        )
-        return replace(settings, tables={**settings.tables, "images": images, "points": points})
-
     @cached_property
-    def _rows(self) -> dict[str, int]:
-        return {name: row for row, name in enumerate(self.block.photo_ids)}
-
-    @property
     def _given(self) -> dict[str, int]:
-        """Rows of control points and tied points."""
+        """Rows of control points, weighted points and tied points."""
         return {name: row for row, name in enumerate(self.block.point_ids)}
 
     @cached_property
     def _spread_out(self) -> tuple[int, Floats]:
         """Distribute observations over buckets; return counts."""
-        import pandas as pd
-        import pyarrow
-        import pyarrow.parquet
-
-        path = self._settings.tables["images"]
-        rows, unused = self._rows, self._photos.unused
-        counts = np.zeros(len(rows))
-        with pyarrow.parquet.ParquetFile(path) as file:
-            buckets = max(-(-file.metadata.num_rows // BUCKET), 1)
-            writers: list[pyarrow.parquet.ParquetWriter] = []
-            start = 0
-            try:
-                for batch in file.iter_batches(BATCH):
-                    table = pyarrow.Table.from_batches([batch])
-                    photos, of_photos = _stripped(table.column(self._columns["photo"]))
-                    points, of_points = _stripped(table.column(self._columns["point"]))
-                    known = np.array([rows.get(each, -1) for each in photos], dtype=np.int64)
-                    for each, row in zip(photos, known.tolist(), strict=True):
-                        if row < 0 and each not in unused:
-                            raise InputError(unknown_name("photo", each, rows), file=path)
-                    used = known[of_photos] >= 0
-                    counts += np.bincount(known[of_photos][used], minlength=len(rows))
-                    hashed = pd.util.hash_array(np.array(points, dtype=object)) % np.uint64(buckets)
-                    where = hashed.astype(np.int64)
-                    where[[row for row, each in enumerate(points) if each in self._tied]] = 0
-                    table = table.append_column("record", pyarrow.array(start + np.arange(len(table))))
-                    if not writers:
-                        writers = [
-                            pyarrow.parquet.ParquetWriter(self._folder / f"{k}.parquet", table.schema)
-                            for k in range(buckets)
-                        ]
-                    for k, writer in enumerate(writers):
-                        own = used & (where[of_points] == k)
-                        if own.any():
-                            writer.write_table(table.filter(pyarrow.array(own)))
-                    start += len(table)
-            finally:
-                for each in writers:
-                    each.close()
-        for k in range(buckets):
-            self._read_bucket(k)
-        return buckets, counts
-
-    def _read_bucket(self, number: int) -> None:
-        """Convert the rows of a bucket to arrays."""
-        import pyarrow.parquet
-
-        path = self._folder / f"{number}.parquet"
-        settings = replace(self._settings, tables={**self._settings.tables, "images": path})
-        # The column is internal and needs no remark.
-        images = read_images(Tables(settings, []), self._photos)
-        cameras = np.asarray(self._photos.cameras)
-        xy, sd = image_coordinates(
-            settings, images, self._cameras, cameras, np.zeros(len(cameras), dtype=bool)
-        )
-        if sd is None:
-            sd = np.asarray(ASSUMED_SD[self._cameras.cameras[0].unit or "px"])
-        names = list(dict.fromkeys([*self._tied, *images.point_names])) if not number else images.point_names
-        places = {name: row for row, name in enumerate(names)}
-        which = np.array([places[name] for name in images.point_names], dtype=np.int64)
-        write_arrays(
-            self._folder / f"{number}.npz",
-            {
+        path, source = self._tables.settings.tables["images"], self._source
+        buckets = max(-(-path.stat().st_size // BUCKET), 1)
+        counts, start = np.zeros(len(self.block.photo_ids)), 0
+        assumed = np.asarray(ASSUMED_SD[source.cameras.cameras[0].unit or "px"])
+        for number, table in enumerate(source.tables.batches("images", self._size)):
+            images = images_of(source.tables, table, source.photos)
+            xy, sd = source.converted(images)
+            sd = assumed if sd is None else sd
+            records = np.asarray(table.records)
+            names = np.array(images.point_names, dtype=np.str_)
+            batch = {
                 "photos": images.photos,
-                "points": which[images.points],
+                "points": images.points,
                 "xy": xy,
                 "sd": np.broadcast_to(sd.reshape(-1, 1) if sd.ndim == 1 else sd, xy.shape),
-                "rows": pyarrow.parquet.read_table(path, columns=["record"]).column(0).to_numpy(),
-                "names": np.array(names, dtype=np.str_),
-            },
-        )
-        path.unlink()
+                "rows": start + np.arange(len(xy)),
+                "records": records if images.used is None else records[images.used],
+                "names": names,
+            }
+            counts += np.bincount(self._vertices[images.photos], minlength=len(counts))
+            start += len(xy)
+            of_points = np.array(
+                [0 if name in self._tied else zlib.crc32(name.encode()) % buckets for name in names.tolist()],
+                dtype=np.int64,
+            )
+            self._divide(batch, of_points[images.points], [f"bucket-{k}" for k in range(buckets)], number)
+        for k in range(buckets):
+            bucket = self._gathered(f"bucket-{k}", [] if k else list(self._tied))
+            records, photos, points = bucket.pop("records"), bucket["photos"], bucket["points"]
+            again = repeated_pairs(photos, points, len(bucket["names"]))
+            if again.size:
+                alike = (photos == photos[again[0]]) & (points == points[again[0]])
+                first, second = records[np.flatnonzero(alike)[:2]].tolist()
+                raise Place(path, second).error(phrase("plain.image-twice", record=first))
+            write_arrays(self._folder / f"{k}.npz", bucket)
+        return buckets, counts
+
+    def _divide(self, arrays: _Arrays, where: Indices, folders: Sequence[str], number: int) -> None:
+        """Write the image observations of each folder as a numbered piece; `where` are their folders."""
+        for k in np.unique(where).tolist():
+            own = where == k
+            points, of_points = np.unique(arrays["points"][own], return_inverse=True)
+            piece = {name: each[own] for name, each in arrays.items() if name != "names"}
+            piece |= {"points": of_points.reshape(-1), "names": arrays["names"][points]}
+            (self._folder / folders[k]).mkdir(exist_ok=True)
+            write_arrays(self._folder / folders[k] / f"{number:06d}.npz", piece)
+
+    def _gathered(self, folder: str, names: Sequence[str]) -> _Arrays:
+        """Return the image observations of all pieces of a folder; `names` are the first points."""
+        place = self._folder / folder
+        pieces = [read_arrays(each) for each in sorted(place.glob("*.npz"))]
+        shutil.rmtree(place, ignore_errors=True)
+        rows = {name: row for row, name in enumerate(names)}
+        points = [
+            np.array([rows.setdefault(name, len(rows)) for name in piece["names"].tolist()], dtype=np.int64)
+            for piece in pieces
+        ]
+        for own, piece in zip(points, pieces, strict=True):
+            piece["points"] = own[piece["points"]]
+        found = {
+            name: np.concatenate([none, *(piece[name] for piece in pieces if name in piece)])
+            for name, none in _EMPTY.items()
+        }
+        return found | {"names": np.array(list(rows), dtype=np.str_)}
 
     def _edges(self, number: int, points: int) -> tuple[Indices, Indices]:
         """Return the edge of each point and, in the first bucket, observation."""
@@ -270,66 +260,59 @@ class Streamed:
         return edges, np.array([edges[each[0]] if each else next(alone) for each in tied], dtype=np.int64)
 
     def _incidences(self) -> Iterator[Incidence]:
-        rows = self._rows
+        rows = {name: row for row, name in enumerate(self.block.photo_ids)}
+        alone = alone_of(self.block)
         for number in range(self._spread_out[0]):
             bucket = read_arrays(self._folder / f"{number}.npz")
             edges, of_observations = self._edges(number, len(bucket["names"]))
             others = [
-                (rows[name], edge)
+                (self._vertices[rows[name]], edge)
                 for each, edge in zip(self.block.observations, of_observations.tolist(), strict=not number)
-                for name in each.photos
+                for name in photos_of(each, alone)
             ]
             photos, own = np.array(others, dtype=np.int64).reshape(-1, 2).T
             yield Incidence(
-                np.concatenate([bucket["photos"], photos]),
+                np.concatenate([self._vertices[bucket["photos"]], photos]),
                 np.concatenate([edges[bucket["points"]], own]),
                 len(edges) + len(of_observations),
             )
 
-    def _into_pieces(self, number: int, bucket: dict[str, np.ndarray], home: Indices) -> None:
-        """Write the image observations of a bucket to their nodes."""
-        of_images = home[bucket["points"]]
-        for node in np.unique(of_images).tolist():
-            own = of_images == node
-            kept, which = np.unique(bucket["points"][own], return_inverse=True)
-            place = self._folder / f"node-{node}"
-            place.mkdir(exist_ok=True)
-            piece = {name: bucket[name][own] for name in ("photos", "rows", "xy", "sd")}
-            piece |= {"points": which.reshape(-1), "names": bucket["names"][kept]}
-            write_arrays(place / f"{number:06d}.npz", piece)
-
     def _at_home(self, node: int, unseen: list[str], observations: Indices) -> AtHome:
         """Return the observations of a node from the pieces of all buckets."""
-        place = self._folder / f"node-{node}"
-        pieces = [read_arrays(each) for each in sorted(place.glob("*.npz"))] if place.is_dir() else []
-        names = [str(name) for piece in pieces for name in piece["names"]]
-        starts = np.cumsum([0, *(len(piece["names"]) for piece in pieces)])
-        points = [piece["points"] + start for piece, start in zip(pieces, starts, strict=False)]
-        names += unseen
-        given, held = self._given, self.block
-        rows = np.array([given.get(name, -1) for name in names], dtype=np.int64)
+        found = self._gathered(f"node-{node}", [])
+        names = [*found["names"].tolist(), *unseen]
+        rows = np.array([self._given.get(name, -1) for name in names], dtype=np.int64)
         known = rows >= 0
         positions, sd = np.full((len(names), 3), np.nan), np.full((len(names), 3), np.inf)
-        positions[known], sd[known] = held.point_positions[rows[known]], held.point_sd[rows[known]]
-
-        def whole(name: str, width: tuple[int, ...], kind: type) -> np.ndarray:
-            return np.concatenate([np.zeros((0, *width), kind), *(each[name] for each in pieces)])
-
+        positions[known], sd[known] = (
+            self.block.point_positions[rows[known]],
+            self.block.point_sd[rows[known]],
+        )
         return AtHome(
             points=np.full(len(names), -1, dtype=np.int64),
             names=names,
             point_positions=positions,
             point_sd=sd,
-            images=whole("rows", (), np.int64),
-            image_photos=whole("photos", (), np.int64),
-            image_points=np.concatenate([np.zeros(0, dtype=np.int64), *points]),
-            image_xy=whole("xy", (2,), np.float64),
-            image_sd=whole("sd", (2,), np.float64),
+            images=found["rows"],
+            image_photos=found["photos"],
+            image_points=found["points"],
+            image_xy=found["xy"],
+            image_sd=found["sd"],
             observations=observations,
         )
 
 
-def _stripped(column: Any) -> tuple[list[str], Indices]:
-    """Return column names without outer blanks, and the index of each row."""
-    names, rows = coded(column)
-    return [str(name).strip() for name in names], rows
+def _tied_names(tables: Tables) -> set[str]:
+    """Return the names of points in tables of observations and in the settings."""
+    found = set[str](tables.settings.statement.get("without", ()))
+    for name, schema in TABLES.items():
+        columns = [each for column in schema.all_columns if column.kind == "point" for each in column.names]
+        for column in columns:
+            found.update(tables.rows(name).texts(column))
+    return found
+
+
+def _selected(parts: Iterable[ColumnTable], wanted: Callable[[ColumnTable], Bools]) -> ColumnTable | None:
+    """Return the wanted rows of batches; None without batches."""
+    found = [table.some(np.flatnonzero(wanted(table)).tolist()) for table in parts]
+    return reduce(ColumnTable.joined, found) if found else None

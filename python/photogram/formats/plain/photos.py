@@ -142,7 +142,8 @@ def _attitude_weights(
 class Images:
     """The table of images; `left` are the omitted observations of existing photos.
 
-    `sd_given` is True if the table or the settings contain standard deviations; levels are ratios.
+    `sd_given` is True if the table or the settings contain standard deviations; levels are ratios. `used` are
+    the rows of the table without omitted observations; None: all.
     """
 
     sd_given: bool
@@ -152,12 +153,18 @@ class Images:
     xy: Floats
     sd: Floats | None
     left: Images | None = None
+    used: Bools | None = None
 
 
 def read_images(tables: Tables, photos: Photos) -> Images:
     """Read the table of images; raises the errors of :func:`read`."""
     table = tables.read("images")
     assert table is not None
+    return images_of(tables, table, photos)
+
+
+def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
+    """Return the image observations of the table of images, or of a batch."""
     if "camera" in table and "photos" in tables.settings.tables:
         tables.remark("plain.camera-column", table.path)
     xs, ys = ("column", "row") if "column" in table else ("x", "y")
@@ -175,7 +182,7 @@ def read_images(tables: Tables, photos: Photos) -> Images:
     if left:
         tables.remark("plain.unused-images", table.path, n=left)
     whole = Images(_sd_is_given(tables, table), rows, names.rows, names.names, xy, sd)
-    return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))))
+    return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))), used=keep)
 
 
 def _some(images: Images, which: Bools) -> Images:

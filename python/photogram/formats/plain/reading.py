@@ -61,10 +61,26 @@ _USES = ("control", "check", "off")
 def read(path: Path, options: ReadOptions) -> Project:
     """Read the project of a folder, or of a file of settings."""
     settings = read_settings(path / SETTINGS if path.is_dir() else path, options)
-    return read_tables(Tables(settings, unread_tables(settings)), options)
+    project, _ = read_tables(Tables(settings, unread_tables(settings)), options)
+    return project
 
 
-def read_tables(tables: Tables, options: ReadOptions) -> Project:
+@dataclass(frozen=True)
+class ImageSource:
+    """The table of images of a project, and what its conversion requires."""
+
+    tables: Tables
+    photos: Photos
+    cameras: Cameras
+    of_photos: Indices  # Rows of the cameras of photos
+    scanned: Bools  # Whether photos are scanned
+
+    def converted(self, images: Images) -> tuple[Floats, Floats | None]:
+        """Return image coordinates and standard deviations of the cameras."""
+        return image_coordinates(self.tables.settings, images, self.cameras, self.of_photos, self.scanned)
+
+
+def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSource]:
     """Read the tables of a project."""
     settings = tables.settings
     if "images" not in settings.tables:
@@ -88,7 +104,8 @@ def read_tables(tables: Tables, options: ReadOptions) -> Project:
     scanned = read_scanned(tables, Seen(images, known, photos, cameras), read_covariances(tables))
     cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
-    xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras), scanned.photos)
+    source = ImageSource(tables, photos, cameras, np.asarray(photo_cameras), scanned.photos)
+    xy, sd = source.converted(images)
     block = BlockBuilder(settings.path, "plain project")
     for row, own in enumerate(zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True)):
         block.camera(*own, key=row)
@@ -140,7 +157,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> Project:
     ).replace(
         sd_taken=True,
         boards=boards,
-        unused=_unused(settings, images, cameras, np.asarray(photo_cameras), photos) if boards else Unused(),
+        unused=_unused(source, images) if boards else Unused(),
         features=settings.features,
         control_crs=settings.crs.get("control", ""),
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
@@ -150,20 +167,17 @@ def read_tables(tables: Tables, options: ReadOptions) -> Project:
         from photogram.formats.control_system import check_systems
 
         check_systems(project, settings, control, points.control_rows, control.vectors(AXES), free=False)
-    return project
+    return project, source
 
 
-def _unused(
-    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, photos: Photos
-) -> Unused:
+def _unused(source: ImageSource, images: Images) -> Unused:
     """Return the omitted image observations of a board."""
     left = images.left
     if left is None:
         return Unused()
-    none = np.zeros(len(photos.names), dtype=bool)
-    xy, sd = image_coordinates(settings, left, cameras, photo_cameras, none)
+    xy, sd = source.converted(left)
     return Unused(
-        photos=tuple(photos.names[row] for row in left.photos.tolist()),
+        photos=tuple(source.photos.names[row] for row in left.photos.tolist()),
         points=tuple(left.point_names[row] for row in left.points.tolist()),
         xy=xy,
         sd=np.ones_like(xy) if sd is None else sd,
@@ -181,9 +195,8 @@ def _check_features(settings: Settings, names: Sequence[str]) -> None:
 
 
 def _with_cameras(tables: Tables, path: Path) -> Tables:
-    return replace(
-        tables, settings=replace(tables.settings, tables={**tables.settings.tables, "cameras": path})
-    )
+    settings = replace(tables.settings, tables={**tables.settings.tables, "cameras": path})
+    return replace(tables, settings=settings, parsed=dict(tables.parsed))
 
 
 def _unknowns(

@@ -6,12 +6,13 @@ photo, `NAME half 2`, which is mounted on the first. Other modules do not proces
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from photogram.formats.plain.tables import Tables
 from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import BATCH
 from photogram.lazy_dataclasses import dataclass, field, fields, replace
 from photogram.network.moving_photos import Timed
 from photogram.network.rigs import Mount
@@ -48,7 +49,8 @@ def with_seams(tables: Tables) -> tuple[Tables, Seams]:
             raise table.error(row, phrase("plain.seam-without-film", photo=names[row]))
         axis = int(np.isnan(places[row, 0]))
         found[names[row]] = Seam(f"{names[row]} half 2", _LINES[axis], float(places[row, axis]))
-    own = {each.name: getattr(tables, each.name) for each in fields(tables) if each.init}
+    own = {each.name: getattr(tables, each.name) for each in fields(tables)}
+    own["parsed"] = {name: each for name, each in tables.parsed.items() if name != "photos"}
     return _Divided(**own, seams=found), found
 
 
@@ -58,12 +60,13 @@ class _Divided(Tables):
 
     seams: Seams = field(default_factory=dict)
 
-    def read(self, name: str) -> ColumnTable | None:
-        """Return a table if it exists, divided; raises the same errors."""
-        table = super().read(name)
-        if table is None or name not in ("photos", "images", "fiducial_images"):
-            return table
-        return _with_halves(table, self.seams) if name == "photos" else _parted(table, self.seams)
+    def batches(self, name: str, size: int | None = BATCH) -> Iterator[ColumnTable]:
+        """Yield a table in batches, divided."""
+        for table in super().batches(name, size):
+            if name in ("images", "fiducial_images"):
+                yield _parted(table, self.seams)
+            else:
+                yield _with_halves(table, self.seams) if name == "photos" else table
 
 
 def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
