@@ -95,7 +95,8 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
     project = changed(project, tmp_path / "project")
     block = read(project).block
     expected = partition(started(block), tmp_path / "whole", 4, OPTIONS, "")
-    assert streamable(project) == (changed is not in_text)
+    assert streamable(project, 40_000)
+    assert streamable(project, 1 << 40) == (changed is not in_text)
     own = Streamed(project, ReadOptions(), tmp_path / "parts", size=size)
     np.testing.assert_array_equal(own.images, np.bincount(block.image_photos))
     assert own.source(OPTIONS) == own.source(OPTIONS)

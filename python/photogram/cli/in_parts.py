@@ -47,9 +47,9 @@ def adjusted_on_disk(
     from photogram.formats import ReadOptions
     from photogram.formats.plain.batches import streamable
 
-    if not streamable(path):
+    if not streamable(path, None if division.cluster else division.memory_bytes):
         return False
-    job.only(TAKEN, "parquet-in-parts", options=[each for each in job.given if each in DIVIDING])
+    job.only(TAKEN, "in-batches", options=[each for each in job.given if each in DIVIDING])
     from photogram.formats import in_parts
     from photogram.show.forms import text
     from photogram.show.page import Section, Text

@@ -55,6 +55,7 @@ from photogram.network.observations import Fiducial, KnownFilm, KnownTogether, P
 from photogram.network.observations.photos import with_epochs
 from photogram.words import phrase
 
+SHARE = 0.25  # Largest size of images in a text that is read as a whole, relative to the memory
 BUCKET = 2**26  # Bytes of the table of images in a bucket, which is loaded completely
 _Arrays = dict[str, np.ndarray]
 _INDICES, _PAIRS = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
@@ -66,18 +67,19 @@ _EMPTY: _Arrays = {
 _INNER = (Fiducial, KnownFilm, KnownTogether, Prior)  # Observations that do not define a datum
 
 
-def streamable(path: Path) -> bool:
-    """Return whether the images of a project are in Parquet, and are read in batches."""
+def streamable(path: Path, memory: int | None = None) -> bool:
+    """Return whether the images of a project are read in batches.
+
+    Images in Parquet are; a text also is if it is larger than its share of the memory in bytes.
+    """
     place = path / SETTINGS if path.is_dir() else path
     if place.suffix != ".toml" or not place.is_file():
         return False
     settings = read_settings(place)
-    tables = settings.tables
-    return (
-        settings.photo_files is None
-        and {"images", "photos"} <= tables.keys()
-        and tables["images"].suffix == ".parquet"
-    )
+    images = settings.tables.get("images")
+    if images is None or "photos" not in settings.tables or settings.photo_files is not None:
+        return False
+    return images.suffix == ".parquet" or (memory is not None and images.stat().st_size > SHARE * memory)
 
 
 class Streamed:
