@@ -339,7 +339,7 @@ def test_the_report_and_the_document_have_the_worst(made):
     assert not [each for each in result.messages if "parallel" in str(each) or "station's" in str(each)]
     points, photos = weakest_points(result), weakest_photos(result)
     assert len(photos) == len(result.block.photo_ids)
-    table = result.document().table("weakest-photos")
+    table = result.document().table("weakest.photos")
     assert table.columns[1].values.tolist() == [each.condition for each in photos]
     document = json.loads(result.to_json())["weakest"]
     assert [each["point"] for each in document["points"]] == [each.point for each in points]

@@ -1,6 +1,7 @@
 """Observations of every kind: residual, redundancy number, test value in arrays, tables, report, document."""
 
 import json
+from fnmatch import fnmatchcase
 
 import numpy as np
 import pytest
@@ -96,8 +97,8 @@ def test_tables_and_document_say_of_a_kind_what_its_arrays_say(result, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_document_has_every_observation_of_a_kind(result, kind):
-    key = {"image": "images", "control": "control", "station": "stations-"}[kind]
-    tables = [table for table in result.document().tables(layers=True) if table.key.startswith(key)]
+    keys = {"image": "observations", "control": "control", "station": "stations-*"}[kind]
+    tables = [table for table in result.document().tables(layers=True) if fnmatchcase(table.key, keys)]
     _, redundancy, tests = (
         getattr(result, name)[rows_of(result, kind)] * sign_of(kind, name) for name in KINDS[kind]
     )
@@ -144,7 +145,7 @@ def test_a_report_lists_no_more_than_can_be_read(monkeypatch):
 
     monkeypatch.setattr(network_sections, "IMAGES", 3)
     result = ring()
-    table = result.document().table("images")
+    table = result.document().table("observations")
     largest = np.argsort(-np.abs(result.standardized[result.used_images]).max(axis=1))[:3]
     assert sorted(largest.tolist()) == table.shown.tolist()
     assert len(table.frame()) == np.count_nonzero(result.used_images)

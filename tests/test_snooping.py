@@ -306,7 +306,7 @@ def test_collections():
 def test_the_log_in_every_form():
     data = golden("statistics", "block6_blunders.json")
     found = photogram.snoop(golden_block(data["input"]))
-    log = found.document().table("log")
+    log = found.document().table("snooping.log")
     assert list(log.columns[2].values) == [entry.name for entry in found.log]
     table = found.table()
     assert set(table["unit"]) == {"mm", "m"}

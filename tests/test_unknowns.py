@@ -136,7 +136,7 @@ def test_examples_print_what_was_found(name, scripts, capsys):
 def test_report_table_and_document_tell_of_unknowns(scripts):
     result = adjust(scripts["direct_georeferencing"].measured())
     lever_arm = result.unknowns[0]
-    rows = result.document().table("unknowns").frame()
+    rows = result.document().table("common-unknowns").frame()
     first = rows[rows["unknown"] == "antenna"].iloc[0]
     assert (first["component"], first["unit"], first["sd_given"]) == ("x", "m", 0.02)
     assert first["value"] == lever_arm.position[0]

@@ -326,7 +326,7 @@ def test_reliability_stands_in_report_and_document(simulated):
     moved = np.linalg.norm(every.own_point_effect[every.suspects.rows(group)], axis=1)
     assert images[0]["own_point"] == pytest.approx(moved.max())
     assert all(0.9 < pair.correlation <= 1 for pair in summary.listed.pairs)
-    weakest = result.document().table("reliability-weakest")
+    weakest = result.document().table("reliability.weakest")
     assert images[0]["name"] in weakest.frame()["name"].tolist()
     frame = summary.weakest_table().frame()
     assert list(frame["name"]) == [each["name"] for each in document["weakest"]]

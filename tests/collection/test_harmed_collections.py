@@ -219,7 +219,7 @@ def test_the_report_the_page_and_the_document_have_the_worst():
     assert all(a.condition >= b.condition for a, b in pairwise(photos))
     # The photo whose pose is held has none.
     assert sorted(each.photo for each in photos) == list(range(1, 8))
-    table = result.document().table("weakest-photos")
+    table = result.document().table("weakest.photos")
     assert table.columns[1].values.tolist() == [each.condition for each in photos]
     document = json.loads(result.to_json())["weakest"]
     assert [each["point"] for each in document["points"]] == [each.point for each in points]

@@ -248,7 +248,7 @@ def test_figures_of_the_page_are_those_of_the_result():
         )
         assert float(row[sd]) == pytest.approx(table.loc[row[0], f"sd_{row[1]}"], rel=6e-3)
     _, rows = Tables(section(text, "iterations")).of("Iterations")
-    assert [int(row[0]) for row in rows] == list(range(len(result.iterations) + 1))
+    assert [int(row[0]) for row in rows] == list(range(1, len(result.iterations) + 1))
     last = result.iterations[-1].weighted_sum_of_squares
     assert float(rows[-1][1]) == pytest.approx(last, rel=1e-6)
     head, rows = Tables(section(text, "worst")).of("Worst observations")

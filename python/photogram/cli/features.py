@@ -64,8 +64,8 @@ def features(
     """
     from photogram import features as fitted
     from photogram.formats.adjusted import feature_files
-    from photogram.io.json import to_json
-    from photogram.results.features import features_document, features_section
+    from photogram.results.features import features_members, features_section
+    from photogram.show.forms import to_json
     from photogram.show.judgement import judged
     from photogram.show.page import Document
 
@@ -79,10 +79,11 @@ def features(
         raise misuse("PATH", "no-features")
     found = fitted(result, definitions or declared, k=k, coverage=coverage)
     verdict = result.verdict
-    document = Document("Features", "", [judged(verdict)], verdict.next, [], [features_section(found)])
+    sections, members = [features_section(found)], features_members(found)
+    document = Document("Features", "", [judged(verdict)], verdict.next, [], sections, members)
     job.finish(
         {} if out is None else {out / name: each for name, each in feature_files(found).items()},
-        {} if json is None else {json: to_json(features_document(found))},
+        {} if json is None else {json: to_json(document)},
         summary=lambda: print_document(document, "--json FILE", "features"),
         code=verdict.exit_code(strict=strict),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,11 +49,11 @@ def collection_document(result: AdjustedCollection) -> Document:
         size_section(result, size, more, good),
         [control_section(result), stations_section(result), cameras],
         photos=int(np.count_nonzero(result.photo_images)),
+        members=partial(_members, result),
     )
 
 
-def collection_members(result: AdjustedCollection) -> dict[str, Any]:
-    """Return the members of the JSON file of an adjusted collection."""
+def _members(result: AdjustedCollection) -> dict[str, Any]:
     named = zip(result.collection.parameters[len(POSE) :], result.collection.units[len(POSE) :], strict=True)
     lengths, plain = list[str](), list[str]()
     for name, unit in named:

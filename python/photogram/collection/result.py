@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -85,11 +85,6 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.document import collection_document
 
         return collection_document(self)
-
-    def _members(self) -> dict[str, Any]:
-        from photogram.collection.document import collection_members
-
-        return collection_members(self)
 
     @property
     def given(self) -> Collection:

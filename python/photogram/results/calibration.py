@@ -27,7 +27,7 @@ from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_c
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
 from photogram.results.parts import AdjustedCamera
 from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section, about, significant
-from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
+from photogram.show.quantity import Axis, Quantity, Table, component, for_people, members, of_each, records
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -331,7 +331,7 @@ def gains_section(result: Result) -> Section:
             of_each(every, "redundancy", head="Redundancy", decimals=3, seen=weighted),
             of_each(every, "gain", head="Gain"),
         ]
-        tables.append(Table(f"gains-{name}", name, columns))
+        tables.append(Table(f"gains-{name}", name, for_people(columns)))
     return Section("gains", "Redundancy numbers and gains of camera parameters", tables, about("gains"))
 
 
@@ -354,7 +354,7 @@ def _terms_together(groups: Sequence[TermsTest]) -> Table:
         of_each(groups, "probability", head="p", figures=2),
         of_each(groups, "outcome", kind="name", head="Outcome"),
     ]
-    return Table("camera-groups", "Terms of the lens tested together", columns)
+    return Table("camera-groups", "Terms of the lens tested together", for_people(columns))
 
 
 def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:

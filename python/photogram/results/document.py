@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,13 +18,13 @@ from photogram.results import network_sections as sections
 from photogram.results import tables as declared
 from photogram.results.calibration import calibration_members, cameras_section, gains_section
 from photogram.results.datum import observed_control
-from photogram.results.features import features_document, features_section
-from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
+from photogram.results.features import features_members, features_section
+from photogram.results.film_report import films_section
 from photogram.results.network_tables import control, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, about, significant
-from photogram.show.quantity import Quantity, Table, chosen, members, named, records
+from photogram.show.quantity import Quantity, Table, chosen, for_people, members, named, records
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -34,7 +35,7 @@ def block_document(result: Result) -> Document:
     pictures, (head, figures) = of_network.drawings(result), bandwidths(result)
     shown, note = notable(result.unknowns)
     tables = [
-        Table("unknowns", "Common unknowns", declared.unknowns(shown), note),
+        Table("common-unknowns", "Common unknowns", for_people(declared.unknowns(shown)), note),
         trajectories_table(result),
     ]
     given = [
@@ -62,6 +63,7 @@ def block_document(result: Result) -> Document:
         poses=about("poses") if result.block.timed else "",
         details=[gains_section(result)],
         work=[Fact(f"Bandwidth {name}", value, note=head) for name, value in figures],
+        members=partial(_members, result),
     )
 
 
@@ -159,7 +161,7 @@ def rms_of(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 
-def block_members(result: Result) -> dict[str, Any]:
+def _members(result: Result) -> dict[str, Any]:
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
     test = result.global_test
     side = None if test is None else "high" if test.rejected_high else "low" if test.rejected_low else None
@@ -192,7 +194,6 @@ def block_members(result: Result) -> dict[str, Any]:
         and members(test, "variance", "limits", "level", "probability") | {"rejected": side},
         **_of_some(result),
         "observations_beside_images": _beside_images(result),
-        "check_points": records(declared.check_points(result)),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
     }
 
@@ -216,11 +217,8 @@ def _of_some(result: Result) -> dict[str, Any]:
             | members(each, "change", "sd", "redundancy", "standardized", "covariance")
             for each in result.unknowns
         ]
-    if result.films:
-        tables = {"films": film_table, "fiducials": mark_table, "scanners": scanner_table}
-        found |= {name: records(table(result)) for name, table in tables.items()}
     if result.features is not None:
-        found["features"] = features_document(result.features)
+        found["features"] = features_members(result.features)
     return found
 
 

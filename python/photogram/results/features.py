@@ -21,7 +21,7 @@ from photogram.messages import Message, by_name, unknown_name
 from photogram.results.covariance import Covariances, used_rows
 from photogram.show import quantity
 from photogram.show.page import Drawing, Part, Section, Text, about
-from photogram.show.quantity import Axis, Table, members, of_each
+from photogram.show.quantity import Axis, Table, for_people, members, of_each
 from photogram.statistics.distributions import LEVEL, critical_student, log_chi_square, log_fisher
 from photogram.words import Phrase, phrase
 
@@ -244,7 +244,7 @@ def features_section(features: Features | None, picture: Drawing | None = None) 
             of_each(tested, "probability", kind="probability", head="p"),
             of_each(tested, "form", kind="name", head="Form"),
         ]
-        parts.append(Table("forms", "Whether form is more than errors of points", forms))
+        parts.append(Table("forms", "Whether form is more than errors of points", for_people(forms)))
         parts += [] if picture is None else [picture]
     parts += [Text(each) for each in features.remarks]
     return Section("features", "Features", parts, about("features"))
@@ -259,7 +259,7 @@ def through(feature: Feature) -> Phrase:
     return Phrase("feature.through", {"feature": form, "count": len(points), "points": points})
 
 
-def features_document(features: Features) -> dict[str, Any]:
+def features_members(features: Features) -> dict[str, Any]:
     own = members(features, "k", "coverage", "remarks")
     return own | {"features": [_member(each) for each in features]}
 

@@ -16,7 +16,7 @@ from photogram.results.films import numbers_of_film
 from photogram.results.network_trial import OBSERVATION, type_name
 from photogram.results.tables import Tests
 from photogram.show.page import Drawing, Part, Section, about
-from photogram.show.quantity import Axis, Kind, Quantity, Table, members_of_each, of_each
+from photogram.show.quantity import Axis, Kind, Quantity, Table, for_people, members_of_each, of_each
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -233,7 +233,7 @@ def scanner_table(result: Result) -> list[Quantity]:
 def films_section(result: Result, drawing: Drawing) -> Section:
     if not result.films:
         return Section("films", "Film and fiducials", [])
-    photos, *rest = form_table(result)
+    photos, *rest = for_people(form_table(result))
     numbers, said = rest[:2], rest[2:]
     parts: list[Part] = [
         Table("films", "Films", film_table(result), about("films")),

@@ -20,7 +20,6 @@ from photogram.arguments.arrays import argument_error, finite_rows, freeze_field
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
-from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, fields, replace
 from photogram.messages import Message
 from photogram.network.core_arrays import CoreNetwork, CoreOptions
@@ -188,13 +187,6 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         rows.append(("see", ".report(), .plot, .photo_table(), .point_table(), .image_table(), .to_json()"))
         title = getattr(self.given, "title", "")
         return f"Adjusted {type(self.given).__name__.lower()}{f': {title}' if title else ''}", rows
-
-    @abstractmethod
-    def _members(self) -> dict[str, Any]: ...
-
-    def to_json(self) -> bytes:
-        """Return the result as a JSON document (UTF-8); see `docs/json.md`."""
-        return json.to_json(self._members())
 
     @property
     @abstractmethod

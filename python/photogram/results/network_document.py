@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Indices
 from photogram.plots.accessor import sketch_of
 from photogram.results import network_sections as sections
@@ -20,7 +19,7 @@ from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, about, significant
-from photogram.show.quantity import Quantities, Quantity, members, records
+from photogram.show.quantity import Quantities, Quantity, for_people, members, records
 from photogram.statistics.evidence import GLOBAL
 from photogram.words import phrase
 
@@ -44,12 +43,14 @@ def network_document(
     poses: str = "",
     work: Sequence[Fact] = (),
     details: Sequence[Section] = (),
+    members: Callable[[], Mapping[str, Any]],
 ) -> Document:
     """Return the document of a network from its `photos`, `size` and `given` data.
 
     `more` are additional highlights, `redundancy` tables below the plot of redundancy numbers, `beside`
     sections below the plan. `datum` describes the reference of coordinates, `poses` the meaning of photo
     poses. `work` are other facts on the normal equations, `details` sections of the text report only.
+    `members` returns the members of JSON documents that are no tables.
     """
     pictures, tests = drawings(result), Tests(result)
     worst = tests.largest(WORST)
@@ -60,9 +61,10 @@ def network_document(
     for rows, table in zip((worst_points, worst_photos), weakest, strict=True):
         link = table.columns[0].link
         rows += [] if link is None else link.rows.tolist()
-    history = declared.iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
+    history = declared.iteration_table(result.iterations)
     course_table = quantity.Table("iterations", "Iterations", history, about("iterations"))
-    course = [Fact("Status", result.status)]
+    first = Fact.of("Weighted sum of squares at first", result.initial_weighted_sum_of_squares, figures=7)
+    course = [Fact("Status", result.status), first]
     if result.loss is not None:
         course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
     summary = result.reliability_summary
@@ -94,6 +96,7 @@ def network_document(
             *details,
             sections.images_section(result),
         ],
+        members=members,
         phases=result.seconds,
     )
 
@@ -115,27 +118,16 @@ def problems_of(result: AdjustedNetwork) -> list[str]:
 def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> dict[str, Any]:
     """Return JSON members of all networks, with additional members of photos."""
     summary = result.reliability_summary
-    weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
     of_photos = Quantity(result.photo_covariances, member="covariance")
-    of_points = Quantity(result.point_covariances[result.used_points], member="covariance")
     return {
-        "program": f"photogram {_photocore.__version__}",
         **members(result, "status", "degrees_of_freedom", "variance_of_unit_weight", "covariance_scale"),
         **members(result, "ordering", "predictions", "operations", "seconds"),
         "messages": [str(message) for message in result.messages],
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
-        "iterations": records(declared.iteration_table(result.iterations)),
         "photos": records([*declared.photos(result), *photo_members, of_photos]),
-        "points": records([*declared.points(result), of_points]),
-        "observations": records([*declared.images(result), *([weights] if result.loss else [])]),
-        "control": records(declared.control(result)),
         "stations": records(declared.stations(result)),
-        "weakest": {
-            "points": sections.weakest_points(result).record(),
-            "photos": sections.weakest_photos(result).record(),
-        },
     }
 
 
@@ -249,7 +241,7 @@ def _worst_table(tests: Tests, places: Indices) -> quantity.Table:
     note = about("worst-observations", n=len(places), count=count, limit=NOTABLE)
     columns = [Quantity(names, kind="name", head="Observation")]
     columns += [each for each in tests.columns(places) if each.name != "component"]
-    return quantity.Table("worst", "Worst observations", columns, note)
+    return quantity.Table("worst", "Worst observations", for_people(columns), note)
 
 
 PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")

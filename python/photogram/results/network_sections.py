@@ -15,7 +15,7 @@ from photogram.results.network_tables import point_axes
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
 from photogram.show.page import Layers, Part, Section, Text, about
-from photogram.show.quantity import Quantity, Table, named
+from photogram.show.quantity import Quantity, Table, for_people, named
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -55,7 +55,7 @@ def weakest_points(result: AdjustedNetwork) -> Table:
         Quantity(distance[rows], member="distance", head="Distance", figures=4),
         Quantity(result.point_rays[rows], member="rays", head="Rays", decimals=0),
     ]
-    return Table("weakest-points", "Weakest points", columns, about("weakest-points"))
+    return Table("weakest.points", "Weakest points", columns, about("weakest-points"))
 
 
 @np.errstate(all="ignore")
@@ -76,7 +76,7 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
         Quantity(condition[order], member="condition", head="Condition", figures=4),
         Quantity(images[rows], member="images", head="Images", decimals=0),
     ]
-    return Table("weakest-photos", "Weakest photos", columns, about("weakest-photos"))
+    return Table("weakest.photos", "Weakest photos", columns, about("weakest-photos"))
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
@@ -118,7 +118,7 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
     there, sd = np.isfinite(own.sd) & ~held[:, np.newaxis], result.point_sd[own.rows]
     parts: list[Part] = [component_table("control", "Control points", columns, there, own.standardized, sd)]
     if free:
-        parts.append(_compared("unheld", "Components of control that are not held", free))
+        parts.append(_compared("unheld", "Components of control that are not held", for_people(free)))
     if held.any():
         fixed = [str(name) for name in np.asarray(columns[0].values)[held]]
         parts.append(Text(about("control.fixed", n=len(fixed), names=fixed)))
@@ -130,10 +130,12 @@ def check_section(result: Result) -> Section:
     table = _compared("check_points", "Check points one by one", columns)
     statistic, p = named(columns, "statistic"), named(columns, "probability")
     law = "T" if result.unit_variance == "unity" else "F"
-    tests = [columns[0], replace(statistic, head=law, decimals=2), replace(p, head="p", figures=2)]
+    tests = for_people(
+        [columns[0], replace(statistic, head=law, decimals=2), replace(p, head="p", figures=2)]
+    )
     rows = np.sort(np.argsort(np.nan_to_num(p.values, nan=2.0), kind="stable")[: COMPONENTS // 3])
     together = Table("check-tests", "Tests of all components of a point together", tests, shown=rows)
-    parts = [_check_summary(result), table, together] if table.visible else []
+    parts = [_check_summary(result), table, together] if table.visible else [table]
     intro = about("check-points")
     checks = result.check_points
     if checks.assumed.any():
@@ -215,7 +217,9 @@ def images_section(result: AdjustedNetwork) -> Section:
         replace(redundancy, head="Redundancy {}"),
         replace(tests, head="w {}"),
     ]
-    table = Table("images", "Image observations", columns, note, shown=rows)
+    if result.loss:
+        columns.append(Quantity(result.image_weights[result.used_images], member="weight_factor"))
+    table = Table("observations", "Image observations", columns, note, shown=rows)
     return Section("images", "Image observations", [table], about("images"))
 
 
@@ -290,6 +294,10 @@ def points_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
     order = np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
     rows, note = _chosen_rows("points", used, others, [order])
     by = result.point_sd[used] if terms.split else None
-    columns = [*network_tables.points(result), *network_tables.plan_deviations(terms, result.point_sd[used])]
+    columns = [
+        *network_tables.points(result),
+        *network_tables.plan_deviations(terms, result.point_sd[used]),
+        Quantity(result.point_covariances[used], member="covariance"),
+    ]
     table = Table("points", "Points", columns, note, "", by, np.searchsorted(used, rows))
     return Section("points", "Points", [table], intro)

@@ -191,11 +191,10 @@ test_value = partial(
 )
 
 
-def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
-    """Return sums after corrections, largest changes, damping; optionally the start."""
-    first = [] if start is None else [(0, start, np.nan, np.nan)]
+def iteration_table(iterations: Sequence[Iteration]) -> list[Quantity]:
+    """Return sums after corrections, largest changes, damping."""
     rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in iterations]
-    number, squares, change, damping = np.array([*first, *rows]).reshape(-1, 4).T
+    number, squares, change, damping = np.array(rows).reshape(-1, 4).T
     return [
         Quantity(number.astype(int), member="number", head="Iteration", decimals=0),
         Quantity(squares, member="weighted_sum_of_squares", head="Weighted sum of squares", figures=7),

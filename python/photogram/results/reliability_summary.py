@@ -19,7 +19,7 @@ from photogram.results.hypotheses import Hypotheses
 from photogram.results.network_trial import NamedSuspects, Standing, Tests
 from photogram.results.reliability import Downweighted, Inseparable, Reliability
 from photogram.show.page import Part, Remarks, about
-from photogram.show.quantity import Quantities, Quantity, Table, column, members, records
+from photogram.show.quantity import Quantities, Quantity, Table, column, for_people, members
 from photogram.statistics.reliability import TESTABLE
 
 LISTED = 5  # Listed observations of each type
@@ -100,7 +100,7 @@ class ReliabilitySummary:
             Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
         ]
         note = about("reliability-kinds")
-        return Table("reliability-kinds", "Redundancy of groups of observations", columns, note)
+        return Table("reliability.kinds", "Redundancy of groups of observations", columns, note)
 
     def weakest_table(self, unit: str = "") -> Table:
         """Return the declared table of weakest observations in object `unit`."""
@@ -108,7 +108,7 @@ class ReliabilitySummary:
         columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
         weight = "known" if self.known else "estimated"
         note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
-        return Table("reliability-weakest", "Largest undetected errors", columns, note)
+        return Table("reliability.weakest", "Largest undetected errors", columns, note)
 
     def parts(self, unit: str) -> list[Part]:
         """Return the parts of a section; `unit` is the unit of the object space."""
@@ -122,14 +122,13 @@ class ReliabilitySummary:
         sentences = sentences or ["all observations of a point can be told apart"]
         found = self.hypotheses
         errors = [found.tests(found.likely), found.external_reliability(found.effective)]
-        return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences), *errors]
+        shown = [replace(table, columns=for_people(table.columns)) for table in errors]
+        return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences), *shown]
 
     def document(self) -> dict[str, Any]:
         return {
             **members(self, "level", "power"),
             "unit_weight": "known" if self.known else "unknown",
-            "kinds": records(self.kinds_table().columns),
-            "weakest": records(self.weakest_table().columns),
             "points_on_two_photos": self.listed.two_rays,
             "inseparable": [members(pair, "first", "second", "correlation") for pair in self.listed.pairs],
             "inseparable_found": self.listed.pairs_found,

@@ -174,11 +174,6 @@ class Result(OnFilm, AdjustedNetwork):
 
         return block_files(self)
 
-    def _members(self) -> dict[str, Any]:
-        from photogram.results.document import block_members
-
-        return block_members(self)
-
     @property
     def given(self) -> Block:
         """The adjusted block."""

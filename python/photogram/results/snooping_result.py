@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
@@ -17,7 +16,7 @@ from photogram.results.snooping_log import Outcome, Removal, Rival, disputes
 from photogram.results.snooping_options import SnoopOptions
 from photogram.show.methods import Brief, Documented, Rows, few
 from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section, about
-from photogram.show.quantity import Quantity, Table, members, members_of_each, of_each, records
+from photogram.show.quantity import Quantity, Table, for_people, members, members_of_each, of_each, records
 from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
 from photogram.words import Phrase
@@ -91,8 +90,7 @@ class Snooped(Brief, Documented):
         rows = [row for entry, member in entries for row in _rows(entry, member)]
         return pd.DataFrame(rows, columns=list(_COLUMNS))
 
-    def members(self) -> dict[str, Any]:
-        """Return the member `snooping` of JSON documents: settings, rounds and the log."""
+    def _members(self) -> dict[str, Any]:
         outcome, options = self.outcome, self.options
         return {
             **(
@@ -110,17 +108,12 @@ class Snooped(Brief, Documented):
                 members(each, "number", *_STANDING, limit_p="limit") | members(each, "removed", "returned")
                 for each in outcome.rounds
             ],
-            "log": records(log_table(self.log).columns),
             "exchanged_names": [
                 members(each, "photos", "points", T_as_named="as_named", T_exchanged="exchanged")
                 | {"dimension": each.dimension}
                 for each in self.exchanged
             ],
         }
-
-    def to_json(self) -> bytes:
-        """Return result, verdict and log (`snooping`) as one JSON document (UTF-8)."""
-        return json.to_json({**self.result._members(), "snooping": self.members()})
 
     def document(self) -> Document:
         """Return the network's document without removed observations, with the log."""
@@ -132,12 +125,16 @@ class Snooped(Brief, Documented):
             *(f"{each.name}: {line}" for each in log for line in each.consequences),
         ]
         parts: list[Part] = [Facts("Data snooping", self._facts())]
-        parts += [log_table(log), _tests_table(log)] if log else []
+        parts += [log_table(log), _tests_table(log)]
         parts += [Remarks(remarks)] if remarks else []
         section = Section("removed", "What was taken out", parts, about("removed"))
         removed = Fact.of("Taken out", count, note=f"of {len(self.suspects)} groups of observations")
         highlights = [removed, *network.highlights]
-        return replace(network, highlights=highlights, sections=[section, *network.sections])
+        return replace(
+            network.with_members(lambda: {"snooping": self._members()}),
+            highlights=highlights,
+            sections=[section, *network.sections],
+        )
 
     def _facts(self) -> list[Fact]:
         outcome, options = self.outcome, self.options
@@ -228,7 +225,7 @@ def log_table(log: Sequence[Removal]) -> Table:
         Quantity([rivals_of(each.rivals[:3], 2) for each in log], kind="name", head="Or instead"),
         Quantity(states, kind="name", head="Now"),
     ]
-    return Table("log", "In order", columns)
+    return Table("snooping.log", "In order", columns)
 
 
 def _tests_table(log: Sequence[Removal]) -> Table:
@@ -243,7 +240,7 @@ def _tests_table(log: Sequence[Removal]) -> Table:
         of_each(log, "prediction", head="T against the rest", decimals=2),
         of_each(log, "prediction_log10_p", head="log10 p", decimals=1),
     ]
-    return Table("removed-tests", "Tests", columns)
+    return Table("removed-tests", "Tests", for_people(columns))
 
 
 _STANDING = ("status", "weighted_sum_of_squares", "degrees_of_freedom")

@@ -279,14 +279,14 @@ def trajectories_table(result: Result) -> Table:
     axes = (Axis.of("position", result.block.linear_unit), Axis.turned("rotation"))
     of = np.array(parts, dtype=np.int64)
     columns = [
-        Quantity(names, kind="name", member="trajectory", head="Trajectory"),
-        Quantity([axes[k].name for k in parts], axes, "name", member="what", head="Of", of=of),
+        Quantity(names, kind="name", head="Trajectory"),
+        Quantity([axes[k].name for k in parts], axes, "name", head="Of", of=of),
         Quantity(bases, kind="name", head="Basis"),
         Quantity(count, head="Coefficients", decimals=0),
-        Quantity(first, member="first", head="From s", decimals=3),
-        Quantity(last, member="last", head="To s", decimals=3),
-        Quantity(largest, axes, "deviation", member="largest", head="Largest correction", figures=4, of=of),
-        Quantity(at, member="at", head="At s", decimals=3),
+        Quantity(first, head="From s", decimals=3),
+        Quantity(last, head="To s", decimals=3),
+        Quantity(largest, axes, "deviation", head="Largest correction", figures=4, of=of),
+        Quantity(at, head="At s", decimals=3),
         Quantity(tests, head="Largest |w|", decimals=2),
     ]
     return Table("trajectories", "Trajectories", columns, note)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import textwrap
-from collections.abc import Collection, Iterable, Sequence
-from typing import Any
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 from photogram import _photocore
 from photogram.io import json
@@ -37,13 +38,13 @@ PLAIN = str.maketrans("µ–−ᵀ¹", "u--'1") | str.maketrans(
 
 def record(document: Document) -> dict[str, object]:
     """Return the members of a JSON document, with its tables by their keys."""
-    members: dict[str, Any] = {**document.members}
+    members = document.all_members()
     for table in document.tables():
         if table.key and any(column.member for column in table.columns):
             *path, name = table.key.split(".")
             place = members
             for member in path:
-                place[member] = {**place[member]}
+                place[member] = {**place.get(member, {})}
                 place = place[member]
             place[name] = table.record()
     return members
@@ -51,7 +52,20 @@ def record(document: Document) -> dict[str, object]:
 
 def to_json(document: Document) -> bytes:
     """Return a document as JSON (UTF-8); values that are not numbers are null."""
-    return json.to_json({"program": f"photogram {_photocore.__version__}", **record(document)})
+    with _without_collection():
+        return json.to_json({"program": f"photogram {_photocore.__version__}", **record(document)})
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Stop the search for cycles, which needs more time than the creation of millions of rows."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def text(document: Document) -> str:

@@ -125,6 +125,7 @@ class Remarks:
 
 
 Part = Table | quantity.Table | Facts | Drawing | Layers | Text | Remarks
+Members = Mapping[str, object] | Callable[[], Mapping[str, object]]
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,8 @@ class Document:
     advice: Sequence[Phrase | str] = ()  # Next steps
     highlights: Sequence[Fact] = ()  # Key figures
     sections: Sequence[Section] = ()
-    members: Mapping[str, object] = field(default_factory=dict)  # Members of JSON in addition to tables
+    # Members of JSON in addition to tables; a function creates large ones if they are needed
+    members: Members = field(default_factory=dict)
     details: Sequence[Section] = ()  # Sections that pages omit
     phases: Mapping[str, float] = field(default_factory=dict)  # Seconds in phases of the engine
     head: Sequence[Fact] = ()  # Client, author
@@ -174,6 +176,12 @@ class Document:
 
     def with_sections(self, *more: Section) -> Document:
         return replace(self, sections=[*self.sections, *more])
+
+    def with_members(self, more: Callable[[], Mapping[str, object]]) -> Document:
+        return replace(self, members=lambda: {**self.all_members(), **more()})
+
+    def all_members(self) -> dict[str, Any]:
+        return {**(self.members() if callable(self.members) else self.members)}
 
     def tables(self, *, layers: bool = False) -> list[quantity.Table]:
         """Return the tables of all sections and details, with those in layers on request."""

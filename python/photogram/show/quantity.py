@@ -181,6 +181,11 @@ def named(table: Quantities, name: str) -> Quantity:
     return next(column for column in table if column.name == name)
 
 
+def for_people(table: Quantities) -> list[Quantity]:
+    """Return a table that JSON documents omit."""
+    return [replace(each, member="") for each in table]
+
+
 def chosen(table: Quantities, rows: Indices) -> list[Quantity]:
     """Return the table of some of its items."""
     return [each.at(rows) for each in table]

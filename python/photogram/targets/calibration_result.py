@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
-from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
@@ -69,15 +68,6 @@ class Calibrated(Brief, Judged, Documented):
         from photogram.targets.page import calibration_page
 
         return calibration_page(self)
-
-    def _members(self) -> dict[str, Any]:
-        from photogram.targets.page import calibration_members
-
-        return calibration_members(self)
-
-    def to_json(self) -> bytes:
-        """Return the whole calibration as a JSON document (UTF-8)."""
-        return json.to_json(self._members())
 
     @property
     def verdict(self) -> Verdict:

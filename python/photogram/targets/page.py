@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.results.document import block_members
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section, Tone
 from photogram.show.quantity import Quantity, Table, members, records
 from photogram.targets.calibration_difference import CameraDifference
@@ -50,7 +49,7 @@ def calibration_page(calibrated: Calibrated) -> Document:
     board: list[Part] = [Facts("The board", board_facts(calibrated))]
     if worst := worst_points(calibrated):
         board.append(Remarks(worst))
-    table = views(calibrated)
+    table = [*views(calibrated), Quantity(calibrated.poses, member="pose")]
     intro = (
         "Pictures of one view show the board in one pose. chi² is the weighted sum of squares of its corners."
     )
@@ -59,14 +58,21 @@ def calibration_page(calibrated: Calibrated) -> Document:
     sections = [
         worth_section(worth),
         Section("board", "Board", board),
-        Section("views", "Views", [Table("", "Views", table)], intro),
+        Section("views", "Views", [Table("views", "Views", table)], intro),
         Section("corners", "Residuals of corners", _residuals(calibrated)),
         Section("splines", "Splined lenses", [Remarks(told)] if (told := spline_lines(calibrated)) else []),
-        Section("priors", "Priors of cameras", [Table("", "What they have moved", moved)] if moved else []),
+        Section(
+            "priors",
+            "Priors of cameras",
+            [Table("moved_by_priors", "What they have moved", moved)] if moved else [],
+        ),
     ]
     highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]
     return replace(
-        page, what="Calibration with targets", highlights=highlights, sections=[*sections, *page.sections]
+        page.with_members(partial(_members, calibrated)),
+        what="Calibration with targets",
+        highlights=highlights,
+        sections=[*sections, *page.sections],
     )
 
 
@@ -168,20 +174,14 @@ def _title(found: UncertaintyMap) -> str:
     return f"{found.camera} {distance_text(found.distance, found.unit)}"
 
 
-def calibration_members(calibrated: Calibrated) -> dict[str, Any]:
-    """Return the JSON members of the calibration."""
+def _members(calibrated: Calibrated) -> dict[str, Any]:
     sensors = [
         {"camera": calibrated.cameras[row].name, "pose": calibrated.sensors[row].tolist()}
         for row in calibrated.sensors_adjusted()
     ]
-    moved = prior_shift(calibrated)
     return {
-        **block_members(calibrated.result),
         "board": _board(calibrated),
-        "views": records([*views(calibrated), Quantity(calibrated.poses, member="pose")]),
         **({"sensors": sensors} if sensors else {}),
-        **({} if calibrated.snooped is None else {"snooping": calibrated.snooped.members()}),
-        **({"moved_by_priors": records(moved)} if moved else {}),
         **({"splines": [asdict(each) for each in told]} if (told := splines(calibrated)) else {}),
         **({} if calibrated.worth is None else worth_members(calibrated.worth)),
     }
