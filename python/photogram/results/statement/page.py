@@ -233,7 +233,8 @@ def _metrology(statement: Statement) -> list[Part]:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
         parts += [declared.test_lengths(texts, lengths), drawing]
-    return [*parts, declared.quality_measures(statement)]
+    measures = [declared.quality_measures(statement)] if statement.standards.iso_19157 else []
+    return [*parts, *measures]
 
 
 def _features(texts: Texts, features: Features) -> Table:
@@ -279,6 +280,7 @@ def statement_document(statement: Statement) -> Document:
             Section("signature", "", [Text(texts("page.signature"))]),
             *annexes(statement),
         ],
+        members=partial(declared.statement_members, statement),
         head=head,
         first=texts("page.first"),
         words=texts,

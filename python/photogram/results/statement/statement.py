@@ -13,7 +13,6 @@ import numpy as np
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.objects import require_kind
 from photogram.errors import AdjustmentError, InputError
-from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.result import Result
 from photogram.results.statement import comparison, tables
@@ -24,7 +23,7 @@ from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
 from photogram.results.statement.request import Asked
 from photogram.results.statement.texts import Texts
-from photogram.show.methods import Brief, Rows
+from photogram.show.methods import Brief, Documented, Rows
 from photogram.show.page import Document
 from photogram.show.quantity import records
 from photogram.show.run import InputFile
@@ -32,7 +31,7 @@ from photogram.words import Phrase, phrase
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Statement(Brief):
+class Statement(Brief, Documented):
     """An accuracy statement for a client: figures, standards, methods, assumptions.
 
     Lengths are in the linear unit of the block, along east, north and up.
@@ -187,7 +186,7 @@ class Statement(Brief):
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return all data as a JSON document (UTF-8); optionally write it to a path."""
-        return _written(json.to_json(tables.statement_members(self)), path)
+        return _written(super().to_json(), path)
 
 
 def _written(content: bytes, path: str | PathLike[str] | None) -> bytes:

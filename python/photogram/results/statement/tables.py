@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
 from photogram.results.group_sums import sums_by_kind
@@ -154,7 +153,7 @@ def test_lengths(texts: Texts, test: LengthTest) -> Table:
         columns.number("normalised", test.normalised, 2, member="normalised"),
         number("limit", limits, member="limit"),
     ]
-    return Table("lengths", texts("table.lengths"), quantities)
+    return Table("lengths.lengths", texts("table.lengths"), quantities)
 
 
 def quality_measures(statement: Statement) -> Table:
@@ -176,7 +175,7 @@ def quality_measures(statement: Statement) -> Table:
         column("date", days, kind="name"),
         column("scope", [*scopes], kind="name"),
     ]
-    return Table("iso", texts("table.iso"), quantities)
+    return Table("iso_19157", texts("table.iso"), quantities)
 
 
 def files_of_statement(statement: Statement) -> dict[str, bytes]:
@@ -226,7 +225,6 @@ def statement_members(found: Statement) -> dict[str, Any]:
     asked, result, standards = found.asked, found.result, found.standards
     unit = result.block.linear_unit
     return {
-        "program": f"photogram {_photocore.__version__}",
         "title": asked.title or result.block.title,
         **{name: own or None for name, own in members(asked, *_HEAD).items()},
         "language": found.texts.language,
@@ -236,17 +234,15 @@ def statement_members(found: Statement) -> dict[str, Any]:
         "sentences": found.sentences,
         "figures": found.figures,
         "vegetated": figures_member(found.of_vegetated),
-        "check_points": found.check_points,
         "without": {"points": dict(asked.without), "figures": figures_member(found.of_rest)}
         if asked.without
         else None,
         "not_usable": [{"point": name, "reason": reason} for name, reason in found.compared.not_usable],
-        "leave_one_out": found.leave_one_out,
         "budgets": {each.quantity: budget_member(each) for each in found.taken_apart},
         "asprs": None if standards.asprs is None else standards.asprs.member(asked, lengths_in(unit)),
         "nssda": standards.nssda_member if "nssda" in asked.standards else None,
-        "lengths": standards.lengths and _lengths(found.texts, standards.lengths),
-        "iso_19157": quality_measures(found).record() or None,
+        "lengths": standards.lengths and _lengths(standards.lengths),
+        "iso_19157": None,
         "layout": found.layout and vars(found.layout),
         "camera": [
             members(each, "name", parameters="names", value="values") | members(each, "sd", "correlations")
@@ -255,7 +251,6 @@ def statement_members(found: Statement) -> dict[str, Any]:
         "adjustment": _adjustment(result),
         "assumptions": found.assumptions,
         "remarks": found.judged.remarks,
-        "removed": removed_observations(found).record(),
         "files": [{"name": each.path.name, "sha256": each.sha256} for each in found.inputs],
         "command": found.command or None,
     }
@@ -357,10 +352,9 @@ def budget_member(found: Budget) -> dict[str, Any]:
     }
 
 
-def _lengths(texts: Texts, test: LengthTest) -> dict[str, Any]:
+def _lengths(test: LengthTest) -> dict[str, Any]:
     together = test.together
     return {
-        "lengths": test_lengths(texts, test).record(),
         **members(test, "largest", rmse="rms", met="met", lines="lines"),
         "arrangement": test.enough and test.long_enough and test.along_diagonal,
         "angle_to_diagonal": test.off_diagonal,
