@@ -73,8 +73,8 @@ def test_a_remark_has_a_code():
     assert Message("a text of a file").code == ""
 
 
-FROM_DATA = ("kind.", "measured.", "reason.", "unit.")
-"""Families whose codes are composed of names that the core returns."""
+FROM_DATA = ("kind.", "measured.", "member.", "reason.", "unit.")
+"""Families whose codes are composed of names that the core returns, or of members of JSON documents."""
 
 
 def strings_of(path):

@@ -21,8 +21,8 @@ from photogram.absolute_orientation.tables import (
 from photogram.arguments.types import Floats
 from photogram.io import json
 from photogram.show.forms import record
-from photogram.show.judgement import judged, remarks_section, tests_section
-from photogram.show.page import Document, Drawing, Fact, Facts, Section, significant
+from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.show.page import Document, Drawing, Fact, Facts, Section, conventions, significant
 from photogram.show.quantity import members
 from photogram.statistics.findings import Findings, Tested
 from photogram.words import Phrase
@@ -35,16 +35,6 @@ STARTS = {
     "report": "the first two stations",
     "closed-form": "the closed form",
 }
-CONVENTIONS = {
-    "model": "x = s A X + B, A = K(kappa) Phi(phi) Omega(omega); x model, X control",
-    "covariance": "omega, phi, kappa, scale, b1, b2, b3; cofactors times covariance_scale",
-    "residual": "u = s X - A^T (x - B): control axes, model units; null where unknown",
-    "residual_ground": "u / s: given minus transformed, ground units",
-    "residual_model": "v = s A X + B - x with the adjusted X: model axes, model units",
-    "standardized": "residual / its standard deviation: a priori if any were given, else by sigma0",
-    "studentized": "residual / its standard deviation by sigma0 of all others: Student",
-    "deviation_factor": "what standard deviations of points to be transformed are multiplied by",
-}
 
 
 def orientation_document(result: Orientation) -> Document:
@@ -53,11 +43,10 @@ def orientation_document(result: Orientation) -> Document:
     caption = "The control in plan with its residuals, given minus transformed, enlarged as the scale says."
     drawing = Drawing("picture-residuals", "Residuals of the control in plan", caption, result.plot)
     of_parameters, unit = parameters(result), f"{stations.model_unit} / {stations.ground_unit}"
-    return Document(
-        what="Absolute orientation of a model",
-        title="",
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
+    return verdict_document(
+        result.verdict,
+        "Absolute orientation of a model",
+        "",
         highlights=[
             *quality[:2],
             Fact.of("Scale", result.similarity.scale, unit, figures=6),
@@ -110,10 +99,11 @@ def _facts(result: Orientation) -> tuple[list[Fact], list[Fact]]:
 
 def _members(result: Orientation) -> dict[str, object]:
     test, similarity = result.test, result.similarity
+    units = {"ground": result.stations.ground_unit, "model": result.stations.model_unit}
     return {
         "program": f"photogram {_photocore.__version__} absolute-orientation",
-        "units": _units(result),
-        "conventions": CONVENTIONS,
+        "units": conventions("orientation-units", **units, sigma0="1" if result.weighted else units["model"]),
+        "conventions": conventions("orientation"),
         **members(
             result,
             *("method", "status", "usable", "scale_held", "covariance_scale", "rms", "sigma0", "condition"),
@@ -132,31 +122,12 @@ def _members(result: Orientation) -> dict[str, object]:
             *("limits", "probability", "rejected_high", "rejected_low"),
             variance_of_unit_weight="variance",
         ),
-        "verdict": result.verdict.document(),
         "test": {
             "of": "standardized" if result.decided_by_w else "studentized",
             "limit": result.limit if math.isfinite(result.limit) else None,
             "outliers": [[result.stations.ids[row], "XYZ"[axis]] for row, axis in result.outliers],
         },
         "centres": members(similarity, control="control_centre", model="model_centre"),
-    }
-
-
-def _units(result: Orientation) -> dict[str, str]:
-    ground, model = result.stations.ground_unit, result.stations.model_unit
-    return {
-        "scale": f"{model} / {ground}",
-        "angles_rad": "rad",
-        "translation": model,
-        "covariance": "products of rad, scale and translation",
-        "rms": model,
-        "sigma0": "1" if result.weighted else model,
-        "residual": model,
-        "residual_ground": ground,
-        "residual_model": model,
-        "adjusted": ground,
-        "position": ground,
-        "position_covariance": f"{ground}^2",
     }
 
 

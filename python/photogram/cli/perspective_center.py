@@ -11,7 +11,6 @@ from photogram.cli.options import Input
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
-    from photogram.show.sketch.plot import Plot
 
 
 @with_job("perspective-center", example=("perspective_center", "grid.deck"), ending="-resected")
@@ -32,6 +31,7 @@ def perspective_center(
     """
     from photogram.perspective_center import run_deck
     from photogram.perspective_center.listing import listing
+    from photogram.perspective_center.plot import run_sketch
     from photogram.statistics.verdict import worst
 
     documents.declare(job, "listing.txt", pictures=["residuals"])
@@ -47,19 +47,13 @@ def perspective_center(
     job.finish(
         documents.as_json(run),
         documents.inside({"listing.txt": listing(run).encode()} if results or not stopped else {}),
-        documents.pictures(lambda: _plots(run)),
+        documents.pictures(lambda: {"residuals": run_sketch(run.results)}),
         documents.page(job, run.document) if results else {},
         summary=lambda: _summarize(run),
         code=0 if stopped else worst((each.verdict for each in results), strict=strict),
     )
     if run.stop is not None:
         raise run.stop.error
-
-
-def _plots(run: Run) -> dict[str, Plot]:
-    from photogram.perspective_center.plot import run_sketch
-
-    return {"residuals": run_sketch(run.results)} if run.results else {}
 
 
 def _summarize(run: Run) -> None:

@@ -12,7 +12,7 @@ from photogram.results.network_document import drawings, network_document, netwo
 from photogram.results.network_sections import control_section, stations_section
 from photogram.results.network_tables import image_axes
 from photogram.results.parts import Terms
-from photogram.show.page import Document, Fact, Section
+from photogram.show.page import Document, Fact, Section, conventions
 from photogram.show.quantity import Axis, Quantity
 
 if TYPE_CHECKING:
@@ -71,12 +71,7 @@ def _members(result: AdjustedCollection) -> dict[str, Any]:
         },
         "conventions": {
             "camera": f"P = R(w) X + t, {result.collection.formula}",
-            "residual": "observed minus computed",
-            "difference": "adjusted minus given; standardized has its sign",
-            "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
-            "covariance": "cofactors times covariance_scale",
-            "cost": "half the sum that is minimised",
-            "control, stations": "residual: given minus adjusted; sd 0: fixed, null: free",
+            **conventions("collection"),
         },
         "initial_cost": 0.5 * result.initial_weighted_sum_of_squares,
         "cost": result.cost,

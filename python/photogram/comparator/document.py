@@ -20,8 +20,18 @@ from photogram.comparator.tables import (
     variance,
 )
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import judged, remarks_section, tests_section
-from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Section, significant
+from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.show.page import (
+    Document,
+    Drawing,
+    Fact,
+    Facts,
+    Layers,
+    Part,
+    Section,
+    conventions,
+    significant,
+)
 from photogram.show.quantity import members
 from photogram.statistics.findings import Findings, Systematic, Tested
 from photogram.words import Phrase, phrase
@@ -31,26 +41,6 @@ if TYPE_CHECKING:
 
 
 UM = "µm"
-CONVENTIONS = {
-    "residuals_comparator_um": "grid transformed into the comparator system less measured: to be added to"
-    " the measurement",
-    "residuals_grid_um": "measured transformed into the grid system less given: to be added to the grid;"
-    " X and Y of the plate are exchanged where left_handed is true",
-    "grid_corrections_um": "averages of residuals_grid_um after all corrections, X and Y exchanged where"
-    " left_handed is true; corrections_plate_um are the same in the axes of the plate",
-    "rotation_rad": "grid = [[cos, sin], [-sin, cos]] corrected + translation_um",
-    "linear": "x' = scale_x x + scale_y sin(nonorthogonality) y, y' = scale_y cos(nonorthogonality) y",
-    "polynomial": "coefficients of x^4, y^4, x^3, y^3, x^2, y^2, x, y, 1; linearly corrected arguments and"
-    " correction in metres",
-    "sigma0_um": "of each case alone; sigma0_combined_um: after the combined adjustments",
-    "variance_components_um": "standard deviations",
-    "correlation_percent": "as the listing: 100 where one coordinate does not vary (correlation: null)",
-    "correction": "linear parameters and polynomials; covariance of scale_x, scale_y, nonorthogonality_rad,"
-    " nine coefficients of x, nine of y (micrometres, arguments (x - centre) / half range); null where"
-    " the verdict forbids its use",
-    "screening": "measured points that do not agree with the adjustment of the others; off_um: measured less"
-    " expected; change_um: what they change corrected coordinates by",
-}
 POLYNOMIALS = (
     "What is added to linearly corrected coordinates: polynomials of fourth degree in metres. Each term"
     " is tested with"
@@ -67,11 +57,10 @@ def calibration_document(calibration: Calibration) -> Document:
     polynomials = [terms(tests), coefficients(nonlinear)] if nonlinear and tests else []
     disagreeing = [outliers(screening), far_pointings(calibration.far_pointings)]
     date = f", {session.date}" if session.date else ""
-    return Document(
-        what=f"Calibration of comparator {session.comparator}",
-        title=f"{len(calibration.cases)} cases{date}",
-        judgements=[judged(verdict)],
-        advice=verdict.next,
+    return verdict_document(
+        verdict,
+        f"Calibration of comparator {session.comparator}",
+        f"{len(calibration.cases)} cases{date}",
         highlights=_highlights(calibration),
         sections=[
             Section("variance", "Where the errors come from", [by_variance], by_variance.about),
@@ -165,9 +154,8 @@ def _members(calibration: Calibration) -> dict[str, Any]:
             joint_check_sd="joint_check",
         ),
         "left_handed": calibration.cases[0].placed.orientation.left_handed,
-        "conventions": CONVENTIONS,
+        "conventions": conventions("comparator"),
         "messages": [*map(str, calibration.messages)],
-        "verdict": calibration.verdict.document(),
         "screening": members(calibration.screening, "limit", "change_um", "sigma_um", "ratios", "freedom"),
         "linear": {
             **members(own.correction, *LINEAR),

@@ -21,7 +21,7 @@ from photogram.film.certificate_tables import (
     terms,
 )
 from photogram.network.cameras import Camera
-from photogram.show.judgement import judged, tests_section
+from photogram.show.judgement import tests_section, verdict_document
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section
 from photogram.show.quantity import members
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, band, error_bars, spread
@@ -46,11 +46,10 @@ def certificate_document(certificate: Certificate) -> Document:
     distances = compared(differences)
     mark_parts, of_marks = _marks(certificate)
     lens_parts, of_lens = _lens(certificate)
-    return Document(
-        what="Certificate of a camera",
-        title=certificate.name,
-        judgements=[judged(verdict)],
-        advice=verdict.next,
+    return verdict_document(
+        verdict,
+        "Certificate of a camera",
+        certificate.name,
         highlights=facts[1:4],
         sections=[
             Section("distances", distances.title, [distances, explanations(differences)], distances.about),
@@ -65,7 +64,6 @@ def certificate_document(certificate: Certificate) -> Document:
             "camera": certificate.name,
             "type": certificate.camera_type or None,
             "date": certificate.day.isoformat() if certificate.day else None,
-            "verdict": verdict.document(),
             "remarks": [*map(str, certificate.told())],
             "marks": of_marks,
             "lens": of_lens,

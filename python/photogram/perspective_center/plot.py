@@ -8,41 +8,34 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, around, band, horizontal_line
+from photogram.plots.picture_data import VectorField
+from photogram.plots.residuals import vector_panel
+from photogram.show.quantity import Axis
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, band, horizontal_line
 from photogram.show.sketch.plot import Plot
-from photogram.show.style import INK, MARKED, round_length
+from photogram.show.style import INK, MARKED
 
-LONGEST_RESIDUAL = 0.12  # As a part of the extent of the grid
+MODEL = tuple(Axis.of(name, "model units") for name in "XY")
 SAME_RADIUS = 0.02  # Points are averaged if their radii differ by less than this part of the largest
 
 
-def run_sketch(results: Sequence[PerspectiveCenter]) -> Plot:
-    """Return the plot of a run; all sets have the same scales."""
+def run_sketch(results: Sequence[PerspectiveCenter]) -> Plot | None:
+    """Return the plot of a run; all sets have the same scales. None without sets."""
+    if not results:
+        return None
     longest = max(float(np.hypot(*each.residual.T).max()) for each in results)
     largest = max(max(np.abs(each.radial_distortion).max(), each.sigma0_plate or 0.0) for each in results)
-    panels = [
-        panel
-        for each in results
-        for panel in (_residual_vectors(each, longest), _distortion_curve(each, 1000.0 * float(largest)))
-    ]
+    panels = []
+    for each in results:
+        title = f"{set_name(each)}: measured − projected"
+        vectors = VectorField(title, each.projected, each.residual, axes=MODEL)
+        panels += [vector_panel(vectors, longest), _distortion_curve(each, 1000.0 * float(largest))]
     return Plot(11.0, 5.0 * len(results), panels, 2)
 
 
 def set_name(result: PerspectiveCenter) -> str:
     """Return the name of a set: its number and its mean height."""
     return f"Set {result.grid.number}, Z = {result.grid.model[:, 2].mean():g}"
-
-
-def _residual_vectors(result: PerspectiveCenter, longest: float) -> Panel:
-    """Return measured minus projected; `longest` residual has the longest vector."""
-    places, known = result.projected, round_length(longest)
-    extent = float(np.ptp(places, axis=0).max()) or 1.0
-    scale = LONGEST_RESIDUAL * extent / longest if longest > 0 else 1.0
-    marks: list[Mark] = [Markers(places, "o", 2.5), Arrows(places, result.residual * scale, MARKED, 0.004)]
-    bar = known * scale, MARKED, f"{known:g} model units (x {scale:,.0f})"
-    title = f"{set_name(result)}: measured − projected"
-    axes = "X, model units", "Y, model units"
-    return Panel(around(places, LONGEST_RESIDUAL), marks, title, *axes, equal=True, bars=[bar])
 
 
 def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.show.quantity import Axis
 from photogram.statistics.findings import Tested
 
 
@@ -101,12 +102,13 @@ class Deviations:
 
 @dataclass(frozen=True, eq=False)
 class VectorField:
-    """Small vectors over the frame of a camera."""
+    """Small vectors over the frame of a camera, or over a plane."""
 
     title: str  # Meaning of the vectors
-    places: Floats  # (n, 2) both, mm
+    places: Floats  # (n, 2) both, in the unit of the axes
     vectors: Floats
     labels: Sequence[str] = ()  # Names of the points, or nothing
+    axes: tuple[Axis, ...] = tuple(Axis(name, "mm", small="µm", factor=1e3) for name in "xy")
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -132,21 +133,23 @@ def films(result: Any) -> Plot:
     InputError
         If there are neither marks nor patterns.
     """
-    panels = first_panels("films", "fields", result._plot_data().films, MAX_FIELDS, _vectors)
+    panels = first_panels("films", "fields", result._plot_data().films, MAX_FIELDS, vector_panel)
     return side_by_side(panels, 2, 4.8)
 
 
-def _vectors(each: VectorField) -> Panel:
+def vector_panel(each: VectorField, longest: float = math.nan) -> Panel:
+    """Draw vectors with a scale bar; `longest` is the longest vector of panels with one scale."""
     extent = max(float(np.ptp(each.places, axis=0).max()), 1e-12)
     marks: list[Mark] = [Markers(each.places, ".", 4.0, FAINT, layer=1.0)]
-    longest = float(np.hypot(*each.vectors.T).max(initial=0.0))
+    longest = float(np.hypot(*each.vectors.T).max(initial=0.0)) if math.isnan(longest) else longest
     bars: list[ScaleBar] = []
+    x, y = each.axes
     if longest > 0:
         scale = LONGEST_OF_FIELD * extent / longest
         marks.append(Arrows(each.places, scale * each.vectors, INK, 0.004))
-        bar = round_length(1e3 * longest)
-        bars = [(1e-3 * scale * bar, INK, f"{bar:g} µm")]
+        bar = round_length(x.factor * longest)
+        bars = [(scale * bar / x.factor, INK, f"{bar:g} {x.small}")]
     if each.labels:
         marks.append(Names(each.places, each.labels, [INK] * len(each.labels)))
-    limits = around(each.places, MARGIN_OF_FIELD)
-    return Panel(limits, marks, each.title, "x, mm", "y, mm", equal=True, bars=bars)
+    limits, titles = around(each.places, MARGIN_OF_FIELD), (f"{axis.name}, {axis.unit}" for axis in (x, y))
+    return Panel(limits, marks, each.title, *titles, equal=True, bars=bars)

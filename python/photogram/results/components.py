@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
-from photogram.show.judgement import judged, remarks_section
+from photogram.show.judgement import remarks_section, verdict_document
 from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import (
     Document,
@@ -125,14 +125,12 @@ class VarianceComponents(Judged, Documented, Brief):
         estimate, equality = self.estimate, self.estimate.equality
         of_equality = ("likelihood_ratio", "degrees_of_freedom", "probability")
         of_step = ("factors", "squares", "redundancy")
-        return Document(
-            what="Variance components",
-            title="",
-            judgements=[judged(self.verdict)],
-            advice=self.verdict.next,
+        return verdict_document(
+            self.verdict,
+            "Variance components",
+            "",
             sections=[components_section(self)],
             members={
-                "verdict": self.verdict.document(),
                 **members(estimate, "converged", "level", helmert_matrix="matrix"),
                 "messages": [str(message) for message in estimate.messages],
                 "all_equal": equality and dict(zip(of_equality, equality, strict=True)),

@@ -23,7 +23,7 @@ from photogram.results.film_report import films_section
 from photogram.results.network_tables import control, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
-from photogram.show.page import Document, Fact, Section, about, significant
+from photogram.show.page import Document, Fact, Section, about, conventions, significant
 from photogram.show.quantity import Quantity, Table, chosen, for_people, members, named, records
 
 if TYPE_CHECKING:
@@ -176,12 +176,7 @@ def _members(result: Result) -> dict[str, Any]:
         "conventions": {
             "object_space": "geographic" if result.block.geographic else "rectangular",
             "rotation": "photo-to-ground" if result.block.photo_to_ground else "ground-to-photo",
-            "attitude": "omega, phi, kappa; M = M_kappa M_phi M_omega",
-            "residual": "observed minus computed",
-            "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
-            "covariance": "cofactors times covariance_scale",
-            "difference": "adjusted minus given",
-            "control, stations": "standardized: sign of the difference; sd 0: fixed, null: free or not held",
+            **conventions("block"),
         },
         "datum": result.datum.document(),
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
@@ -226,25 +221,13 @@ _SUMS = ("camera", "ground", "plates", "observations", "total")
 
 
 def _units(result: Result) -> dict[str, str]:
-    linear, unit = result.block.linear_unit, result.block.image_unit
-    geographic, mixed = result.block.geographic, f"longitude deg, latitude deg, height {linear}"
-    position = mixed if geographic else linear
-    return {
-        "position": position,
-        "water_level": linear,
-        "position_covariance": f"longitude rad, latitude rad, height {linear}; products"
-        if geographic
-        else f"{linear}^2",
-        "attitude": "rad",
-        "attitude_covariance": "rad^2",
-        "covariance": "products of the units of position_covariance and rad",
-        f"residual_{unit}": unit,
-        **dict.fromkeys(("position_difference", "position_sd"), position),
-        **dict.fromkeys(("attitude_difference_rad", "attitude_sd_rad"), "rad"),
-        "difference": position,
-        "operations": "multiply-adds, each time the phase is carried out",
-        "seconds": "s",
-    }
+    linear, image = result.block.linear_unit, result.block.image_unit
+    position, square = linear, f"{linear}^2"
+    if result.block.geographic:
+        position = f"longitude deg, latitude deg, height {linear}"
+        square = f"longitude rad, latitude rad, height {linear}; products"
+    own = conventions("block-units", linear=linear, position=position, square=square)
+    return own | {f"residual_{image}": image}
 
 
 def _beside_images(result: Result) -> list[dict[str, Any]]:

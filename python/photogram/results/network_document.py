@@ -17,7 +17,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.tables import Tests
 from photogram.show import quantity
 from photogram.show.cells import unit_written
-from photogram.show.judgement import judged, remarks_section, verdict_table
+from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, about, significant
 from photogram.show.quantity import Quantities, Quantity, for_people, members, records
 from photogram.statistics.evidence import GLOBAL
@@ -69,11 +69,10 @@ def network_document(
         course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
     summary = result.reliability_summary
     reliability = [] if summary is None else summary.parts(result._terms.linear_unit)
-    return Document(
-        what=what,
-        title=title,
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
+    return verdict_document(
+        result.verdict,
+        what,
+        title,
         highlights=[*_highlights(result, photos), *more],
         sections=[
             remarks_section(problems_of(result)),
@@ -124,7 +123,6 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
         **members(result, "ordering", "predictions", "operations", "seconds"),
         "messages": [str(message) for message in result.messages],
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
-        "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
         "photos": records([*declared.photos(result), *photo_members, of_photos]),
         "stations": records(declared.stations(result)),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.show.page import Judgement, Remarks, Section, Tone
+from photogram.show.page import Document, Judgement, Remarks, Section, Tone
 from photogram.show.quantity import Quantity, Table
 from photogram.words import Words, words_of
 
@@ -27,6 +27,12 @@ def judged(verdict: Verdict, on: str = "") -> Judgement:
     tone: Tone = "bad" if verdict.exit else "look" if verdict.warning else "good" if tested else ""
     mark = "Look first" if tone == "look" and not tested else MARKS[tone]
     return Judgement(mark, verdict.headline, tuple(map(str, verdict.lines)), tone, on)
+
+
+def verdict_document(verdict: Verdict, what: str, title: str, **fields: Any) -> Document:
+    """Return a document with headline and next steps of a verdict, and its JSON member."""
+    document = Document(what, title, [judged(verdict)], verdict.next, **fields)
+    return document.with_members(lambda: {"verdict": verdict.document()})
 
 
 def verdict_table(verdict: Verdict, words: Words | None = None) -> Table:

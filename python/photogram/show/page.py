@@ -210,6 +210,11 @@ def about(code: str, **fields: Any) -> str:
     return words_of("en")(f"about.{code}", **fields)
 
 
+def conventions(group: str, **fields: Any) -> dict[str, str]:
+    """Return units or conventions of the members of a JSON document, by their names."""
+    return words_of("en").below(f"member.{group}.", **fields)
+
+
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:
     """Return one document of several with the same tables as layers.
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import judged, remarks_section, tests_section
-from photogram.show.page import Document, Fact, Facts, Layers, Remarks, Section, significant
+from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.show.page import Document, Fact, Facts, Layers, Remarks, Section, conventions, significant
 from photogram.show.quantity import Table, members
 from photogram.stellar import tables
 from photogram.stellar.camera_tables import correlated_members, matrix_table
@@ -32,14 +32,6 @@ if TYPE_CHECKING:
     from photogram.stellar import Result
 
 MAX_WORST_COORDINATES = 25
-
-CONVENTIONS = {
-    "frame": "north, east, zenith (left-handed); azimuth from south, positive west",
-    "longitude": "positive west",
-    "residual": "computed minus measured; of stars adjusted minus catalogue",
-    "standardized": "residual over its mean error",
-    "covariance": "cofactors times m squared, in the units of the parameters",
-}
 
 
 def plate_document(result: Result) -> Document:
@@ -71,11 +63,10 @@ def plate_document(result: Result) -> Document:
         Section("histogram", "Histogram of residuals", [Layers("histogram-layers", histograms)]),
         *_combined(result),
     ]
-    return Document(
-        what="Calibration of a camera by a plate with stars",
-        title=problem.labels.get("title", ""),
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
+    return verdict_document(
+        result.verdict,
+        "Calibration of a camera by a plate with stars",
+        problem.labels.get("title", ""),
         highlights=_highlights(result),
         sections=sections,
         members=_members(result),
@@ -124,11 +115,11 @@ def _members(result: Result) -> dict[str, Any]:
     classes = residual_classes(result) if options.histogram else {}
     return {
         "labels": result.problem.labels,
-        "conventions": CONVENTIONS | {"iteration": "as published" if options.as_published else "strict"},
+        "conventions": conventions("plate")
+        | {"iteration": "as published" if options.as_published else "strict"},
         **_solution_members(result),
         "stop": result.solved.stop,
         "converged": result.converged,
-        "verdict": result.verdict.document(),
         "messages": [*map(str, result.messages)],
         "correlated": correlated_members(result.correlated()),
         "significance": result.significance(),

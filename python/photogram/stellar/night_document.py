@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import judged, remarks_section, tests_section
-from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section
+from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section, conventions
 from photogram.show.quantity import members
 from photogram.show.sketch.plot import Plot
 from photogram.stellar import night_tables as tables
@@ -22,16 +22,6 @@ if TYPE_CHECKING:
 
 MAX_WORST_IMAGES = 25
 MAX_EXPOSURES = 200
-
-CONVENTIONS = {
-    "frame": "north, east, zenith (left-handed); azimuth from south, positive west",
-    "pixels": "right and down",
-    "residual": "measured minus computed; of stars adjusted minus catalogue",
-    "standardized": "residual over its mean error",
-    "covariance": "cofactors times m squared, in the units of the parameters",
-    "icrs": "quaternion w, x, y, z from ICRS to the camera (x right, y down, z along the axis);"
-    " covariance of the turn about these axes, radians squared",
-}
 
 
 def night_document(result: CalibratedNight) -> Document:
@@ -60,11 +50,10 @@ def night_document(result: CalibratedNight) -> Document:
         tables.stars(result),
         tables.images(result),
     ]
-    return Document(
-        what="Calibration of a camera by exposures of the sky",
-        title=result.night.title,
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
+    return verdict_document(
+        result.verdict,
+        "Calibration of a camera by exposures of the sky",
+        result.night.title,
         highlights=_highlights(result),
         sections=sections,
         members=_members(result),
@@ -85,13 +74,12 @@ def _members(result: CalibratedNight) -> dict[str, Any]:
     found, night, camera, test = result.calibration, result.night, result.camera, result.test
     return {
         "title": night.title,
-        "conventions": CONVENTIONS,
+        "conventions": conventions("night"),
         "m": found.mean_error,
         "m_unit": "standard deviation of an image coordinate",
         "sd_px": night.pixel_sd,
         **members(found, "degrees_of_freedom", "iterations", stop="status"),
         **members(result, "converged", "usable", "doubtful", "falsely_identified"),
-        "verdict": result.verdict.document(),
         "global_test": test and members(test, "limits", "probability", variance_of_unit_weight="variance"),
         "lens": {
             "name": camera.lens,

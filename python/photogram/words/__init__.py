@@ -160,6 +160,11 @@ class Words:
         """Return whether there is a sentence."""
         return code in self._table
 
+    def below(self, group: str, **fields: Any) -> dict[str, str]:
+        """Return the sentences whose codes begin with a group, by the rest of their codes."""
+        codes = [code for code in self._table if code.startswith(group)]
+        return {code.removeprefix(group): self(code, **fields) for code in codes}
+
     def listed(self, names: Sequence[str], most: int = MAX_NAMES) -> str:
         """List all names, or the first `most` of them."""
         shown = ", ".join(names[:most])
