@@ -21,7 +21,7 @@ from photogram import (
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 from photogram.results.components import statement
-from photogram.results.group_sums import Probing, factored
+from photogram.results.group_sums import Probing
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
 
 PUBLISHED = Path(__file__).parent / "data" / "statistics" / "published_problems.json"
@@ -418,7 +418,7 @@ def test_what_errors_leave_is_a_projection():
     """Test that of images alone R is symmetric and idempotent, with the degrees of freedom as its trace."""
     collection = simulate_collection(photos=4, points=25, noise=0.5, seed=2).collection
     result = adjust_collection(collection)
-    core = factored(result)
+    core = result._factor()
     m = len(collection.image_xy)
     r = core.project_images(np.eye(2 * m).reshape(-1, m, 2), threads=1, progress=None).reshape(2 * m, 2 * m)
     assert r == pytest.approx(r.T, abs=1e-8)

@@ -19,7 +19,7 @@ from photogram.results import datum as datums
 from photogram.results.covariance import adjusted
 from photogram.results.features import KINDS as FORMS
 from photogram.results.features import through
-from photogram.results.group_sums import observables
+from photogram.results.grouping import observables
 from photogram.results.parts import named_observation, parts_of
 from photogram.results.statement import budget
 from photogram.results.statement.texts import LANGUAGES, Texts

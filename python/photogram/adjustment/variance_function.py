@@ -15,7 +15,8 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.motion import focal_images
 from photogram.results.components import Bin, VarianceFunction
-from photogram.results.group_sums import Grouping, Probing, factored, group_sums, observables
+from photogram.results.group_sums import Probing, group_sums
+from photogram.results.grouping import Grouping, observables
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.components import GroupsOf
 from photogram.statistics.variance_function import estimate_function
@@ -36,7 +37,7 @@ class _Left:
     def information(self, terms: Floats) -> Floats:
         """Return (t, t) sums of R_ij^2 c_i c_j^T, estimated with random signs."""
         rows, count = terms.shape
-        factor = factored(self._result)
+        factor = self._result._factor()
         options = self._probing.options(rows)
         if rows <= options["exact"]:
             columns = np.eye(rows).reshape(rows, -1, 2)

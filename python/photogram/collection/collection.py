@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
     from photogram.diagnosis import Diagnosis
     from photogram.network.core_arrays import CoreOptions
-    from photogram.results.group_sums import Grouping, Observables
+    from photogram.results.grouping import Grouping, Observables
     from photogram.results.snooping_options import SnoopOptions
 
 __all__ = ["Collection"]
@@ -171,7 +171,7 @@ class Collection(Valued, Brief):
         return replace(self, **changes)
 
     def _observables(self) -> Observables:
-        from photogram.results.group_sums import Observables
+        from photogram.results.grouping import Observables
 
         photos, width = self.photo_parameters.shape
         return Observables(

@@ -30,7 +30,6 @@ from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.trajectories import Readout
 from photogram.results.fixed_tests import Scores, as_adjusted, is_suspected, lens_partials, station_partials
-from photogram.results.group_sums import factored
 from photogram.results.result import Result
 from photogram.statistics.limits import externally_studentized
 from photogram.words import Phrase, phrase
@@ -172,7 +171,7 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> Ph
     if not own.any():
         return None
     residuals = np.where(result.used_images[:, np.newaxis], result.residuals / block.image_sd, 0.0)
-    factor = factored(result)
+    factor = result._factor()
     down = bool(block.cameras) and block.cameras[camera].image_y == "down"
     columns = {axis: _column(block, motion, own, axis, down) for axis in (1, 0)}
     tried = {axis: Scores.of(factor, each[np.newaxis], residuals) for axis, each in columns.items()}

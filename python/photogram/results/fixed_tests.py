@@ -21,7 +21,6 @@ from photogram.network.directions import seen_without_lenses
 from photogram.network.motion import focal_images
 from photogram.network.rays import Rays
 from photogram.network.wider_models import calibration_words
-from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase
@@ -68,7 +67,7 @@ def held_tests(
     if not suspected:
         return []
     partials = partials_of()
-    factor = factored(result)
+    factor = result._factor()
     found: list[tuple[Phrase, float, float]] = []
     for each in suspected:
         columns = np.zeros((len(each.partials), *residuals.shape))
@@ -175,7 +174,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
     columns = lens_partials(result, own)
     used = result.used_images[:, np.newaxis]
     residuals: Floats = np.where(used, result.residuals / block.image_sd, 0.0)
-    factor = factored(result)
+    factor = result._factor()
     for count in (len(columns), 4, 2):
         if (found := score(factor, columns[:count], residuals)) is not None:
             return found

@@ -29,7 +29,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
 from photogram.results.distortion import INTERIOR, compared_places, partials_of, rows_of_images
 from photogram.results.fixed_tests import score
-from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
 from photogram.show.methods import Brief, Documented
@@ -232,7 +231,7 @@ def score_test(
         names = tuple(names) or tuple(f"effect {k + 1}" for k in range(len(columns)))
     used = result.used_images[:, np.newaxis]
     b, v = (np.where(used, each / block.image_sd, 0.0) for each in (columns, result.residuals))
-    statistic = score(factored(result), b, v)
+    statistic = score(result._factor(), b, v)
     if statistic is None:
         raise InputError(phrase("models.inseparable", names=list(names)))
     freedom = result.freedom_of_scale - len(b)

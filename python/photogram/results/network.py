@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import MISSING
 from functools import cached_property
@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, finite_rows, freeze_fields, number, standard_deviations
+from photogram.arguments.arrays import argument_error, finite_rows, freeze_fields, number
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, fields, replace
 from photogram.messages import Message
-from photogram.network.core_arrays import CoreNetwork, CoreOptions
+from photogram.network.core_arrays import CoreOptions
 from photogram.network.unadjusted import Given
-from photogram.results.covariance import Adjusted, Covariances, Failure, Propagated, Selection
-from photogram.results.parts import Iteration
+from photogram.results.covariance import Covarying
+from photogram.results.parts import Iteration, Observed
 from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
@@ -48,28 +48,11 @@ JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
 REMARKS = 5  # Number of messages of a `repr`
 
 
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """Observations of one type, each with k components."""
-
-    rows: Indices  # (r,) their points or photos
-    residuals: Floats  # (r, k) observed minus adjusted; 0 if fixed, NaN if not observed
-    sd: Floats  # (r, k) standard deviations: 0 if fixed, infinite if not observed
-    # (r, k) redundancy numbers, and residual / (sd x root of redundancy number)
-    redundancy: Floats
-    standardized: Floats
-
-    @property
-    def differences(self) -> Floats:
-        """(r, k) adjusted minus given: residuals with the sign of check points."""
-        return 0.0 - self.residuals
-
-
 MAX_BIAS_RATIO = 6.0  # Permitted effect of undetected errors on points, in standard deviations
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
+class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
     """An adjusted network of P photos with k unknowns, n points and m image points.
 
     All arrays are in the order of the input. Values that were excluded from the adjustment are NaN. Residuals
@@ -213,9 +196,6 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def global_test(self) -> GlobalTest | None:
         """The test of all residuals together; None without degrees of freedom."""
         return global_test(*self.sum_and_freedom)
-
-    @abstractmethod
-    def _core_network(self) -> CoreNetwork: ...
 
     @property
     @abstractmethod
@@ -422,79 +402,6 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def converged(self) -> bool:
         """Whether the criterion of convergence was met."""
         return self.status == "converged"
-
-    @property
-    def covariance_scale(self) -> float:
-        """The scale of covariances: the variance of unit weight, or 1 without one."""
-        return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
-
-    @property
-    def photo_covariances(self) -> Floats:
-        """(P, k, k) covariances of photo unknowns, scaled by the unit weight variance.
-
-        Blocks have k = 6: X, Y, Z in the linear unit (longitude and latitude in radians, height), then omega,
-        phi, kappa in radians. These angles are the numbers of `photo_attitudes` with the definition by
-        `block.photo_to_ground`; `Result.photo_rotation_covariances` uses rotation vectors. Collections have
-        the parameters `collection.parameters`, in their order.
-        """
-        return self.photo_cofactors * self.covariance_scale
-
-    @property
-    def point_covariances(self) -> Floats:
-        """(n, 3, 3) covariances, scaled by the variance of unit weight."""
-        return self.point_cofactors * self.covariance_scale
-
-    @property
-    def photo_sd(self) -> Floats:
-        """(P, k) standard deviations of the unknowns of photos."""
-        return standard_deviations(self.photo_cofactors, self.covariance_scale)
-
-    @property
-    def point_sd(self) -> Floats:
-        """(n, 3) standard deviations."""
-        return standard_deviations(self.point_cofactors, self.covariance_scale)
-
-    @abstractmethod
-    def _adjusted(self) -> Adjusted: ...
-
-    @abstractmethod
-    def _refused(self, error: Failure) -> Exception: ...
-
-    def covariances(self) -> Covariances:
-        """Return an object that computes covariances between any unknowns from one factor.
-
-        The normal equations are formed and factored once, at the adjusted values. The object contains the
-        factor, and deleting the object releases its memory.
-
-        Raises
-        ------
-        AdjustmentError
-            If unknowns are not determined.
-        OutOfMemoryError
-            If the memory is not sufficient for the factor.
-        KeyboardInterrupt
-            If the user presses Ctrl-C.
-        """
-        network = self._core_network()
-        return Covariances(
-            self._adjusted(),
-            lambda: network.covariances(self.state, threads=0, progress=None),
-            self._refused,
-            self.covariance_scale,
-        )
-
-    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
-        """Return the covariance matrix of a selection, or between two selections.
-
-        For several selections use one object of :meth:`covariances`, which describes selections and errors.
-        """
-        return self.covariances().covariance(a, b)
-
-    def propagate(
-        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
-    ) -> Propagated:
-        """Return a function of unknowns with covariance; see `Covariances.propagate`."""
-        return self.covariances().propagate(function, unknowns, bias=bias)
 
     @property
     def plot(self) -> Plots:

@@ -67,6 +67,23 @@ class SumsByKind:
 
 
 @dataclass(frozen=True, eq=False)
+class Observed:
+    """Observations of one type, each with k components."""
+
+    rows: Indices  # (r,) their points or photos
+    residuals: Floats  # (r, k) observed minus adjusted; 0 if fixed, NaN if not observed
+    sd: Floats  # (r, k) standard deviations: 0 if fixed, infinite if not observed
+    # (r, k) redundancy numbers, and residual / (sd x root of redundancy number)
+    redundancy: Floats
+    standardized: Floats
+
+    @property
+    def differences(self) -> Floats:
+        """(r, k) adjusted minus given: residuals with the sign of check points."""
+        return 0.0 - self.residuals
+
+
+@dataclass(frozen=True, eq=False)
 class ObservedKind:
     """The k additional observations of one type, with r components each.
 

@@ -28,7 +28,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
 from photogram.results.fixed_tests import fall_by_lens
-from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.statistics import patterns as fits
@@ -271,7 +270,7 @@ def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[D
         return np.array([value(clipped) for *_, value in tests])
 
     found, drawn = values(result.residuals / block.image_sd), list[Floats]()
-    random, core = np.random.default_rng(seed), factored(result)
+    random, core = np.random.default_rng(seed), result._factor()
     while count := min(TOGETHER, draws - len(drawn)):
         errors = np.where(used[:, np.newaxis], random.normal(size=(count, *block.image_xy.shape)), 0.0)
         drawn += [values(each) for each in core.project_images(errors, threads=0, progress=None)]

@@ -18,7 +18,7 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.results.components import VarianceComponents
-from photogram.results.group_sums import GroupsArgument
+from photogram.results.grouping import GroupsArgument
 from photogram.show.quantity import Axis, Quantity, chosen
 from photogram.targets.choices import CornerBasis
 from photogram.targets.regularisation import weighted_block
