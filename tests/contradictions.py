@@ -41,7 +41,7 @@ CLAIMS = {
     "not tested as a whole": r"not tested as a whole|there is no global test",
     "checked": r"^accepted|no single test rejects|are judged by|degrees of freedom [1-9]\d",
     "not checked": r"nothing is checked|nothing checks these|no degrees of freedom|degrees of freedom 0$",
-    "check points were tested": r"check points disagree|at the check points|test check|of check points ",
+    "check points were tested": r"check points disagree|at the check points|test check|^check points +[\d.]",
     "no check points": r"there are no check points",
     "has a datum": r"held components of control .*[1-9]|datum observations",
     "has no datum": r"nothing gives the network a datum|there is no control",

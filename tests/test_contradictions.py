@@ -417,7 +417,7 @@ PLANTED = {
     "Not tested as a whole (a robust loss changes the weights)": (
         "Accepted: the residuals agree with the given standard deviations"
     ),
-    "There are no check points. Leave some control out": "rms of check points   X 0.1 m",
+    "There are no check points. Leave some control out": "check points   0.1  0.2  0.3",
     "There is no control, and no other observation": "held components of control X 3, Y 3, Z 3",
     "Nothing needs to be done.": "Look at the observations that are named.",
     "Weights too optimistic": "Weights too pessimistic",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import pickle
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 from photogram import Attitudes, Block, Result, Spheroid, adjust, simulate
-from photogram.network import project
+from photogram.network import lengths_of_units, project
 from photogram.show.cells import written
 from photogram.show.forms import titled_lines
 from photogram.words import Phrase
@@ -285,10 +284,13 @@ def test_section_7_the_report_counts_and_weighs(result):
 
 
 def test_every_quantity_of_the_report_has_a_unit(result):
-    figures = [value for name, value in facts(result, "size").items() if name.startswith("rms of")]
-    assert figures
-    assert all(re.search(r"(µm|mm|m|°|″)\b|″", value) for value in figures)
-    for key, count in {"check_points": 5, "control": 5, "photos-positions": 6, "photos-attitudes": 6}.items():
+    for key, count in {
+        "check_points": 5,
+        "control": 5,
+        "photos-positions": 6,
+        "photos-attitudes": 6,
+        "differences": 3,
+    }.items():
         columns = written(result.document().table(key)).columns
         units = [column for column in columns if column.unit or "Component" in column.head]
         assert len(units) >= (count if not result.block.geographic else 1), key
@@ -460,5 +462,7 @@ def test_reports_of_geographic_blocks_have_lengths_beside_seconds_of_arc():
     sd = result.photo_sd[0]
     assert east == pytest.approx(sd[0] * 6.37e6 * np.cos(0.52), rel=0.01)
     assert north == pytest.approx(sd[1] * 6.37e6, rel=0.01)
-    rms = facts(result, "size")["rms of control points"]
-    assert re.search(r"longitude \S+ ″ \(\S+ m\), latitude", rms)
+    names, angles, lengths = result.document().table("differences").columns
+    assert names.values[0] == "control points"
+    scale = lengths_of_units(result.photo_positions.mean(axis=0, keepdims=True), block.spheroid)[0]
+    np.testing.assert_allclose(lengths.values, angles.values[:, :2] * scale[:2])

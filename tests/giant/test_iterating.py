@@ -60,10 +60,11 @@ def test_section_6_limit_of_iterations(directory, tmp_path, limit):
     run(short, "--as-published", "--out", tmp_path / "out", code=3)
     report = (tmp_path / "out" / "report.txt").read_text()
     _, _, iterations = report.partition("Iterations\n----------\n")
-    heading, *rows = iterations.split("\n")[: limit + 2]
+    heading, *rows = iterations.split("\n")[: limit + 1]
     assert heading.split()[:5] == ["Iteration", "Weighted", "sum", "of", "squares"]
-    assert [int(row.split()[0]) for row in rows] == list(range(limit + 1))
-    values = [float(row.split()[1]) for row in rows]
+    assert [int(row.split()[0]) for row in rows] == list(range(1, limit + 1))
+    first = re.search(r"weighted sum of squares at first +(\S+)", iterations)[1]
+    values = [float(first), *(float(row.split()[1]) for row in rows)]
     result = adjust(
         read_project(short).to_block(), unit_variance="free", tolerance=AsPublished(5), max_iterations=limit
     )
@@ -278,9 +279,9 @@ def test_section_2_6_unheld_components_are_checks(directory, tmp_path):
     (values,) = named(table.columns, "d").values
     assert (name, np.isnan(values[:2]).all()) == (control.name, True)
     assert values[2] == pytest.approx(result.point_differences[row, 2])
-    assert (
-        f"{abs(result.point_differences[row, 2]):.5f}"[:-1] in result.report().partition("rms of unheld")[2]
-    )
+    kinds, values, *_ = result.document().table("differences").columns
+    rms = values.values[list(kinds.values).index("unheld components")]
+    assert rms[2] == pytest.approx(abs(result.point_differences[row, 2]))
     check = [each for each in read.ground if each.type_code == 7]
     assert len(check) == 4
     assert (result.point_kinds[[result.block.point_ids.index(each.name) for each in check]] == "check").all()
@@ -289,16 +290,17 @@ def test_section_2_6_unheld_components_are_checks(directory, tmp_path):
     again = adjust(read.to_block())
     assert np.isnan(again.point_differences[again.block.point_ids.index(check[0].name), 2])
     differences = again.point_differences[again.point_kinds == "check"]
-    line = again.report().partition("rms of check points")[2].partition("\n")[0]
-    # In seconds of arc the lengths stand behind, in parentheses.
-    printed = [float(value) for value in re.findall(r"\w (\d+\.\d+) (?:m|arcsec)\b", line)]
-    lengths = [float(value) for value in re.findall(r"\((\d+\.\d+) m\)", line)]
+    kinds, values, *lengths = again.document().table("differences").columns
+    row = list(kinds.values).index("check points")
     scale = np.array([180 / math.pi * 3600] * 2 + [1]) if again.block.geographic else 1.0
     root = np.sqrt(np.nanmean(differences**2, axis=0))
-    assert printed == pytest.approx(root * scale, abs=1e-5)
+    assert values.outward()[row] == pytest.approx(root * scale)
+    # In geographic space the lengths are in further columns.
     middle = again.block.photo_positions.mean(axis=0, keepdims=True)
     metres = root * network.lengths_of_units(middle, again.block.spheroid)[0]
-    assert lengths == pytest.approx(metres[:2] if again.block.geographic else [], abs=1e-4)
+    assert [own.values[row].tolist() for own in lengths] == [
+        pytest.approx(metres[:2]) for _ in range(again.block.geographic)
+    ]
 
 
 @pytest.mark.giant("13", "10 weights as a diagnostic tool")

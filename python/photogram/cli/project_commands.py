@@ -10,7 +10,6 @@ from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFile, Reads, Writes
 from photogram.cli.projects import EXAMPLE, read_project
 from photogram.formats.read_options import ReadOptions
-from photogram.lazy_dataclasses import replace
 from photogram.messages import listed
 from photogram.words import phrase
 
@@ -70,7 +69,7 @@ def _with_statement(document: Document, project: Project) -> Document:
         "budgets": asked.budgets,
     }
     document = document.with_sections(Section("statement", "Accuracy statement", [Facts("", facts)]))
-    return replace(document, members={**document.members, "statement": members})
+    return document.with_members(lambda: {"statement": members})
 
 
 @with_job("convert", example=EXAMPLE)

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.collection.parameters import POSE
-from photogram.results.network_document import drawings, network_document, network_members, size_section
+from photogram.results.network_document import (
+    drawings,
+    network_document,
+    network_members,
+    size_section,
+    used_fact,
+)
 from photogram.results.network_sections import control_section, stations_section
 from photogram.results.network_tables import image_axes
 from photogram.results.parts import Terms
@@ -23,18 +29,17 @@ if TYPE_CHECKING:
 def collection_document(result: AdjustedCollection) -> Document:
     """Return the document of an adjusted collection."""
     given, variance = result.collection, result.variance_of_unit_weight
-    counts = {
-        "photos": result.photo_images > 0,
-        "points": result.used_points,
-        "image points": result.used_images,
-    }
-    size = [(name, f"{np.count_nonzero(used)} used of {len(used)}") for name, used in counts.items()]
-    more = [Fact("Camera", given.camera, note=f"unknowns of a photo: {', '.join(given.parameters)}")]
+    size = [
+        used_fact("Photos", result.photo_images > 0),
+        used_fact("Points", result.used_points),
+        used_fact("Image points", result.used_images),
+        Fact("Camera", given.camera, note=f"unknowns of a photo: {', '.join(given.parameters)}"),
+    ]
     if result.datum:
         held = [f"{name} of photo {photo}" for photo, name in result.datum]
-        more.append(Fact("Datum", "held parameters", note=", ".join(held)))
+        size.append(Fact("Datum", "held parameters", note=", ".join(held)))
     if behind := int(np.count_nonzero(result.point_rays_behind)):
-        more.append(Fact.of("Points behind a camera", behind, tone="look"))
+        size.append(Fact.of("Points behind a camera", behind, tone="look"))
     first = 0.5 * result.initial_weighted_sum_of_squares
     good = [
         Fact.of("Cost at first, half the sum of squares", first, figures=7),
@@ -46,7 +51,7 @@ def collection_document(result: AdjustedCollection) -> Document:
     return network_document(
         result,
         "Adjustment of a collection of photos",
-        size_section(result, size, more, good),
+        size_section(result, size, good),
         [control_section(result), stations_section(result), cameras],
         photos=int(np.count_nonzero(result.photo_images)),
         members=partial(_members, result),

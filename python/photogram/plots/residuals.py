@@ -151,5 +151,5 @@ def vector_panel(each: VectorField, longest: float = math.nan) -> Panel:
         bars = [(scale * bar / x.factor, INK, f"{bar:g} {x.small}")]
     if each.labels:
         marks.append(Names(each.places, each.labels, [INK] * len(each.labels)))
-    limits, titles = around(each.places, MARGIN_OF_FIELD), (f"{axis.name}, {axis.unit}" for axis in (x, y))
-    return Panel(limits, marks, each.title, *titles, equal=True, bars=bars)
+    limits, across, up = around(each.places, MARGIN_OF_FIELD), f"{x.name}, {x.unit}", f"{y.name}, {y.unit}"
+    return Panel(limits, marks, each.title, across, up, equal=True, bars=bars)

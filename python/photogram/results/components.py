@@ -12,7 +12,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import remarks_section, verdict_document
-from photogram.show.methods import Brief, Documented, Judged
+from photogram.show.methods import Brief, Judged, Tabular
 from photogram.show.page import (
     Document,
     Drawing,
@@ -36,14 +36,14 @@ from photogram.statistics.variance_function import FunctionEstimate
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 INCHES_OF_COMPONENT = 0.32
 MARGIN = 1.1  # Limits relative to the extreme values
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VarianceComponents(Judged, Documented, Brief):
+class VarianceComponents(Judged, Tabular, Brief):
     """Variance components of groups of observations.
 
     Attributes
@@ -100,10 +100,6 @@ class VarianceComponents(Judged, Documented, Brief):
             if name == each.name or name in each.members:
                 return each
         raise KeyError(name)
-
-    def table(self) -> pd.DataFrame:
-        """Return the components as a data frame."""
-        return components_table(self).frame()
 
     def _findings(self) -> Findings:
         """Return tests with these weights; optimistic given weights reject good observations."""
@@ -227,7 +223,7 @@ class Bin:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VarianceFunction(Documented, Brief):
+class VarianceFunction(Tabular, Brief):
     """Variance of image coordinates: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
 
     Attributes
@@ -284,12 +280,7 @@ class VarianceFunction(Documented, Brief):
         panel = Panel(limits, marks, "", f"{self.name}{unit}", "factor of the given variance", legend="below")
         return Plot(6.4, 4.0, [panel])
 
-    def table(self) -> pd.DataFrame:
-        """Return the bins as a data frame."""
-        return self.bins_table().frame()
-
-    def bins_table(self) -> Table:
-        """Return the declared table: bin means, redundancy, both factors."""
+    def _bins_table(self) -> Table:
         low, high = np.array([each.interval for each in self.bins]).reshape(-1, 2).T
         columns = [
             of_each(self.bins, "value", name=self.name, head=self.name.capitalize(), figures=4),
@@ -325,5 +316,5 @@ class VarianceFunction(Documented, Brief):
         function = Section("function", "Function", [Facts("", facts)])
         more = {**members(estimate, "coefficients", "covariance", "converged")}
         more |= {"of": self.name, **members(self, "largest", "test_value", "probability")}
-        sections = [remarks_section(remarks), function, Section.of(self.bins_table())]
+        sections = [remarks_section(remarks), function, Section.of(self._bins_table())]
         return Document("Variance function", "", [], [], [], sections, more)

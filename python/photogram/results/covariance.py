@@ -324,10 +324,7 @@ class Covariances:
             raise InputError(phrase("covariance.step"))
         value = _evaluated(function, selected, selected.values)
         partials = _partials(function, selected, value)
-        cofactors = self._asked(
-            lambda: self._core.propagate(partials, selected.rows, threads=0, progress=None)
-        )
-        covariance = self._scale * cofactors
+        covariance = self.combined(partials, unknowns)
         sd = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(np.shape(value))
         found = _bias(function, selected, value, self.covariance(unknowns)) if bias else None
         if np.ndim(value) == 0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from photogram.results.calibration import calibration_members, cameras_section, 
 from photogram.results.datum import observed_control
 from photogram.results.features import features_members, features_section
 from photogram.results.film_report import films_section
-from photogram.results.network_tables import control, point_axes
+from photogram.results.network_tables import control, plan_deviations, point_axes
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, about, conventions, significant
@@ -102,27 +102,31 @@ def _size_section(result: Result) -> Section:
     good += [
         Fact.of(f"Weighted sum of squares, {name}", square, decimals=6) for name, square in groups.items()
     ]
-    tables: dict[str, Callable[[Result], list[Quantity]]] = {
+    return of_network.size_section(result, [*_size(result), *more], good, [_differences(result)])
+
+
+def _differences(result: Result) -> Table:
+    """Return the rms of differences between adjusted and given coordinates."""
+    kinds: dict[str, Callable[[Result], list[Quantity]]] = {
         "control points": control,
         "unheld components": declared.unheld,
         "check points": declared.check_points,
     }
-    axes, lengths, unit = point_axes(result.block), result._terms.lengths, result.block.linear_unit
-    for what, table in tables.items():
-        differences = named(table(result), "d").values
-        values = [rms_of(column[np.isfinite(column)]) for column in differences.T]
-        if np.isfinite(differences).any():
-            texts = [
-                f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
-                + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")
-                for k, (axis, value) in enumerate(zip(axes, values, strict=True))
-                if math.isfinite(value)
-            ]
-            good.append(Fact(f"rms of {what}", ", ".join(texts)))
-    return of_network.size_section(result, size_of(result), more, good)
+    found = {
+        kind: [rms_of(column[np.isfinite(column)]) for column in named(table(result), "d").values.T]
+        for kind, table in kinds.items()
+    }
+    known = {kind: values for kind, values in found.items() if np.isfinite(values).any()}
+    values = np.reshape([*known.values()], (-1, 3))
+    columns = [
+        Quantity([*known], kind="name", head="rms of"),
+        Quantity(values, point_axes(result.block), "difference", head="{}", figures=5),
+        *(replace(each, head="{}") for each in plan_deviations(result._terms, values)),
+    ]
+    return Table("differences", "Adjusted minus given coordinates", columns)
 
 
-def size_of(result: Result) -> list[tuple[str, str]]:
+def _size(result: Result) -> list[Fact]:
     block = result.block
     kinds = result.point_kinds[result.used_points].tolist()
     held = np.isfinite(block.point_sd)
@@ -130,19 +134,19 @@ def size_of(result: Result) -> list[tuple[str, str]]:
     held &= result.used_points[:, np.newaxis]
     counts = zip(point_axes(block), held.sum(axis=0), strict=True)
     return [
-        ("photos", f"{len(block.photo_ids)}"),
-        *([("cameras", f"{len(block.cameras)}")] if block.cameras else []),
-        ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
-        ("held components of control", ", ".join(f"{axis.name} {count}" for axis, count in counts)),
-        ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
+        Fact.of("Photos", len(block.photo_ids)),
+        *([Fact.of("Cameras", len(block.cameras))] if block.cameras else []),
+        Fact("Points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
+        Fact("Held components of control", ", ".join(f"{axis.name} {count}" for axis, count in counts)),
+        of_network.used_fact("Image points", result.used_images),
         *(
-            (f"observations, {each.kind}", f"{each.used} used of {len(each.rows)}")
+            of_network.used_fact(f"Observations, {each.kind}", np.isfinite(each.squares))
             for each in result.kinds.values()
         ),
-        ("object space", "geographic" if block.geographic else "rectangular"),
-        ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
-        ("datum", str(result.datum)),
-        ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
+        Fact("Object space", "geographic" if block.geographic else "rectangular"),
+        Fact("Rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
+        Fact("Datum", str(result.datum)),
+        Fact("Refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
     ]
 
 

@@ -20,7 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import by_name
 from photogram.results.grouping import Grouping, GroupsArgument, grouped, observables
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Brief, Documented
+from photogram.show.methods import Brief, Tabular
 from photogram.show.page import Document, Section
 from photogram.show.quantity import Table, column, of_each
 from photogram.statistics.components import balanced
@@ -29,8 +29,6 @@ from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from photogram import Result
 
 TESTABLE = 0.5  # Smallest redundancy of a tested group
@@ -82,7 +80,7 @@ class GroupSum:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GroupSums(Documented, Brief):
+class GroupSums(Tabular, Brief):
     """Groups of the observations of an adjusted network, with their tests.
 
     A group should be tested after the removal of gross errors, and jointly with the others by variance
@@ -111,8 +109,8 @@ class GroupSums(Documented, Brief):
         found: GroupSum = by_name(self.groups, name, "group")
         return found
 
-    def groups_table(self) -> Table:
-        """Return the declared table: sums, factors of standard deviations, probabilities of sums."""
+    def document(self) -> Document:
+        """Return the document: sums, factors of standard deviations, probabilities of sums."""
         groups, tests = self.groups, [each.test for each in self.groups]
         sides = [
             (math.nan, math.nan) if test is None else (test.probability_below, test.probability_above)
@@ -133,15 +131,8 @@ class GroupSums(Documented, Brief):
         tested = sum(test is not None for test in tests)
         names = ", ".join(each.name for each in self.rejected) or "none"
         note = f"Beyond their limits, of {tested} tested at {100 * self.level:g} percent together: {names}."
-        return Table("groups", "Groups of observations", columns, note)
-
-    def table(self) -> pd.DataFrame:
-        """Return the groups as a data frame."""
-        return self.groups_table().frame()
-
-    def document(self) -> Document:
-        """Return the document: the table of groups."""
-        return Document("Groups of observations", "", [], [], [], [Section.of(self.groups_table())])
+        title = "Groups of observations"
+        return Document(title, "", sections=[Section.of(Table("groups", title, columns, note))])
 
 
 class Left:

@@ -31,15 +31,13 @@ from photogram.results.distortion import INTERIOR, compared_places, partials_of,
 from photogram.results.fixed_tests import score
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
-from photogram.show.methods import Brief, Documented
+from photogram.show.methods import Brief, Tabular
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each
 from photogram.statistics.agreement import quadratic
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from photogram import Result
 
 LEVEL = 0.05  # Significance level of terms
@@ -104,7 +102,7 @@ class Model:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Documented, Brief):
+class Comparison(Tabular, Brief):
     """A comparison of models of the same observations."""
 
     models: tuple[Model, ...]  # The best first
@@ -129,12 +127,8 @@ class Comparison(Documented, Brief):
             return f"{self.best.name} and {rival.name} are as good as each other (BIC {difference:.1f} apart)"
         return f"{self.best.name} is better than {rival.name}: {size} evidence (BIC {difference:.1f} apart)"
 
-    def table(self) -> pd.DataFrame:
-        """Return the models as a data frame."""
-        return self.models_table().frame()
-
-    def models_table(self) -> Table:
-        """Return the declared table of the models, the best first."""
+    def document(self) -> Document:
+        """Return the document: models, the best first, and tests against larger models."""
         columns = [
             of_each(self.models, "name", kind="name", name="model", head="Model"),
             of_each(
@@ -145,16 +139,13 @@ class Comparison(Documented, Brief):
             of_each(self.models, "bic", name="bic", head="BIC", decimals=2),
             of_each(self.models, "checks", name="rms_check", head="rms of checks", figures=5),
         ]
-        return Table("models", "Models", columns, self.statement())
-
-    def document(self) -> Document:
-        """Return the document: models, and tests against larger models."""
+        models = Table("models", "Models", columns, self.statement())
         nested = [
             f"{small} within {large}: T {value:.3f} with {dimension}, probability {probability:.2g}"
             for small, large, value, dimension, probability in self.nested
         ]
-        sections = [Section.of(self.models_table()), Section("nested", "Nested models", [Remarks(nested)])]
-        return Document("Models of the same observations", "", [], [], [], sections)
+        sections = [Section.of(models), Section("nested", "Nested models", [Remarks(nested)])]
+        return Document("Models of the same observations", "", sections=sections)
 
 
 def terms_test(result: Result, names: Sequence[str], *, camera: str | None = None) -> TermsTest:

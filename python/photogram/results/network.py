@@ -433,7 +433,9 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return a table by the type of its items."""
-        raise NotImplementedError
+        from photogram.results.tables import table_frame
+
+        return table_frame(self, what)
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""

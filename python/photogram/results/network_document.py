@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Indices
+from photogram.arguments.types import Bools, Indices
 from photogram.plots.accessor import sketch_of
 from photogram.results import network_sections as sections
 from photogram.results import network_tables as declared
@@ -129,15 +129,19 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
     }
 
 
+def used_fact(name: str, used: Bools) -> Fact:
+    """Return the number of used items of a type."""
+    return Fact(name, f"{np.count_nonzero(used)} used of {len(used)}")
+
+
 def size_section(
-    result: AdjustedNetwork, much: Sequence[tuple[str, str]], more: Sequence[Fact], good: Sequence[Fact]
+    result: AdjustedNetwork, size: Sequence[Fact], good: Sequence[Fact], tables: Sequence[quantity.Table] = ()
 ) -> Section:
-    """Return the sizes of the network, `more` facts, and its accuracy."""
-    facts = [Fact(f"{name[:1].upper()}{name[1:]}", value) for name, value in much]
-    facts.append(Fact.of("Degrees of freedom", result.degrees_of_freedom))
+    """Return the sizes of the network, and its accuracy."""
     parts: list[Part] = [
-        Facts("How much", [*facts, *more]),
+        Facts("How much", [*size, Fact.of("Degrees of freedom", result.degrees_of_freedom)]),
         Facts("How good", [*good, *_images_facts(result)]),
+        *tables,
         _precision_table(result),
     ]
     return Section("size", "How much, how good", parts)

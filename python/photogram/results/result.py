@@ -305,9 +305,7 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        from photogram.results.tables import table_frame
-
-        table = table_frame(self, what)
+        table = super()._table(what)
         table.attrs["datum"] = str(self.datum)
         return table
 

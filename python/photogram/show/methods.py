@@ -12,6 +12,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
     from photogram.statistics.verdict import Verdict
@@ -64,6 +66,14 @@ class Documented:
 
         page = self.document()
         return page_html(page.with_sections(reproducibility(None, page.phases)))
+
+
+class Tabular(Documented):
+    """Base class of results that are one table in the main."""
+
+    def table(self) -> pd.DataFrame:
+        """Return the table as a data frame."""
+        return self.document().tables()[0].frame()
 
 
 class Brief:
