@@ -386,9 +386,10 @@ LOCATIONS = ["corner", "edge", "interior"]
 
 
 def parts_of(made, key):
-    """Return the parts of a section of the document, with the layers of the first."""
+    """Return the visible parts of a section of the document, with the layers of the first."""
     (section,) = (section for section in made.document().sections if section.key == key)
-    return [layer for part in section.parts for layer in getattr(part, "parts", [part])]
+    layers = [layer for part in section.parts for layer in getattr(part, "parts", [part])]
+    return [layer for layer in layers if layer.visible]
 
 
 def test_the_document_of_three_networks_and_of_one():

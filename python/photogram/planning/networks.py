@@ -15,7 +15,7 @@ from photogram.errors import InputError, PhotogramError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
-from photogram.planning.pattern import Pattern, with_known_readout
+from photogram.planning.pattern import Pattern, UnknownQuality, with_known_readout
 from photogram.results.hypotheses import FEWEST
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
@@ -30,7 +30,7 @@ from photogram.show.page import (
     about,
     significant,
 )
-from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
+from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each
 from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
@@ -51,7 +51,7 @@ REMEDIES = {
 """Observations that detect errors of these types; other types need points."""
 SHARE = (Axis("", "", small="percent", factor=100.0),)
 IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
-MOTION_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
+SMALL_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
 PANEL = 6.0  # Longer side of a panel, inches
 MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
 
@@ -189,12 +189,11 @@ def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
         "scale": f"{linear} on the ground for 1 mm in the photo",
         "unit": f"{linear}: the standard deviation of image coordinates on the ground",
         "points": f"standard deviations {linear}, detectable mm, effect standard deviations",
-        "photos": f"positions {linear}, angles rad",
+        "photos": "as each says",
+        "motion": "as each says",
         "control": f"sd and detectable {linear}, effect standard deviations",
         "undetected": f"change {linear} or rad, bias_to_noise and ratio standard deviations",
     }
-    if any(pattern.motion for pattern in patterns):
-        units["motion"] = "as each says"
     return {
         "units": units,
         "noncentrality": noncentrality(),
@@ -208,8 +207,8 @@ def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
                 "image_count": int(pattern.result.used_images.sum()),
                 "points": [vars(group) for group in pattern.points if group.points],
                 "photos": [*map(vars, pattern.photos)],
-                "control": records(_control(pattern).columns),
-                "undetected": records(_undetected(pattern).columns),
+                "control": _control(pattern).record(),
+                "undetected": _undetected(pattern).record(),
                 **({"motion": [*map(vars, pattern.motion)]} if pattern.motion else {}),
                 **({"rms_sd_known_readout": known} if (known := pattern.known_rms_sd) else {}),
             }
@@ -247,36 +246,31 @@ def _multiples(pattern: Pattern) -> Table:
 
 
 def _photos(pattern: Pattern) -> Table:
-    turned = map(Axis.turned, ("omega", "phi", "kappa"))
-    axes = [*(Axis.of(name, pattern.block.linear_unit) for name in pattern.axes), *turned]
     redundancy = of_each(pattern.photos, "redundancy", head="Mean redundancy of weighted values", decimals=3)
-    return _deviations(pattern, axes, [(each.rms_sd, each.max_sd) for each in pattern.photos], redundancy)
+    return _unknowns(pattern, pattern.photos, redundancy)
 
 
 def _motion(pattern: Pattern) -> Table:
-    units = [MOTION_UNITS.get(each.unit, (each.unit, 1.0)) for each in pattern.motion]
-    axes = [
-        Axis(each.unknown, small=unit, factor=factor)
-        for each, (unit, factor) in zip(pattern.motion, units, strict=True)
-    ]
-    sd = [(each.rms_sd, each.max_sd) for each in pattern.motion]
+    linear, known = pattern.block.linear_unit, pattern.known_rms_sd or ()
+    names = [f"{axis} of new points if the readout time is known" for axis in pattern.axes]
+    points = [UnknownQuality(name, linear, sd, np.nan) for name, sd in zip(names, known, strict=False)]
     better = [*(None for _ in pattern.motion), *_improvements(pattern)]
-    for axis, known in zip(pattern.axes, pattern.known_rms_sd or (), strict=False):
-        name = f"{axis} of new points if the readout time is known"
-        axes.append(Axis.of(name, pattern.block.linear_unit))
-        sd.append((known, np.nan))
-    return _deviations(pattern, axes, sd, Quantity(better, head="Times better", decimals=2))
+    unknowns = [*pattern.motion, *points]
+    return _unknowns(pattern, unknowns, Quantity(better, head="Times better", decimals=2))
 
 
-def _deviations(
-    pattern: Pattern, axes: Sequence[Axis], sd: Sequence[tuple[float, float]], more: Quantity
-) -> Table:
+def _unknowns(pattern: Pattern, unknowns: Sequence[UnknownQuality], more: Quantity) -> Table:
     """Return a table with one row per unknown and its unit."""
-    own, of, (rms, largest) = tuple(axes), np.arange(len(axes)), np.reshape(sd, (-1, 2)).T
+    units = [SMALL_UNITS.get(each.unit, (each.unit, 1.0)) for each in unknowns]
+    axes = tuple(
+        Axis(each.unknown, small=unit, factor=factor)
+        for each, (unit, factor) in zip(unknowns, units, strict=True)
+    )
+    deviations, of = partial(of_each, unknowns, axes=axes, kind="deviation"), np.arange(len(axes))
     columns = [
-        replace(component(own, of)[0], head="Unknown"),
-        Quantity(rms, own, "deviation", head="rms sd", of=of),
-        Quantity(largest, own, "deviation", head="Largest sd", of=of),
+        replace(component(axes, of)[0], head="Unknown"),
+        deviations("rms_sd", head="rms sd", of=of),
+        deviations("max_sd", head="Largest sd", of=of),
         more,
     ]
     return Table("", pattern.name, columns)
@@ -309,8 +303,7 @@ def _undetected(pattern: Pattern) -> Table:
 def _layers(
     patterns: Sequence[Pattern], key: str, title: str, table: Callable[[Pattern], Table], intro: str = ""
 ) -> Section:
-    tables = [made for pattern in patterns if (made := table(pattern)).visible]
-    return Section(key, title, [Layers(f"{key}-layers", tables)], intro)
+    return Section(key, title, [Layers(f"{key}-layers", [*map(table, patterns)])], intro)
 
 
 def _judgement(patterns: Sequence[Pattern]) -> Phrase:

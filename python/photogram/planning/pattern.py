@@ -36,24 +36,28 @@ Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class MotionQuality:
-    """Expected quality of the motion of all photos, or of all trajectories.
+class UnknownQuality:
+    """Expected quality of one unknown of all photos or trajectories.
 
     Attributes
     ----------
     unknown
-        "readout time" with its name, "velocity", "rate" (of photos with motions of their own), "position of
-        trajectories" or "rotation of trajectories" (anywhere between their observations).
+        Name of the unknown; of motions "readout time" with its name, "velocity", "rate" (of photos with
+        motions of their own), "position of trajectories" or "rotation of trajectories" (anywhere between
+        their observations).
     unit
-        "s", the linear unit a second, "rad/s", the linear unit or "rad".
+        The linear unit, "rad", "s", the linear unit a second, or "rad/s".
     rms_sd, max_sd
-        Root mean square and largest of the expected standard deviations of its components.
+        Root mean square and largest of the expected standard deviations.
+    redundancy
+        Mean redundancy number of the given values as observations; NaN if none is weighted, and of motions.
     """
 
     unknown: str
     unit: str
     rms_sd: float
     max_sd: float
+    redundancy: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -88,26 +92,6 @@ class PointQuality:
     unchecked: float
     detectable: float
     effect: float
-
-
-@dataclass(frozen=True)
-class PhotoQuality:
-    """Expected quality of one unknown of the photos.
-
-    Attributes
-    ----------
-    unknown
-        Name of the unknown.
-    rms_sd, max_sd
-        Root mean square and largest of the expected standard deviations: linear unit, radians for angles.
-    redundancy
-        Mean redundancy number of the given values as observations; NaN if none is weighted.
-    """
-
-    unknown: str
-    rms_sd: float
-    max_sd: float
-    redundancy: float
 
 
 @dataclass(frozen=True)
@@ -178,11 +162,6 @@ class Pattern:
         sd[:, :3] *= geometry.lengths_of_units(self.result.photo_positions, self.block.spheroid)
         return sd
 
-    @cached_property
-    def control_sd(self) -> Floats:
-        """(n, 3) a priori standard deviations of control, linear unit; infinite for free components."""
-        return self.block.point_sd * self._point_units
-
     @property
     def new_points(self) -> NDArray[np.bool_]:
         """(n,) mask of points to be determined: used points that are not control."""
@@ -230,7 +209,7 @@ class Pattern:
         return [self._group(grouping, name, self.new_points & chosen) for grouping, name, chosen in groups]
 
     @cached_property
-    def photos(self) -> list[PhotoQuality]:
+    def photos(self) -> list[UnknownQuality]:
         """Positions (linear unit) and attitudes (radians) of the photos."""
         block, redundancy = self.block, self.result.photo_redundancy.copy()
         moving = {each.photo for each in block.timed if each.trajectory is None}
@@ -241,13 +220,16 @@ class Pattern:
         given_sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
         weighted = np.isfinite(given_sd) & (given_sd > 0)
         unknowns = (*self.axes, "omega", "phi", "kappa")
+        units = [block.linear_unit] * 3 + ["rad"] * 3
         return [
-            PhotoQuality(name, _rms(sd), _of(np.max, sd), _of(np.mean, redundancy[weighted[:, k], k]))
-            for k, (name, sd) in enumerate(zip(unknowns, self.photo_sd.T, strict=True))
+            UnknownQuality(name, unit, _rms(sd), _of(np.max, sd), _of(np.mean, numbers[rows]))
+            for name, unit, sd, numbers, rows in zip(
+                unknowns, units, self.photo_sd.T, redundancy.T, weighted.T, strict=True
+            )
         ]
 
     @cached_property
-    def motion(self) -> list[MotionQuality]:
+    def motion(self) -> list[UnknownQuality]:
         """Readout times, velocities and rates; empty without motion."""
         block, trajectories = self.block, self.result.trajectories
         if not block.timed:
@@ -263,7 +245,7 @@ class Pattern:
             sd = np.concatenate(sds)
             found.append(("position of trajectories", linear, sd[:, :3]))
             found.append(("rotation of trajectories", "rad", sd[:, 3:]))
-        return [MotionQuality(name, unit, _rms(sd), float(sd.max())) for name, unit, sd in found]
+        return [UnknownQuality(name, unit, _rms(sd), float(sd.max())) for name, unit, sd in found]
 
     @cached_property
     def hypotheses(self) -> Hypotheses | None:
@@ -285,10 +267,8 @@ class Pattern:
     @cached_property
     def control(self) -> list[ControlQuality]:
         """Weighted or fixed components of control, by axis."""
-        qualities = []
-        for name, sd, numbers in zip(
-            self.axes, self.control_sd.T, self.result.point_redundancy.T, strict=True
-        ):
+        qualities, given_sd = [], self.block.point_sd * self._point_units
+        for name, sd, numbers in zip(self.axes, given_sd.T, self.result.point_redundancy.T, strict=True):
             held = self.result.used_points & np.isfinite(sd)
             weighted = held & (sd > 0)
             redundancy = numbers[weighted]
@@ -367,14 +347,11 @@ def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
 
 def _times_on_trajectories(block: Block) -> dict[str, Floats]:
     """Return the evaluated times of trajectories that photos share, by name."""
-    found: dict[str, list[Floats]] = {}
+    found: dict[str, list[float]] = {}
     for each, trajectory, _, own in timed_images(block):
         if each.trajectory is not None and len(own):
-            time, since, _ = each.images(block.image_xy[own])
-            scale = 1.0 if each.readout is None else float(each.readout.position[0])
-            found.setdefault(trajectory.name, []).append(time + scale * since)
-    spans = {name: np.concatenate(times) for name, times in found.items()}
-    return {name: np.linspace(times.min(), times.max(), PLACES) for name, times in spans.items()}
+            found.setdefault(trajectory.name, []).extend(each.times(block.image_xy[own]).tolist())
+    return {name: np.linspace(min(times), max(times), PLACES) for name, times in found.items()}
 
 
 def _triple(reduce: Callable[[Floats], float], sd: Floats) -> Triple:
