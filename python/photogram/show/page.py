@@ -247,10 +247,7 @@ def number_text(value: float | str | None, decimals: int | None, figures: int = 
 
 def fixed(value: float, decimals: int) -> str:
     """Return a fixed-point number, zero unsigned; long ones with an exponent."""
-    if not abs(value) < 1e15:
-        return significant(value)
-    text = f"{value:.{decimals}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
+    return f"{value:z.{decimals}f}" if abs(value) < 1e15 else significant(value)
 
 
 def significant(value: float, figures: int = 4) -> str:

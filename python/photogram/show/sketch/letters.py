@@ -95,7 +95,6 @@ def _candidates(low: float, high: float, log: bool) -> Iterator[tuple[Any, float
 def _written(values: Floats, step: float, decimal: str) -> Ticks:
     largest = float(np.abs(values).max(initial=0.0))
     decimals = min(max(0, -math.floor(math.log10(step) + 1e-9)), 15) if step > 0 else 0
-    layout = f".{decimals}f" if step and (largest == 0 or 1e-3 <= largest < 1e8) else ".10g"
-    texts = [f"{value:{layout}}" for value in values.tolist()]
-    texts = [text.lstrip("-") if not text.strip("-0.") else text.replace("-", "−") for text in texts]
-    return Ticks(values, [text.replace(".", decimal) for text in texts])
+    layout = f"z.{decimals}f" if step and (largest == 0 or 1e-3 <= largest < 1e8) else "z.10g"
+    texts = [f"{value:{layout}}".replace("-", "−").replace(".", decimal) for value in values.tolist()]
+    return Ticks(values, texts)
