@@ -23,31 +23,6 @@ KM = 1000.0
 _WORDS = {"first": "ANGLES", "second": "VELOCITIES", "third": "ACCELERATIONS", "all": "ALL", "none": "NONE"}
 _AXES = ("Latitude", "Longitude", "Radius")
 _CELLS = ("initial", "correction", "final", "apriori sigma", "adj sigma")
-_POINT_HEADS = [
-    ("", "Point", "Label"),
-    ("", "Point", "Status"),
-    ("", "Accepted", "Measures"),
-    ("", "Rejected", "Measures"),
-    ("", "Residual", "RMS"),
-    *(("3-d", axis, unit) for axis, unit in zip(_AXES, ("(dd)", "(dd)", "(km)"), strict=True)),
-    *(("Sigma", axis, "(m)") for axis in _AXES),
-    *(("Correction", axis, "(m)") for axis in _AXES),
-    *(("Coordinate", axis, "(km)") for axis in "XYZ"),
-    *(("Sigma", axis, "(m)") for axis in "XYZ"),
-]
-_RESIDUAL_HEADS = [
-    ("", "Point", "Label"),
-    ("", "Image", "Filename"),
-    ("", "Image", "Serial Number"),
-    ("x image", "coordinate", "(mm)"),
-    ("y image", "coordinate", "(mm)"),
-    ("Measured", "Sample", "(pixels)"),
-    ("Measured", "Line", "(pixels)"),
-    ("sample", "residual", "(pixels)"),
-    ("line", "residual", "(pixels)"),
-    ("Residual Vector", "Magnitude", "(pixels)"),
-    ("", "", "Rejected"),
-]
 _PARAMETER = "{:>6} {:>14}{:>22}{:>22}{:>22}{:>18}{:>18}"
 _COEFFICIENTS = (("X", "Y", "Z"), ("RA", "DEC", "TWIST"))
 _UNITS = ("km", "deg")
@@ -55,7 +30,7 @@ _UNITS = ("km", "deg")
 
 def jigsaw_files(outcome: Outcome) -> Mapping[str, bytes]:
     """Return the files by their names."""
-    parts = (_head, _settings, _results, _image_summary, _images, _points_summary, _points)
+    parts = (_head, _results, _image_summary, _images, _points_summary, _points)
     return {
         "images.csv": _table_of_images(outcome),
         "points.csv": _table_of_points(outcome),
@@ -72,16 +47,20 @@ def _rms(residuals: Floats) -> Floats:
     return np.sqrt([squares[0], squares[1], squares.mean()])
 
 
-def _apriori(own: Parameter) -> str:
-    """Return an a-priori standard deviation: FREE, N/A (fixed) or a number."""
-    return "N/A" if own.apriori == 0 else repr(own.apriori) if np.isfinite(own.apriori) else "FREE"
+_Head = tuple[str, ...]  # The lines of the header of a column
 
 
-def _table(heads: Sequence[Sequence[str]], columns: Sequence[Any]) -> bytes:
-    """Return a table with a header of several lines from headers by column."""
-    lines = [",".join(line) for line in zip(*heads, strict=True)]
-    _, rows = csv_text({str(k): column for k, column in enumerate(columns)}).split(b"\n", 1)
+def _table(columns: Sequence[tuple[_Head, Any]]) -> bytes:
+    """Return a table with a header of several lines."""
+    lines = [",".join(line) for line in zip(*(head for head, _ in columns), strict=True)]
+    _, rows = csv_text({str(k): column for k, (_, column) in enumerate(columns)}).split(b"\n", 1)
     return ("\n".join(lines) + "\n").encode() + rows
+
+
+def _three(what: str, names: Sequence[str], units: str, values: Floats) -> list[tuple[_Head, Floats]]:
+    """Return three columns of (n, 3) values."""
+    heads = zip(names, units.split(), strict=True)
+    return [((what, name, f"({unit})"), column) for (name, unit), column in zip(heads, values.T, strict=True)]
 
 
 def _table_of_images(outcome: Outcome) -> bytes:
@@ -95,24 +74,18 @@ def _table_of_images(outcome: Outcome) -> bytes:
         for image in outcome.contents.different
         if image.solving.trajectory.name in trajectories
     }
-    # Images with fixed poses have fewer coefficients.
     names = max((list(own) for own in found.values()), key=len)
     rows = []
     for image, own in found.items():
         mine = outcome.rows[image]
-        cells = [str(image.path), *_rms(outcome.residuals[mine[used[mine]]]).tolist()]
-        rows.append(cells + [cell for name in names for cell in _cells(own.get(name))])
+        cells: list[Any] = [str(image.path), *_rms(outcome.residuals[mine[used[mine]]]).tolist()]
+        for each in (own.get(name) for name in names):
+            # Images with fixed poses have fewer coefficients.
+            cells += each.cells if each else [None] * len(_CELLS)
+        rows.append(cells)
     heads = [("Image", "Filename"), *(("rms", f"{what} res") for what in ("sample", "line", "total"))]
     heads += [(f"{name}(t{power})", what) for name, power in names for what in _CELLS]
-    return _table(heads, list(zip(*rows, strict=True)))
-
-
-def _cells(own: Parameter | None) -> list[Any]:
-    """Return the cells of a coefficient; empty cells if an image does not have it."""
-    if own is None:
-        return [None] * len(_CELLS)
-    adjusted = "N/A" if own.apriori == 0 else repr(own.adjusted)
-    return [own.initial, own.correction, own.final, _apriori(own), adjusted]
+    return _table(list(zip(heads, zip(*rows, strict=True), strict=True)))
 
 
 def _table_of_points(outcome: Outcome) -> bytes:
@@ -122,20 +95,22 @@ def _table_of_points(outcome: Outcome) -> bytes:
     rejected = np.bincount(network.point_of_measure[outcome.rejected], minlength=len(network.points))
     taken = block.image_points[outcome.result.used_images]
     places = outcome.latitudes[used]
-    columns = [
-        [network.points.ids[row] for row in rows.tolist()],
-        [POINT_TYPES[code].upper() for code in network.points.types[rows].tolist()],
-        np.bincount(taken, minlength=len(block.point_ids))[used],
-        rejected[rows],
-        outcome.point_rms[used],
-        *np.rad2deg(places[:, :2]).T,
-        places[:, 2] / KM,
-        *outcome.local_sigmas[used].T,
-        *outcome.corrections[used].T,
-        *(outcome.xyz[used] / KM).T,
-        *np.sqrt(np.maximum(np.einsum("nkk->nk", outcome.covariances[used]), 0.0)).T,
-    ]
-    return _table(_POINT_HEADS, columns)
+    degrees = np.column_stack([np.rad2deg(places[:, :2]), places[:, 2] / KM])
+    variances = np.einsum("nkk->nk", outcome.covariances[used])
+    return _table(
+        [
+            (("", "Point", "Label"), [network.points.ids[row] for row in rows.tolist()]),
+            (("", "Point", "Status"), [POINT_TYPES[each].upper() for each in network.points.types[rows]]),
+            (("", "Accepted", "Measures"), np.bincount(taken, minlength=len(block.point_ids))[used]),
+            (("", "Rejected", "Measures"), rejected[rows]),
+            (("", "Residual", "RMS"), outcome.point_rms[used]),
+            *_three("3-d", _AXES, "dd dd km", degrees),
+            *_three("Sigma", _AXES, "m m m", outcome.local_sigmas[used]),
+            *_three("Correction", _AXES, "m m m", outcome.corrections[used]),
+            *_three("Coordinate", "XYZ", "km km km", outcome.xyz[used] / KM),
+            *_three("Sigma", "XYZ", "m m m", np.sqrt(np.maximum(variances, 0.0))),
+        ]
+    )
 
 
 def _table_of_residuals(outcome: Outcome) -> bytes:
@@ -147,32 +122,36 @@ def _table_of_residuals(outcome: Outcome) -> bytes:
     serials = [measures.serials[row] for row in measures.serial[rows].tolist()]
     found = np.column_stack([outcome.focal, outcome.residuals])[used]
     found = np.vstack([found, np.full((len(rejected), 4), np.nan)])
-    columns = [
-        [network.points.ids[row] for row in network.point_of_measure[rows].tolist()],
-        [str(images[serial].path) for serial in serials],
-        serials,
-        *found[:, :2].T,
-        measures.sample[rows],
-        measures.line[rows],
-        *found[:, 2:].T,
-        np.hypot(*found[:, 2:].T),
-        [""] * (len(rows) - len(rejected)) + ["*"] * len(rejected),
-    ]
-    return _table(_RESIDUAL_HEADS, columns)
+    points = [network.points.ids[row] for row in network.point_of_measure[rows].tolist()]
+    return _table(
+        [
+            (("", "Point", "Label"), points),
+            (("", "Image", "Filename"), [str(images[serial].path) for serial in serials]),
+            (("", "Image", "Serial Number"), serials),
+            (("x image", "coordinate", "(mm)"), found[:, 0]),
+            (("y image", "coordinate", "(mm)"), found[:, 1]),
+            (("Measured", "Sample", "(pixels)"), measures.sample[rows]),
+            (("Measured", "Line", "(pixels)"), measures.line[rows]),
+            (("sample", "residual", "(pixels)"), found[:, 2]),
+            (("line", "residual", "(pixels)"), found[:, 3]),
+            (("Residual Vector", "Magnitude", "(pixels)"), np.hypot(*found[:, 2:].T)),
+            (("", "", "Rejected"), [""] * (len(rows) - len(rejected)) + ["*"] * len(rejected)),
+        ]
+    )
 
 
 def _title(text: str) -> list[str]:
     return ["", text, "=" * len(text), ""]
 
 
-def _facts(facts: Mapping[str, object]) -> list[str]:
-    return [f"{name:>40}: {value}" for name, value in facts.items()]
+def _facts(title: str, facts: Mapping[str, object]) -> list[str]:
+    return [*_title(title), *(f"{name:>40}: {value}" for name, value in facts.items())]
 
 
 def _head(outcome: Outcome) -> Iterator[str]:
-    network = outcome.contents.network
-    yield from _title("JIGSAW: BUNDLE ADJUSTMENT")
+    network, settings = outcome.contents.network, outcome.contents.settings
     yield from _facts(
+        "JIGSAW: BUNDLE ADJUSTMENT",
         {
             "Network Id": network.network_id or "",
             "Network Filename": outcome.contents.path,
@@ -180,13 +159,9 @@ def _head(outcome: Outcome) -> Iterator[str]:
             "Target": network.target or "",
             "Linear Units": "kilometers",
             "Angular Units": "decimal degrees",
-        }
+        },
     )
-
-
-def _settings(outcome: Outcome) -> Iterator[str]:
-    yield from _title("INPUT: SETTINGS")
-    yield from _facts({name: _setting(outcome.contents.settings, name) for name in PARAMETERS})
+    yield from _facts("INPUT: SETTINGS", {name: _setting(settings, name) for name in PARAMETERS})
 
 
 def _setting(settings: Settings, name: str) -> str:
@@ -211,8 +186,8 @@ def _results(outcome: Outcome) -> Iterator[str]:
     points = result.block.point_sd[result.used_points]
     weighted = int(((points > 0) & np.isfinite(points)).sum()) + 3 * len(result.block.observations)
     variance = result.variance_of_unit_weight
-    yield from _title("JIGSAW: RESULTS")
     yield from _facts(
+        "JIGSAW: RESULTS",
         {
             "Images": len(outcome.contents.different),
             "Points": int(result.used_points.sum()),
@@ -228,7 +203,7 @@ def _results(outcome: Outcome) -> Iterator[str]:
             "Status": result.status,
             "Sigma0": "N/A" if variance is None else f"{np.sqrt(variance):.10f}",
             "Ignored Points": int(network.points.ignore.sum()),
-        }
+        },
     )
 
 
@@ -254,7 +229,7 @@ def _images(outcome: Outcome) -> Iterator[str]:
             unit = own.unit if own.power == 0 else f"{own.unit}/t^{own.power}"
             values = [f"{value:.10f}" for value in (own.initial, own.correction, own.final)]
             sigma = "N/A" if own.apriori == 0 else f"{own.adjusted:.10f}"
-            yield _PARAMETER.format(own.name, f"({unit})", *values, _apriori(own), sigma)
+            yield _PARAMETER.format(own.name, f"({unit})", *values, own.apriori_text, sigma)
         yield ""
 
 
@@ -312,6 +287,19 @@ class Parameter:
     correction: float
     apriori: float
     adjusted: float
+
+    @property
+    def cells(self) -> list[Any]:
+        """The cells of a table, see `_CELLS`."""
+        adjusted = "N/A" if self.apriori == 0 else repr(self.adjusted)
+        return [self.initial, self.correction, self.final, self.apriori_text, adjusted]
+
+    @property
+    def apriori_text(self) -> str:
+        """The a-priori standard deviation: FREE, N/A (fixed) or a number."""
+        if self.apriori == 0:
+            return "N/A"
+        return repr(self.apriori) if np.isfinite(self.apriori) else "FREE"
 
     @property
     def final(self) -> float:

@@ -46,18 +46,22 @@ _Codes = NDArray[np.int8]
 _Indices = NDArray[np.int32]
 _Rest = tuple[NDArray[np.uint8], NDArray[np.int64]]
 
-_TRIPLES = {
-    "apriori": ("apriori_x", "apriori_y", "apriori_z"),
-    "adjusted": ("adjusted_x", "adjusted_y", "adjusted_z"),
-    "constrained": ("latitude_constrained", "longitude_constrained", "radius_constrained"),
+_ABSENT: Mapping[type, np.generic] = {
+    np.bool_: np.bool_(False),
+    np.int8: np.int8(-1),
+    np.int32: np.int32(-1),
+    np.float64: np.float64(np.nan),
 }
-"""Columns of a table that are three columns of the engine."""
-_WIDTHS = {**dict.fromkeys(_TRIPLES, 3), "apriori_covariance": 6, "adjusted_covariance": 6}
-"""Numbers per row of columns with several."""
-_TRUTHS = {"edit_lock", "ignore", "rejected", *_TRIPLES["constrained"]}
-_CODES = {"types", "apriori_source", "apriori_radius_source"}
-_NO_COLUMNS = ("serials", "rest")
-_NAMES = ("ids", "serial", *_NO_COLUMNS)  # Passed to the engine separately from the columns of numbers
+"""Missing values of columns by type."""
+
+
+def _column(kind: type, *names: str, width: int = 1) -> Any:
+    """Declare a column: type, names of the engine if it has several columns, numbers per row."""
+    return field(metadata={"absent": _ABSENT[kind], "names": names, "width": len(names) or width})
+
+
+def _axes(kind: type, form: str, names: str = "x y z") -> Any:
+    return _column(kind, *(form.format(name) for name in names.split()))
 
 
 def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
@@ -75,12 +79,15 @@ class _Columns:
 
     def __post_init__(self) -> None:
         rows = len(self)
-        for each in fields(self):  # type: ignore[arg-type]
-            if each.name in _NO_COLUMNS:
-                continue
-            shape = (rows, _WIDTHS[each.name]) if each.name in _WIDTHS else (rows,)
-            _check_shape(each.name, getattr(self, each.name), shape)
+        for name, column in _columns(type(self)).items():
+            width = column["width"]
+            _check_shape(name, getattr(self, name), (rows,) if width == 1 else (rows, width))
         _check_shape("rest[1]", self.rest[1], (rows + 1,))
+
+
+def _columns(kind: type[_Columns]) -> dict[str, Mapping[str, Any]]:
+    """Return the declarations of the columns of points or measures."""
+    return {each.name: each.metadata for each in fields(kind) if each.metadata}  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,19 +99,20 @@ class ControlPoints(_Columns):
     """
 
     ids: Sequence[str]
-    types: _Codes  # (n,) index into `POINT_TYPES`
-    edit_lock: Bools  # (n,) the point must not be edited
-    ignore: Bools
-    rejected: Bools
-    reference: _Indices  # (n,) the reference measure of the point, counted from its first measure
+    types: _Codes = _column(np.int8)  # (n,) index into `POINT_TYPES`
+    edit_lock: Bools = _column(np.bool_)  # (n,) the point must not be edited
+    ignore: Bools = _column(np.bool_)
+    rejected: Bools = _column(np.bool_)
+    reference: _Indices = _column(np.int32)  # (n,) reference measure of the point, from its first measure
     # (n,) index into `SOURCES`: origin of the a-priori coordinates, and of the radius
-    apriori_source: _Codes
-    apriori_radius_source: _Codes
-    apriori: Floats  # (n, 3) coordinates before an adjustment
-    apriori_covariance: Floats
-    constrained: Bools  # (n, 3) whether latitude, longitude and radius are weighted
-    adjusted: Floats  # (n, 3) coordinates of an adjustment
-    adjusted_covariance: Floats
+    apriori_source: _Codes = _column(np.int8)
+    apriori_radius_source: _Codes = _column(np.int8)
+    apriori: Floats = _axes(np.float64, "apriori_{}")  # (n, 3) coordinates before an adjustment
+    apriori_covariance: Floats = _column(np.float64, width=6)
+    # (n, 3) whether latitude, longitude and radius are weighted
+    constrained: Bools = _axes(np.bool_, "{}_constrained", "latitude longitude radius")
+    adjusted: Floats = _axes(np.float64, "adjusted_{}")  # (n, 3) coordinates of an adjustment
+    adjusted_covariance: Floats = _column(np.float64, width=6)
     # All other message fields as bytes, and the start of each point (n + 1); written unchanged
     rest: _Rest
 
@@ -131,19 +139,19 @@ class ControlMeasures(_Columns):
 
     serials: Sequence[str]  # Serial numbers of images, each once
     serial: _Indices  # (m,) index of the image in `serials`
-    types: _Codes  # (m,) index into `MEASURE_TYPES`
-    sample: Floats
-    line: Floats
-    apriori_sample: Floats
-    apriori_line: Floats
-    sample_sigma: Floats
-    line_sigma: Floats
-    sample_residual: Floats
-    line_residual: Floats
-    diameter: Floats  # (m,) diameter of a measured crater
-    edit_lock: Bools  # (m,) the measure must not be edited
-    ignore: Bools
-    rejected: Bools
+    types: _Codes = _column(np.int8)  # (m,) index into `MEASURE_TYPES`
+    sample: Floats = _column(np.float64)
+    line: Floats = _column(np.float64)
+    apriori_sample: Floats = _column(np.float64)
+    apriori_line: Floats = _column(np.float64)
+    sample_sigma: Floats = _column(np.float64)
+    line_sigma: Floats = _column(np.float64)
+    sample_residual: Floats = _column(np.float64)
+    line_residual: Floats = _column(np.float64)
+    diameter: Floats = _column(np.float64)  # (m,) diameter of a measured crater
+    edit_lock: Bools = _column(np.bool_)  # (m,) the measure must not be edited
+    ignore: Bools = _column(np.bool_)
+    rejected: Bools = _column(np.bool_)
     rest: _Rest
 
     def __len__(self) -> int:
@@ -203,48 +211,33 @@ class ControlNetwork:
         return self.measures.ignore | self.points.ignore[self.point_of_measure]
 
 
-def _absent(name: str) -> np.generic:
-    """Return the missing value of a column of the engine."""
-    if name in _TRUTHS:
-        return np.bool_(False)
-    if name in _CODES:
-        return np.int8(-1)
-    return np.int32(-1) if name == "reference" else np.float64(np.nan)
-
-
 def _from_core(kind: type[_Columns], columns: Mapping[str, Any], rows: int) -> dict[str, Any]:
     """Return columns of points or measures; an empty one has missing values."""
-
-    def column(name: str) -> NDArray[Any]:
-        shape = (rows, _WIDTHS[name]) if name in _WIDTHS else (rows,)
-        own: NDArray[Any] | None = columns.get(name)
-        return np.broadcast_to(_absent(name), shape) if own is None else own
-
     found = {"rest": columns.get("rest", (np.zeros(0, np.uint8), np.zeros(rows + 1, np.int64)))}
-    for each in fields(kind):  # type: ignore[arg-type]
-        names = _TRIPLES.get(each.name, ())
-        if any(name in columns for name in names):
-            found[each.name] = np.column_stack([column(name) for name in names])
-        elif names:
-            found[each.name] = np.broadcast_to(_absent(names[0]), (rows, len(names)))
-        elif each.name not in _NAMES:
-            found[each.name] = column(each.name)
+    for name, own in _columns(kind).items():
+        absent, names, width = own["absent"], own["names"] or (name,), own["width"]
+        if not any(each in columns for each in names):
+            shape = (rows,) if width == 1 else (rows, width)
+            found[name] = np.broadcast_to(absent, shape)
+        elif len(names) == 1:
+            found[name] = columns[name]
+        else:
+            parts = [columns.get(each) for each in names]
+            missing = np.broadcast_to(absent, rows)
+            found[name] = np.column_stack([missing if part is None else part for part in parts])
     return found
 
 
-def _to_core(own: _Columns) -> dict[str, Any]:
+def _to_core(table: _Columns) -> dict[str, Any]:
     """Return points or measures as columns of the engine, without empty columns."""
-    found: dict[str, Any] = {"rest": own.rest}
-    for each in fields(own):  # type: ignore[arg-type]
-        if each.name in _NAMES:
-            continue
-        values = getattr(own, each.name)
-        triple = _TRIPLES.get(each.name)
-        for name, column in zip(triple, values.T, strict=True) if triple else [(each.name, values)]:
-            absent = _absent(name)
+    found: dict[str, Any] = {"rest": table.rest}
+    for name, own in _columns(type(table)).items():
+        absent, values = own["absent"], getattr(table, name)
+        pairs = zip(own["names"], values.T, strict=True) if own["names"] else [(name, values)]
+        for each, column in pairs:
             same = not any(column.strides)
             if column.size and not (same and np.array_equal(column.flat[0], absent, equal_nan=True)):
-                found[name] = np.ascontiguousarray(column, dtype=absent.dtype)
+                found[each] = np.ascontiguousarray(column, dtype=absent.dtype)
     return found
 
 

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 
 from photogram.errors import InputError, message_of
 from photogram.io.files import read_lines
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
@@ -22,56 +22,6 @@ Sigmas = tuple[float | None, float | None, float | None]
 Axes = Literal["latitudinal", "rectangular"]
 
 MOST = 8  # The highest degree of a polynomial
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Adjusted parameters and their weights; defaults are the defaults of jigsaw."""
-
-    # Degrees of the polynomials fitted to the angles of an image, and of the adjusted ones
-    ck_degree: int = 2
-    ck_solve_degree: int = 2
-    # Free coefficients, and whether coefficients of the third angle are free
-    angles: Solved = "first"
-    twist: bool = True
-    over_existing: bool = False  # Whether polynomials are added to the angles of the table instead
-    spk_degree: int = 2  # The same for positions
-    spk_solve_degree: int = 2
-    positions: Solved = "none"
-    over_hermite: bool = False
-    # Degrees: coefficients of degree 0, 1 and 2, by scaled time
-    angle_sigmas: Sigmas = (None, None, None)
-    position_sigmas: Sigmas = (None, None, None)  # Metres: as for angles
-    radius: bool = False  # Whether radii of free points are free
-    axes: Axes = "latitudinal"  # Coordinates in which points are adjusted
-    # Metres: latitude, longitude, radius of all points, and X, Y, Z
-    latitude_sigmas: Sigmas = (None, None, None)
-    rectangular_sigmas: Sigmas = (None, None, None)
-    observations: bool = False  # Whether images of one observation share their coefficients
-    held: Path | None = None  # List of images with fixed poses; None: no image
-    # Whether measures with large residuals are rejected, and the limit in standard deviations
-    rejects: bool = False
-    multiplier: float = 3.0
-    remarks: tuple[Phrase, ...] = ()  # Remarks on settings replaced by others
-
-    @property
-    def angle_coefficients(self) -> int:
-        """Number of free coefficients of each angle."""
-        return _count(self.angles, self.ck_solve_degree)
-
-    @property
-    def position_coefficients(self) -> int:
-        """Number of free coefficients of each coordinate."""
-        return _count(self.positions, self.spk_solve_degree)
-
-    @property
-    def point_sigmas(self) -> Sigmas:
-        """Standard deviations of the adjusted coordinates of all points, metres."""
-        return self.latitude_sigmas if self.axes == "latitudinal" else self.rectangular_sigmas
-
-
-def _count(solved: Solved, degree: int) -> int:
-    return degree + 1 if solved == "all" else ("none", "first", "second", "third").index(solved)
 
 
 def _yes(text: str) -> bool:
@@ -114,7 +64,79 @@ def _word(**words: str) -> Callable[[str], str]:
 
 
 _SOLVED = {"velocities": "second", "accelerations": "third", "all": "all", "none": "none"}
-_AXES = _word(latitudinal="latitudinal", rectangular="rectangular")
+
+
+def _said(names: str, read: Callable[[str], Any], default: Any) -> Any:
+    """Declare a field with its names in jigsaw and the reader of their values."""
+    return field(default=default, metadata={"names": names.split(), "read": read})
+
+
+_FREE: Sigmas = (None, None, None)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Adjusted parameters and their weights; defaults are the defaults of jigsaw."""
+
+    # Degrees of the polynomials fitted to the angles of an image, and of the adjusted ones
+    ck_degree: int = _said("CKDEGREE", _degree, 2)
+    ck_solve_degree: int = _said("CKSOLVEDEGREE", _degree, 2)
+    # Free coefficients, and whether coefficients of the third angle are free
+    angles: Solved = _said("CAMSOLVE", _word(**_SOLVED, angles="first"), "first")
+    twist: bool = _said("TWIST", _yes, True)
+    # Whether polynomials are added to the angles of the table instead
+    over_existing: bool = _said("OVEREXISTING", _yes, False)
+    # The same for positions
+    spk_degree: int = _said("SPKDEGREE", _degree, 2)
+    spk_solve_degree: int = _said("SPKSOLVEDEGREE", _degree, 2)
+    positions: Solved = _said("SPSOLVE", _word(**_SOLVED, position="first", positions="first"), "none")
+    over_hermite: bool = _said("OVERHERMITE", _yes, False)
+    radius: bool = _said("RADIUS", _yes, False)  # Whether radii of free points are free
+    # Coordinates in which points are adjusted
+    axes: Axes = _said(
+        "CONTROL_POINT_COORDINATE_TYPE_BUNDLE",
+        _word(latitudinal="latitudinal", rectangular="rectangular"),
+        "latitudinal",
+    )
+    # Degrees: coefficients of degree 0, 1 and 2, by scaled time
+    angle_sigmas: Sigmas = _said(
+        "CAMERA_ANGLES_SIGMA CAMERA_ANGULAR_VELOCITY_SIGMA CAMERA_ANGULAR_ACCELERATION_SIGMA", _sigma, _FREE
+    )
+    # Metres: as for angles
+    position_sigmas: Sigmas = _said(
+        "SPACECRAFT_POSITION_SIGMA SPACECRAFT_VELOCITY_SIGMA SPACECRAFT_ACCELERATION_SIGMA", _sigma, _FREE
+    )
+    # Metres: latitude, longitude, radius of all points, and X, Y, Z
+    latitude_sigmas: Sigmas = _said(
+        "POINT_LATITUDE_SIGMA POINT_LONGITUDE_SIGMA POINT_RADIUS_SIGMA", _sigma, _FREE
+    )
+    rectangular_sigmas: Sigmas = _said("POINT_X_SIGMA POINT_Y_SIGMA POINT_Z_SIGMA", _sigma, _FREE)
+    # Whether images of one observation share their coefficients
+    observations: bool = _said("OBSERVATIONS", _yes, False)
+    held: Path | None = _said("HELDLIST", Path, None)  # List of images with fixed poses; None: no image
+    # Whether measures with large residuals are rejected, and the limit in standard deviations
+    rejects: bool = _said("OUTLIER_REJECTION", _yes, False)
+    multiplier: float = _said("REJECTION_MULTIPLIER", _positive, 3.0)
+    remarks: tuple[Phrase, ...] = ()  # Remarks on settings replaced by others
+
+    @property
+    def angle_coefficients(self) -> int:
+        """Number of free coefficients of each angle."""
+        return _count(self.angles, self.ck_solve_degree)
+
+    @property
+    def position_coefficients(self) -> int:
+        """Number of free coefficients of each coordinate."""
+        return _count(self.positions, self.spk_solve_degree)
+
+    @property
+    def point_sigmas(self) -> Sigmas:
+        """Standard deviations of the adjusted coordinates of all points, metres."""
+        return self.latitude_sigmas if self.axes == "latitudinal" else self.rectangular_sigmas
+
+
+def _count(solved: Solved, degree: int) -> int:
+    return degree + 1 if solved == "all" else ("none", "first", "second", "third").index(solved)
 
 
 class _Parameter(NamedTuple):
@@ -126,31 +148,10 @@ class _Parameter(NamedTuple):
 
 
 PARAMETERS: Mapping[str, _Parameter] = {
-    "CKDEGREE": _Parameter("ck_degree", _degree),
-    "CKSOLVEDEGREE": _Parameter("ck_solve_degree", _degree),
-    "CAMSOLVE": _Parameter("angles", _word(**_SOLVED, angles="first")),
-    "TWIST": _Parameter("twist", _yes),
-    "OVEREXISTING": _Parameter("over_existing", _yes),
-    "SPKDEGREE": _Parameter("spk_degree", _degree),
-    "SPKSOLVEDEGREE": _Parameter("spk_solve_degree", _degree),
-    "SPSOLVE": _Parameter("positions", _word(**_SOLVED, position="first", positions="first")),
-    "OVERHERMITE": _Parameter("over_hermite", _yes),
-    "RADIUS": _Parameter("radius", _yes),
-    "CONTROL_POINT_COORDINATE_TYPE_BUNDLE": _Parameter("axes", _AXES),
-    **{
-        f"{name}_SIGMA": _Parameter(own, _sigma, place)
-        for own, names in {
-            "angle_sigmas": ("CAMERA_ANGLES", "CAMERA_ANGULAR_VELOCITY", "CAMERA_ANGULAR_ACCELERATION"),
-            "position_sigmas": ("SPACECRAFT_POSITION", "SPACECRAFT_VELOCITY", "SPACECRAFT_ACCELERATION"),
-            "latitude_sigmas": ("POINT_LATITUDE", "POINT_LONGITUDE", "POINT_RADIUS"),
-            "rectangular_sigmas": ("POINT_X", "POINT_Y", "POINT_Z"),
-        }.items()
-        for place, name in enumerate(names)
-    },
-    "OBSERVATIONS": _Parameter("observations", _yes),
-    "HELDLIST": _Parameter("held", Path),
-    "OUTLIER_REJECTION": _Parameter("rejects", _yes),
-    "REJECTION_MULTIPLIER": _Parameter("multiplier", _positive),
+    name: _Parameter(own.name, own.metadata["read"], place if len(own.metadata["names"]) > 1 else None)
+    for own in fields(Settings)
+    if own.metadata
+    for place, name in enumerate(own.metadata["names"])
 }
 """Field of each jigsaw name."""
 
@@ -176,10 +177,14 @@ def read_settings(text: str) -> Settings:
     """
     given: dict[str, Any] = {}
     remarks: dict[str, Phrase] = {}
-    for name, value, where in _said(text):
+    for name, value, where in _words(text):
         try:
-            if name in PARAMETERS:
-                _put(given, PARAMETERS[name], value)
+            if (own := PARAMETERS.get(name)) is not None:
+                found = own.read(value)
+                if own.place is not None:
+                    three = given.get(own.field, _FREE)
+                    found = (*three[: own.place], found, *three[own.place + 1 :])
+                given[own.field] = found
             else:
                 remarks |= _elsewhere(name, value)
         except InputError as error:
@@ -189,7 +194,7 @@ def read_settings(text: str) -> Settings:
     return Settings(**given, remarks=tuple(remarks.values()))
 
 
-def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
+def _words(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Yield names and values, and their locations in a file."""
     path = Path(text) if text.strip() and "=" not in text else None
     lines = [text] if path is None else read_lines(path)
@@ -207,15 +212,6 @@ def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
                     continue
                 raise InputError(phrase("isis.syntax", value=word), **where)
             yield name.upper(), value, where
-
-
-def _put(given: dict[str, Any], own: _Parameter, value: str) -> None:
-    found = own.read(value)
-    if own.place is not None:
-        three = list(given.get(own.field, (None, None, None)))
-        three[own.place] = found
-        found = tuple(three)
-    given[own.field] = found
 
 
 def _elsewhere(name: str, value: str) -> dict[str, Phrase]:
