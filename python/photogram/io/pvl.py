@@ -45,6 +45,12 @@ class Group:
         """Return the groups and objects of a name directly in it, ignoring case."""
         return [each for each in self.inside if each.name.lower() == name.lower()]
 
+    def need(self, name: str, path: Path) -> Group:
+        """Return the first group or object of a name, which the file must contain."""
+        if not (found := self.groups(name)):
+            raise InputError(phrase("format.member", name=name), file=path, record=self.line)
+        return found[0]
+
 
 _TOKEN = re.compile(
     r"""(?P<space>(?:\s+|\#[^\n]*|/\*(?s:.*?)\*/)+)

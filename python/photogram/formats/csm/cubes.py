@@ -62,16 +62,8 @@ def read_label(path: Path) -> Group:
                 raise InputError(phrase("csm.label"), file=path)
             text += piece
     label = parsed(text[: end.end()].decode("utf-8", "replace"), path)
-    _group(label, "IsisCube", path)
+    label.need("IsisCube", path)
     return label
-
-
-def _group(within: Group, name: str, path: Path) -> Group:
-    """Return the group of a name; raise an error if it is missing."""
-    found = within.groups(name)
-    if not found:
-        raise InputError(phrase("format.member", name=name), file=path, record=within.line)
-    return found[0]
 
 
 def _members(group: Group, path: Path) -> Tree:
@@ -197,7 +189,7 @@ def _named(instrument: Tree) -> tuple[str, str]:
 
 def serial_number(label: Group, path: Path) -> str:
     """Return the serial number of a cube in control networks."""
-    instrument = _members(_group(_group(label, "IsisCube", path), "Instrument", path), path)
+    instrument = _members(label.need("IsisCube", path).need("Instrument", path), path)
     spacecraft, name = _named(instrument)
     if spacecraft == _LRO and name in _NAC:
         return f"LRO/{instrument['SpacecraftClockStartCount'].text()}/{name}"
@@ -213,11 +205,11 @@ def read_cube(path: Path) -> Isd:
     Sub-areas, maps and unknown instruments are rejected. An unknown instrument requires an ISD.
     """
     label = read_label(path)
-    cube = _group(label, "IsisCube", path)
+    cube = label.need("IsisCube", path)
     for name in _CHANGED:
         if cube.groups(name):
             raise InputError(phrase("csm.derived", name=name), file=path)
-    instrument = _members(_group(cube, "Instrument", path), path)
+    instrument = _members(cube.need("Instrument", path), path)
     known = _CAMERAS.get(_named(instrument))
     if known is None:
         spacecraft, name = _named(instrument)
@@ -227,9 +219,9 @@ def read_cube(path: Path) -> Isd:
 
 def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
     """Return support data of the LRO Narrow Angle Camera."""
-    keywords = _members(_group(label, "NaifKeywords", path), path)
-    code = f"INS{_members(_group(cube, 'Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
-    size = _members(_group(_group(cube, "Core", path), "Dimensions", path), path)
+    keywords = _members(label.need("NaifKeywords", path), path)
+    code = f"INS{_members(cube.need('Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
+    size = _members(cube.need("Core", path).need("Dimensions", path), path)
     samples, count = size["Samples"].whole(1), size["Lines"].whole(1)
     pointing = read_turns(label, "InstrumentPointing", path)
     rate = not_zero(instrument["LineExposureDuration"]) / 1000

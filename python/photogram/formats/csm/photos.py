@@ -234,29 +234,17 @@ class SupportedImage:
         else:
             times = self.isd.lines.times(xy[:, 1])
             xy = self._line_sensor().places(xy[:, 0])
-        self._check_reached(times, np.atleast_1d(np.asarray(lines, dtype=float)))
+        first, last = self.flown.reach
+        beyond = (times < first) | (times > last)
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            fields = {"line": float(np.atleast_1d(lines)[row]), "time": float(times[row])}
+            raise self.isd.error(phrase("csm.reach", image=self.name, first=first, last=last, **fields))
         given = (np.array([each.position for each in own]) for own in self.flown.coefficients)
         places, turned, *_ = self.flown.flown(times, *given)
         rays = np.einsum("nij,nj->ni", turned.reshape(-1, 3, 3), self.camera.rays(xy))
         a, b = self.isd.radii
         return _nearest_intersection(places, rays, a + height, b + height)
-
-    def _check_reached(self, times: Floats, lines: Floats) -> None:
-        """Reject times outside the tables of poses."""
-        first, last = self.flown.reach
-        beyond = (times < first) | (times > last)
-        if beyond.any():
-            row = int(np.argmax(beyond))
-            raise self.isd.error(
-                phrase(
-                    "csm.reach",
-                    line=lines[row],
-                    image=self.name,
-                    time=float(times[row]),
-                    first=first,
-                    last=last,
-                )
-            )
 
     def to_image(self, xyz: ArrayLike) -> Floats:
         """Project points to lines and samples of the image.
@@ -277,18 +265,11 @@ class SupportedImage:
             return seen[0][:, ::-1] + HALF[self.pixels]
         images = np.array([self._measured(each) for each in seen])
         framelets = self.isd.framelets
-        found = images[0] if framelets is None else _in_framelets(framelets, images)
-        return self._jittered(found)[:, ::-1] + HALF[self.pixels]
-
-    def _jittered(self, image: Floats) -> Floats:
-        """Add the shifts of jitter to samples and lines."""
-        jitter = self.isd.jitter
-        if jitter is None:
-            return image
-        found = image
-        for _ in range(_STEPS):
-            found = image + jitter.shifts(np.nan_to_num(found[:, 1]))
-        return found
+        image = found = images[0] if framelets is None else _in_framelets(framelets, images)
+        if self.isd.jitter is not None:
+            for _ in range(_STEPS):
+                found = image + self.isd.jitter.shifts(np.nan_to_num(found[:, 1]))
+        return found[:, ::-1] + HALF[self.pixels]
 
 
 def _in_framelets(framelets: Framelets, images: Floats) -> Floats:

@@ -61,7 +61,10 @@ def read_isd(path: Path) -> Isd:
     code = _instrument(tree, keywords)
     tree, remarks = completed(tree, keywords, code)
     focal_length = not_zero(tree["focal_length_model"]["focal_length"])
-    _check_frames(tree)
+    tables = [tree[name] for name in ("instrument_position", "instrument_pointing", "body_rotation")]
+    frames = {each["reference_frame"].whole(-(2**31)) for each in tables if "reference_frame" in each}
+    if len(frames) > 1:
+        raise tables[0].error(phrase("csm.frames", names=sorted(frames)))
     detector = _detector(tree, keywords, code)
     pointing, center = _turns(tree, "instrument_pointing"), tree["center_ephemeris_time"].number()
     position = _positions(tree["instrument_position"])
@@ -110,14 +113,6 @@ def _look(
     depth = -(pointing.matrices[middle[0]] @ position.places[middle[1]])[2]
     mirrored = np.linalg.det(detector.planes["csm"].matrix) < 0
     return -1 if kind == "frame" and mirrored and depth < 0 else 1
-
-
-def _check_frames(tree: Tree) -> None:
-    """Reject tables with different inertial axes."""
-    tables = [tree[name] for name in ("instrument_position", "instrument_pointing", "body_rotation")]
-    frames = {each["reference_frame"].whole(-(2**31)) for each in tables if "reference_frame" in each}
-    if len(frames) > 1:
-        raise tables[0].error(phrase("csm.frames", names=sorted(frames)))
 
 
 def _unit(tree: Tree) -> float:
@@ -368,18 +363,14 @@ def _only_time(tree: Tree) -> Any:
     return times[0] if isinstance(times, list) and len(times) == 1 else None
 
 
-def _none(_: Tree) -> None:
-    return None
-
-
-_RULES: tuple[tuple[str, str, Callable[[Tree], Any], str], ...] = (
-    ("focal_length_model/focal_length", "FOCAL_LENGTH", _none, "the focal length in millimetres"),
-    ("focal2pixel_samples", "ITRANSS", _none, _PLANE.format("sample")),
-    ("focal2pixel_lines", "ITRANSL", _none, _PLANE.format("line")),
-    ("detector_sample_summing", "", _none, _SUMMING.format("samples", "sample")),
-    ("detector_line_summing", "", _none, _SUMMING.format("lines", "line")),
-    ("starting_detector_sample", "", _none, _START.format("sample")),
-    ("starting_detector_line", "", _none, _START.format("line")),
+_RULES: tuple[tuple[str, str, Callable[[Tree], Any] | None, str], ...] = (
+    ("focal_length_model/focal_length", "FOCAL_LENGTH", None, "the focal length in millimetres"),
+    ("focal2pixel_samples", "ITRANSS", None, _PLANE.format("sample")),
+    ("focal2pixel_lines", "ITRANSL", None, _PLANE.format("line")),
+    ("detector_sample_summing", "", None, _SUMMING.format("samples", "sample")),
+    ("detector_line_summing", "", None, _SUMMING.format("lines", "line")),
+    ("starting_detector_sample", "", None, _START.format("sample")),
+    ("starting_detector_line", "", None, _START.format("line")),
     ("detector_center/sample", "BORESIGHT_SAMPLE", _middle("sample"), _CENTER.format("sample")),
     ("detector_center/line", "BORESIGHT_LINE", _middle("line"), _CENTER.format("line")),
     ("center_ephemeris_time", "", _only_time, "the time of the exposure in ephemeris seconds"),
@@ -399,7 +390,7 @@ def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple
         if not isinstance(holder, dict) or holder.get(name) is not None:
             continue
         known = f"{code}_{keyword}"
-        value = keywords[known].value if known in keywords else derive(tree)
+        value = keywords[known].value if known in keywords else derive and derive(tree)
         if value is None:
             if name in holder or tree.value.get(group or name, 0) is None:
                 raise Tree(None, tree.file, f"/{path}").error(phrase("csm.null", meaning=meaning))

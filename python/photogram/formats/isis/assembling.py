@@ -26,7 +26,6 @@ from photogram.io.places import Place
 from photogram.messages import Message
 from photogram.network.geometry import Cartesian, Spheroid
 from photogram.network.motion import about
-from photogram.network.moving_photos import Timed
 from photogram.words import Phrase, option_sd, phrase
 
 
@@ -135,20 +134,25 @@ def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Pl
     return starts
 
 
-def _spheroid(contents: PlanetaryContents) -> Spheroid | None:
-    """Return the sphere below points; None if X, Y, Z are adjusted."""
-    if contents.settings.axes == "rectangular":
-        return None
-    a, b = contents.different[0].supported.isd.radii
-    return Spheroid((2 * a + b) / 3, (2 * a + b) / 3)
-
-
 def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) -> Project:
-    network, place, spheroid = contents.network, Place(contents.path), _spheroid(contents)
+    network, place, spheroid = contents.network, Place(contents.path), None
+    if contents.settings.axes == "latitudinal":
+        a, b = contents.different[0].supported.isd.radii
+        spheroid = Spheroid((2 * a + b) / 3, (2 * a + b) / 3)
     starts = contents.starts[seen.points]
     known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
     timed = [each for own in contents.different for each in own.supported.timed]
-    centres, matrices = _poses(contents, spheroid)
+    # Approximate poses: of frames, and of the first lines of scanners.
+    found = [
+        about(
+            own.supported.flown, float(each.time or 0.0 if each.lines is None else each.lines.times([0.0])[0])
+        )
+        for own in contents.different
+        for each in own.supported.timed
+    ]
+    axes = Cartesian(spheroid)
+    centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
+    matrices = axes.to_local(np.array([matrix for _, matrix in found]), centres)
     remarks = [*contents.settings.remarks]
     if contents.settings.rejects:
         remarks.append(phrase("isis.rejection"))
@@ -166,20 +170,6 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     block.lacks.append(Phrase("read.images", fields))
     details = {DETAILS: contents, "further inputs": [each.path for each in contents.different]}
     return block.project(details=details, title=network.network_id or "", timed=timed, spheroid=spheroid)
-
-
-def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:
-    """Return approximate positions and attitudes of photos."""
-    axes, found = Cartesian(spheroid), []
-    for own in contents.different:
-        found += [about(own.supported.flown, _begin(each)) for each in own.supported.timed]
-    centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
-    return centres, axes.to_local(np.array([matrix for _, matrix in found]), centres)
-
-
-def _begin(own: Timed) -> float:
-    """Return the time of a frame, or of the first line."""
-    return float(own.time or 0.0) if own.lines is None else float(own.lines.times([0.0])[0])
 
 
 def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from photogram.errors import InputError
 from photogram.formats.isis.network import HEADER, MESSAGE, ControlNetwork, measures_of, points_of
 from photogram.io.files import read_bytes, reading
 from photogram.io.pvl import Group, Quantity, Value, parsed
-from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
 LABEL_BYTES = 65536  # Bytes of the label of a binary network, padded with zeros
@@ -63,17 +61,13 @@ def read_network(path: Path) -> ControlNetwork:
         network = _text(data, path)
     else:
         raise InputError(phrase("isis.network", value=str(kind)), file=path)
-    _check_names(network.points.ids, path)
+    ids = network.points.ids
+    if len(set(ids)) < len(ids):
+        first: dict[str, int] = {}
+        for number, name in enumerate(ids, 1):
+            if first.setdefault(name, number) != number:
+                raise InputError(phrase("format.repeated", what="point", name=name), file=path, record=number)
     return network
-
-
-def _check_names(ids: Sequence[str], path: Path) -> None:
-    if len(set(ids)) == len(ids):
-        return
-    first: dict[str, int] = {}
-    for number, name in enumerate(ids, 1):
-        if first.setdefault(name, number) != number:
-            raise InputError(phrase("format.repeated", what="point", name=name), file=path, record=number)
 
 
 def _check_version(version: str, known: tuple[str, ...], what: str, path: Path) -> None:
@@ -81,86 +75,58 @@ def _check_version(version: str, known: tuple[str, ...], what: str, path: Path) 
         raise InputError(phrase("isis.version", kind=what, version=version, names=list(known)), file=path)
 
 
-@dataclass
-class _Label:
-    """The contents of the label of a binary network."""
-
-    core: Group
-    info: Group
-    others: Group
-    path: Path
-
-    def whole(self, group: Group, key: str) -> int | None:
-        """Return an integer that is not negative; None if the key is missing."""
-        value = group.get(key)
-        if value is None:
-            return None
-        if not isinstance(value, str) or re.fullmatch(r"\d{1,18}", value) is None:
-            raise InputError(phrase("format.whole", name=key, value=value), file=self.path, record=group.line)
-        return int(value)
-
-    def place(self, key: str) -> int:
-        """Return an offset or a number of bytes of the core."""
-        if (place := self.whole(self.core, key)) is None:
-            raise InputError(phrase("format.member", name=key), file=self.path, record=self.core.line)
-        return place
+def _whole(group: Group, key: str, path: Path, *, required: bool = False) -> int | None:
+    """Return an integer that is not negative; None if the key is missing."""
+    value = group.get(key)
+    if value is None:
+        if required:
+            raise InputError(phrase("format.member", name=key), file=path, record=group.line)
+        return None
+    if not isinstance(value, str) or re.fullmatch(r"\d{1,18}", value) is None:
+        raise InputError(phrase("format.whole", name=key, value=value), file=path, record=group.line)
+    return int(value)
 
 
-def _label(data: bytes, path: Path) -> _Label:
+def _binary(data: bytes, path: Path) -> ControlNetwork:
     head = data[:LABEL_BYTES].split(b"\0", 1)[0]
     try:
         text = head.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = head.decode("latin-1")
     label = parsed(text, path, numbers=False)
-    buffer = _only(label, "ProtoBuffer", path)
-    core, info = (_only(buffer, name, path) for name in ("Core", "ControlNetworkInfo"))
+    buffer = label.need("ProtoBuffer", path)
+    core, info = (buffer.need(name, path) for name in ("Core", "ControlNetworkInfo"))
+    version = str(info.get("Version") or _OLDEST)
+    _check_version(version, _BINARY_VERSIONS, "binary", path)
+    keys = ("HeaderStartByte", "HeaderBytes", "PointsStartByte", "PointsBytes")
+    start, size, points, points_size = (int(_whole(core, key, path, required=True) or 0) for key in keys)
+    texts, count, lengths, radii, rest = _photocore.control_header(data, start, start + size, path)
+    listed = lengths if version == "2" else None
+    columns, measures, firsts = _photocore.control_points(data, points, points + points_size, listed, path)
     known = {*_HEADER, "numberofpoints", "numberofmeasures", "version"}
     others = Group("", "label", items=[item for item in info.items if item[0].lower() not in known])
     others.items += label.items + buffer.items
     read = {id(buffer), id(core), id(info)}
     others.inside = [each for each in label.inside + buffer.inside if id(each) not in read]
-    return _Label(core, info, others, path)
-
-
-def _only(group: Group, name: str, path: Path) -> Group:
-    if not (found := group.groups(name)):
-        raise InputError(phrase("format.member", name=name), file=path, record=group.line)
-    return found[0]
-
-
-def _binary(data: bytes, path: Path) -> ControlNetwork:
-    label = _label(data, path)
-    version = str(label.info.get("Version") or _OLDEST)
-    _check_version(version, _BINARY_VERSIONS, "binary", path)
-    start, points = label.place("HeaderStartByte"), label.place("PointsStartByte")
-    texts, count, lengths, radii, rest = _photocore.control_header(
-        data, start, start + label.place("HeaderBytes"), path
-    )
-    listed = lengths if version == "2" else None
-    read = _photocore.control_points(data, points, points + label.place("PointsBytes"), listed, path)
     header: dict[str, Any] = dict(zip(MESSAGE, texts, strict=True))
-    network = _network(
-        *read, **header, radii=np.array(radii), header_rest=rest, version=int(version), others=label.others
-    )
+    header |= {"radii": np.array(radii), "header_rest": rest, "version": int(version), "others": others}
+    network = ControlNetwork(points_of(columns), measures_of(measures), firsts, **header)
     for said, found, what in (
         (count, len(network.points), "points"),
-        (label.whole(label.info, "NumberOfPoints"), len(network.points), "points"),
-        (label.whole(label.info, "NumberOfMeasures"), len(network.measures), "measures"),
+        (_whole(info, "NumberOfPoints", path), len(network.points), "points"),
+        (_whole(info, "NumberOfMeasures", path), len(network.measures), "measures"),
     ):
         if said is not None and said != found:
             raise InputError(phrase("isis.count", count=said, what=what, n=found), file=path)
     return network
 
 
-def _network(points: dict[str, Any], measures: dict[str, Any], firsts: Any, **header: Any) -> ControlNetwork:
-    return ControlNetwork(points_of(points), measures_of(measures), firsts, **header)
-
-
 def _text(data: bytes, path: Path) -> ControlNetwork:
-    read, around = _photocore.control_points_of_text(data.removeprefix(b"\xef\xbb\xbf"), path)
+    (points, measures, firsts), around = _photocore.control_points_of_text(
+        data.removeprefix(b"\xef\xbb\xbf"), path
+    )
     label = parsed(around, path, numbers=False)
-    network = _only(label, "ControlNetwork", path)
+    network = label.need("ControlNetwork", path)
     _check_version(str(network.get("Version") or _OLDEST), _TEXT_VERSIONS, "text", path)
     header: dict[str, Any] = {}
     others = Group("", "label", items=[*label.items])
@@ -174,7 +140,8 @@ def _text(data: bytes, path: Path) -> ControlNetwork:
             header["radii"] = _radii(value, network, path)
         elif key.lower() != "version":
             others.items.append((key, value))
-    return _network(*read, **header, version=int(str(network.get("Version"))), others=others)
+    header |= {"version": int(str(network.get("Version"))), "others": others}
+    return ControlNetwork(points_of(points), measures_of(measures), firsts, **header)
 
 
 def _radii(value: Value, network: Group, path: Path) -> Floats:
