@@ -7,16 +7,13 @@ image centre, in square pixels of the height of a row. An affinity contains the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.images import by_camera
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import Failing
@@ -33,12 +30,6 @@ class Sensor:
     camera: Camera
     size: Size
     pixel: float
-
-    def images(self, pixels: Floats) -> Floats:
-        """Convert columns and rows to (m, 2) millimetres from the image centre, y up."""
-        width, height = self.size
-        found: Floats = (pixels - [width / 2, height / 2]) * [self.pixel, -self.pixel]
-        return found
 
 
 def sensor_of(
@@ -67,18 +58,6 @@ def sensor_of(
         **terms,
     }
     return Sensor(Camera("brown", parameters, name=name), size, down)
-
-
-def sensors_of_table(
-    cameras: Sequence[Camera], sizes: Sequence[Size | None], pixels: Sequence[float | None], path: Path
-) -> dict[str, Sensor]:
-    """Return the cameras of a table of the plain project, by their names."""
-    found = {}
-    for camera, size, pixel in zip(cameras, sizes, pixels, strict=True):
-        if size is None or pixel is None or camera.image_y != "up":
-            raise InputError(phrase("dbat.camera", camera=camera.title), file=path)
-        found[camera.name] = Sensor(camera, size, pixel)
-    return found
 
 
 class DbatBuilder(BlockBuilder):
@@ -120,14 +99,16 @@ class DbatBuilder(BlockBuilder):
         if not self.image_keys:
             raise self.place.error(phrase("format.missing", what="image observations"))
         photos, points, pixels = self.image_rows()
-        cameras, sensors = np.array(self.photo_cameras)[photos], list(self.sensors.values())
+        cameras = np.array(self.photo_cameras)[photos]
         side = np.array(self.pixel_mm, dtype=float)[cameras, np.newaxis]
         sd = side * np.broadcast_to(options.sd.get("images", np.array(self.image_sd)), pixels.shape)
         if (missing := np.isnan(sd)).any():
             sd = np.where(missing, side, sd)
             fields = {"number": 1.0, "unit": "pixel", "option": option_sd("images")}
             self.lacks.append(Phrase("read.images", fields))
-        xy = by_camera(pixels, cameras, lambda row, own: sensors[row].images(own))
+        # Millimetres from the image centre, y up
+        middles = np.array([sensor.size for sensor in self.sensors.values()])[cameras] / 2
+        xy = (pixels - middles) * side * [1, -1]
         self.images(photos, points, xy, sd)
         held = [[0.0 if number in self.held else np.inf] * 3 for number in self.photo_rows]
         self.position_sd = self.attitude_sd = held

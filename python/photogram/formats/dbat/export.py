@@ -20,7 +20,6 @@ from photogram.formats.project import Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place, at_place
-from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.words import Phrase, option_sd, phrase
@@ -39,20 +38,11 @@ def is_export(path: Path) -> bool:
         return False
     if len(lines) < 5 or "," in "".join(lines[1:5]):
         return False
-    counts = [len(line.split()) for line in lines[1:5]]
-    return (
-        counts[0] in (2, 4)
-        and all(count >= least for count, least in zip(counts, _HEAD, strict=True))
-        and all(_is_number(word) for line in lines[1:5] for word in line.split())
-    )
-
-
-def _is_number(word: str) -> bool:
     try:
-        float(word)
+        counts = [len([float(word) for word in line.split()]) for line in lines[1:5]]
     except ValueError:
         return False
-    return True
+    return counts[0] in (2, 4) and all(n >= least for n, least in zip(counts, _HEAD, strict=True))
 
 
 class _Lines:
@@ -85,7 +75,7 @@ def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
     lines.take("nine standard deviations")
     default = lines.take("the camera")
     lines.take("standard deviations of the camera")
-    cameras = _Cameras(content, default, _sensor(default, 0, "camera", size), size)
+    cameras = _Cameras(content, default, size)
     for card in lines.until_empty():
         _photo(card, lines, cameras)
     _control(lines, content, options)
@@ -120,15 +110,13 @@ def _sensor(card: Card, first: int, name: str, size: Size) -> Sensor:
         return sensor_of(name, size, sides, (c, px, py), named)
 
 
-@dataclass
 class _Cameras:
     """The camera of the header, and different cameras of photos."""
 
-    content: DbatBuilder
-    head: Card
-    common: Sensor
-    size: Size
-    others: dict[tuple[str, ...], str] = field(default_factory=dict)
+    def __init__(self, content: DbatBuilder, head: Card, size: Size) -> None:
+        self.content, self.head, self.size = content, head, size
+        self.common = _sensor(head, 0, "camera", size)
+        self.others: dict[tuple[str, ...], str] = {}
 
     def name_of(self, number: int, card: Card) -> str:
         """Return the name of a photo's camera: usually the one of the header, rounded."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError
-from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of, sensors_of_table
+from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of
 from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, titled, untitled
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
@@ -49,36 +49,29 @@ def read_script(path: Path, options: ReadOptions) -> DbatBuilder:
     content = DbatBuilder(path, TITLE)
     base = path.parent / _known(given, given.attributes.get("base_dir", "$HERE"))
     cameras = given.need("cameras")
-    file = cameras.child("file")
-    sensors = (
-        _cameras(cameras, content.messages)
-        if file is None
-        else read_camera_file(_path(file, base), content.messages)
-    )
-    for name, sensor in sensors.items():
+    if (file := cameras.child("file")) is not None:
+        cameras = read_stream(_path(file, base), {}, "document").need("cameras")
+    for name, sensor in _cameras(cameras, content.messages).items():
         content.sensor(name, sensor)
     for _, table in _tables(given.need("images"), base):
         take_photos(table, content)
     eo = given.child("prior_eo")
     for element, table in [] if eo is None else _tables(eo, base):
         take_poses(table, content, element.attributes.get("units", "degrees"))
-    sd = options.sd.get("control")
     for name in ("ctrl_pts", "check_pts"):
         points = given.child(name)
         if points is not None:
             for _, table in _tables(points, base):
-                take_points(table, content, sd, check=name == "check_pts", wanted=_filter(points))
+                given_sd, wanted = options.sd.get("control"), _filter(points)
+                take_points(table, content, given_sd, check=name == "check_pts", wanted=wanted)
     for element, table in _tables(given.need("image_pts"), base):
-        take_images(table, content, _deviation(element))
+        word = element.attributes.get("sxy")
+        sd = math.nan if word is None else element.place.number(word.strip(), "sxy")
+        take_images(table, content, sd if word is None else positive(element, "sxy", sd))
     if (operations := root.child("operations")) is not None:
         _estimates(operations, content)
         _datum(operations, content)
     return content
-
-
-def read_camera_file(path: Path, messages: list[Message]) -> dict[str, Sensor]:
-    """Read a file of cameras."""
-    return _cameras(read_stream(path, {}, "document").need("cameras"), messages)
 
 
 def _path(element: Element, base: Path) -> Path:
@@ -118,13 +111,6 @@ def _filter(points: Element) -> Callable[[int], bool]:
     numbers = {found.place.whole(word.strip()) for word in found.attributes.get("id", "").split(",")}
     how = one_word(found, "filter", found.text.strip(), ("keep", "remove"))
     return lambda number: (number in numbers) == (how == "keep")
-
-
-def _deviation(element: Element) -> float:
-    word = element.attributes.get("sxy")
-    if word is None:
-        return math.nan
-    return positive(element, "sxy", element.place.number(word.strip(), "sxy"))
 
 
 def _operations(operations: Element, name: str) -> Iterator[Element]:
@@ -306,12 +292,17 @@ def _sensors(path: Path, options: ReadOptions, messages: list[Message]) -> dict[
         table = read_cameras(
             Tables(Settings(path, tables={"cameras": options.cameras}, image="mm"), messages)
         )
-        return sensors_of_table(table.cameras, table.sizes, table.pixel_mm, options.cameras)
+        found = {}
+        for camera, size, pixel in zip(table.cameras, table.sizes, table.pixel_mm, strict=True):
+            if size is None or pixel is None or camera.image_y != "up":
+                raise InputError(phrase("dbat.camera", camera=camera.title), file=options.cameras)
+            found[camera.name] = Sensor(camera, size, pixel)
+        return found
     folder = path if path.is_dir() else path.parent
     files = [each for each in sorted(folder.glob("*.xml")) if "dbat_camera_version" in root_of(each)[1]]
     if len(files) != 1:
         raise InputError(phrase("format.cameras"), file=path)
-    return read_camera_file(files[0], messages)
+    return _cameras(read_stream(files[0], {}, "document").need("cameras"), messages)
 
 
 def read_folder(path: Path, options: ReadOptions) -> DbatBuilder:

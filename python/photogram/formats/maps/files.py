@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.crs_results import Placed
-from photogram.formats.maps.layers import Layer, chosen_crs, map_layers
+from photogram.formats.maps.layers import GEOMETRIES, Layer, chosen_crs, map_layers
 from photogram.network.rays import local_axes
 from photogram.results.footprints import metric_covariances
 from photogram.results.network import AdjustedNetwork
@@ -35,16 +35,6 @@ CREATE TABLE layer_styles (
     ui TEXT(30), update_time DATETIME DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now'))
 )
 """
-_GEOMETRIES = {
-    "photos": "Point Z",
-    "footprints": "Polygon Z",
-    "points": "Point Z",
-    "point_ellipses": "Polygon",
-    "control": "Point Z",
-    "control_residuals": "LineString Z",
-    "check_residuals": "LineString Z",
-    "suspicious": "Point Z",
-}
 
 
 def map_files(
@@ -152,7 +142,7 @@ def _write(drawn: Layer, path: Path, driver: str, options: dict[str, str], **mor
             drawn.table,
             path,
             driver=driver,
-            geometry_type=_GEOMETRIES[drawn.name],
+            geometry_type=GEOMETRIES[drawn.name],
             layer_options=options,
             **more,
         )
@@ -277,10 +267,22 @@ def point_cloud(
     for axis, name in enumerate("xyz"):
         vertices[name] = places[:, axis] - origin[axis]
         vertices[f"sd_{name}"] = np.sqrt(covariances[:, axis, axis])
-    vertices["sd_max"] = _largest(covariances)
+    known = np.isfinite(covariances).all(axis=(1, 2))
+    vertices["sd_max"] = np.nan
+    vertices["sd_max"][known] = np.sqrt(np.linalg.eigvalsh(covariances[known])[:, -1])
     vertices["rays"] = np.minimum(result.point_rays[rows], 65535)
     unit = result.block.linear_unit if isinstance(result, Result) else ""
-    return _header(len(rows), what, unit, origin) + vertices.tobytes()
+    printed = "".join(each if each.isascii() and each.isprintable() else "?" for each in what)
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment frame {printed}; unit {unit or 'not known'}",
+        f"comment origin {' '.join(repr(float(each)) for each in origin)} was taken away",
+        f"element vertex {len(rows)}",
+        *(f"property {_TYPES[_VERTEX[name].str]} {name}" for name in _VERTEX.names or ()),
+        "end_header\n",
+    ]
+    return "\n".join(lines).encode("ascii") + vertices.tobytes()
 
 
 def _own(result: AdjustedNetwork) -> tuple[Indices, Floats, Floats, str]:
@@ -293,24 +295,3 @@ def _own(result: AdjustedNetwork) -> tuple[Indices, Floats, Floats, str]:
         local = local_axes(result.block).positions(places)
         return rows, local, metric_covariances(result)[rows], "east, north, up amid the stations"
     return rows, places, covariances, str(result.block.frame)
-
-
-def _largest(covariances: Floats) -> Floats:
-    known = np.isfinite(covariances).all(axis=(1, 2))
-    found = np.full(len(covariances), np.nan)
-    found[known] = np.sqrt(np.linalg.eigvalsh(covariances[known])[:, -1])
-    return found
-
-
-def _header(count: int, what: str, unit: str, origin: tuple[float, float, float]) -> bytes:
-    printed = "".join(each if each.isascii() and each.isprintable() else "?" for each in what)
-    lines = [
-        "ply",
-        "format binary_little_endian 1.0",
-        f"comment frame {printed}; unit {unit or 'not known'}",
-        f"comment origin {' '.join(repr(float(each)) for each in origin)} was taken away",
-        f"element vertex {count}",
-        *(f"property {_TYPES[_VERTEX[name].str]} {name}" for name in _VERTEX.names or ()),
-        "end_header",
-    ]
-    return ("\n".join(lines) + "\n").encode("ascii")

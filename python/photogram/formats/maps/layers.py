@@ -28,6 +28,16 @@ MOST_ELLIPSES = 20_000  # Default limit of error ellipses of points
 SUSPICIOUS = 3.0  # Smallest test value on the map
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("e", "n", "u")
+GEOMETRIES = {
+    "photos": "Point Z",
+    "footprints": "Polygon Z",
+    "points": "Point Z",
+    "point_ellipses": "Polygon",
+    "control": "Point Z",
+    "control_residuals": "LineString Z",
+    "check_residuals": "LineString Z",
+    "suspicious": "Point Z",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +77,12 @@ def chosen_crs(result: Result) -> str:
         return ""
     if frame.kind == "cartesian":
         return frame.crs
-    geographic = placed_middle(result)
-    zone = int((geographic[1] + 180.0) // 6.0) % 60 + 1
-    return f"EPSG:{(32600 if geographic[0] >= 0 else 32700) + zone}"
-
-
-def placed_middle(result: Result) -> tuple[float, float, float]:
-    """Return the mean latitude, longitude and height of the stations."""
     from photogram.formats.crs import to_system
 
-    earth, _ = to_system("EPSG:4978", result.photo_positions, frame_of(result.block))
-    return amid("EPSG:4978", earth)
+    earth, _ = to_system("EPSG:4978", result.photo_positions, frame)
+    latitude, longitude, _ = amid("EPSG:4978", earth)
+    zone = int((longitude + 180.0) // 6.0) % 60 + 1
+    return f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}"
 
 
 def map_layers(
@@ -118,6 +123,7 @@ def map_layers(
         If geopandas is not installed.
     """
     import geopandas
+    import shapely
 
     found = placed(result, chosen_crs(result) if crs is None else crs)
     own = ellipses(found.point_covariances, confidence)
@@ -125,7 +131,11 @@ def map_layers(
     few = f" {len(drawn):,} of {known:,}" if len(drawn) < known else ""
     if scale is None:
         # Sizes are in metres, positions in degrees: the scale follows from the spacing of stations in metres.
-        scale = fitting_scale(own, _metric_places(found))
+        spacing = found.points[:, :2]
+        if found.names[0] == "longitude" and len(spacing):
+            one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]
+            spacing = spacing / one[:, :2]
+        scale = fitting_scale(own, spacing)
     parts = [
         ("photos", "adjusted stations with standard deviations, metres", *_photos(found)),
         (
@@ -157,8 +167,10 @@ def map_layers(
         ),
     ]
     system = None if not found.crs or enu_origin(found.crs) is not None else without_geoid(found.crs)
+    shapes = {"Point": shapely.points, "LineString": shapely.linestrings, "Polygon": shapely.polygons}
     layers = []
-    for name, description, geometries, columns in parts:
+    for name, description, corners, columns in parts:
+        geometries = shapes[GEOMETRIES[name].split()[0]](corners) if len(corners) else []
         scaled = name in ("point_ellipses", "control_residuals", "check_residuals")
         table = geopandas.GeoDataFrame(dict(columns), geometry=list(geometries), crs=system)
         left_out = known - len(drawn) if name == "point_ellipses" else 0
@@ -166,12 +178,10 @@ def map_layers(
     return layers
 
 
-_Part = tuple[Any, Mapping[str, Any]]  # Geometries and columns
+_Part = tuple[Any, Mapping[str, Any]]  # Corners of geometries, and columns
 
 
 def _photos(found: Placed) -> _Part:
-    import shapely
-
     result, block = found.result, found.result.block
     angles, deviations = (np.degrees(each) for each in found.angles())
     own = block.image_photos[result.used_images]
@@ -182,7 +192,7 @@ def _photos(found: Placed) -> _Part:
     cameras = (
         {} if block.photo_cameras is None else {"camera": np.array(block.camera_names)[block.photo_cameras]}
     )
-    return shapely.points(found.photos), {
+    return found.photos, {
         "photo": block.photo_ids,
         **cameras,
         **_deviations(found.photo_covariances),
@@ -196,8 +206,7 @@ def _photos(found: Placed) -> _Part:
 def _footprints(found: Placed, sizes: Sequence[tuple[float, float] | None]) -> _Part:
     import shapely
 
-    result, block = found.result, found.result.block
-    shown = footprints(result, sizes)
+    block, shown = found.result.block, footprints(found.result, sizes)
     outlines = shown.positions()
     known: Bools = np.asarray(np.isfinite(outlines).all(axis=2))
     rows = np.flatnonzero(known.sum(axis=1) >= 4)
@@ -205,7 +214,7 @@ def _footprints(found: Placed, sizes: Sequence[tuple[float, float] | None]) -> _
     of_rings = np.repeat(np.arange(len(rows)), known[rows].sum(axis=1))
     rings = shapely.linearrings(places, indices=of_rings) if len(rows) else []  # Closes open rings
     unit = block.linear_unit
-    return shapely.polygons(rings), {
+    return rings, {
         "photo": np.array(block.photo_ids, dtype=object)[rows],
         f"{unit}_per_{block.image_unit}": shown.size[rows],
         "cut": shown.cut[rows],
@@ -213,13 +222,10 @@ def _footprints(found: Placed, sizes: Sequence[tuple[float, float] | None]) -> _
 
 
 def _points(found: Placed) -> _Part:
-    import shapely
-
-    result = found.result
-    return shapely.points(found.points), {
+    return found.points, {
         "point": _ids(found)[found.rows],
-        "kind": result.point_kinds[found.rows],
-        "rays": result.point_rays[found.rows],
+        "kind": found.result.point_kinds[found.rows],
+        "rays": found.result.point_rays[found.rows],
         **_deviations(found.point_covariances),
     }
 
@@ -236,14 +242,12 @@ def _with_ellipses(found: Placed, most: int) -> tuple[Indices, int]:
 
 
 def _ellipses(found: Placed, known: Indices, confidence: float, scale: float) -> _Part:
-    import shapely
-
     own = ellipses(found.point_covariances[known], confidence)
     steps = own.outlines(np.zeros((len(known), 2)), scale)
     count = steps.shape[1]
     flat = np.column_stack([steps.reshape(-1, 2), np.zeros(steps.size // 2)])
     places = found.moved(np.repeat(found.points[known], count, axis=0), flat)
-    return shapely.polygons(places[:, :2].reshape(-1, count, 2)), {
+    return places[:, :2].reshape(-1, count, 2), {
         "point": _ids(found)[found.rows[known]],
         "a": own.major,
         "b": own.minor,
@@ -262,11 +266,9 @@ def _given(found: Placed, differences: tuple[Indices, Floats]) -> tuple[Indices,
 
 
 def _control(found: Placed) -> _Part:
-    import shapely
-
     rows, given, steps = _given(found, found.control_differences())
     tests = np.abs(found.result.control.standardized)
-    return shapely.points(given), {
+    return given, {
         "point": _ids(found)[rows],
         **_along("d", steps),
         "largest_test": np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0),
@@ -274,11 +276,8 @@ def _control(found: Placed) -> _Part:
 
 
 def _vectors(found: Placed, rows: Indices, given: Floats, steps: Floats, scale: float) -> _Part:
-    import shapely
-
     ends = found.moved(given, scale * steps)
-    lines = shapely.linestrings(np.stack([given, ends], axis=1)) if len(rows) else []
-    return lines, {
+    return np.stack([given, ends], axis=1), {
         "point": _ids(found)[rows],
         **_along("d", steps),
         "length": np.linalg.norm(steps, axis=1),
@@ -288,15 +287,13 @@ def _vectors(found: Placed, rows: Indices, given: Floats, steps: Floats, scale: 
 
 def _suspicious(found: Placed) -> _Part:
     """Return observations with large test values, the largest first."""
-    import shapely
-
     tests = Tests(found.result).normal
     limit = normal_limit(max(sum(int(np.isfinite(each.values).sum()) for each in tests), 1))
     rows = sorted(_large_tests(found, tests), key=lambda each: -abs(each[1]["test"]))
     columns = {name: [own.get(name) for _, own in rows] for name in _SUSPECT}
     columns["beyond"] = [abs(own["test"]) > limit for _, own in rows]
     columns["limit"] = [limit] * len(rows)
-    return shapely.points(np.array([at for at, _ in rows])) if rows else [], columns
+    return np.array([at for at, _ in rows]), columns
 
 
 def _large_tests(found: Placed, types: Sequence[ComponentTests]) -> Iterator[tuple[Floats, dict[str, Any]]]:
@@ -358,11 +355,3 @@ def _along(what: str, values: Floats) -> dict[str, Floats]:
 
 def _ids(found: Placed) -> np.ndarray[Any, Any]:
     return np.array(found.result.block.point_ids, dtype=object)
-
-
-def _metric_places(found: Placed) -> Floats:
-    """Return (k, 2) positions in metres, for the distances between them."""
-    if found.names[0] != "longitude" or not len(found.points):
-        return found.points[:, :2]
-    one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]
-    return found.points[:, :2] / one[:, :2]
