@@ -7,8 +7,8 @@ import pytest
 
 from photogram import InputError, Message
 from photogram.comparator import Place
+from photogram.io.delimited import LONGEST_RECORD, cells, read_records
 from photogram.io.numbers import finite_number, is_whole_number, whole_number
-from photogram.io.rows import LONGEST_RECORD, Table, cells, read_rows
 from photogram.messages import MOST_CHARACTERS
 from photogram.words import quoted
 
@@ -21,22 +21,22 @@ def written(tmp_path, text):
 
 def test_rows_hold_cells_and_places(tmp_path):
     path = written(tmp_path, '# a remark\nID,x\n\n,,\n"a, b", 1.5\nc,\n')
-    table = Table.read(path, comment="#", spelling=str.lower)
+    table = read_records(path, spelling=lambda names: [name.lower() for name in names])
     assert (table.columns, table.head, table.path) == (("id", "x"), Place(path, 2, "ID,x"), path)
     assert [place.text for place in table.comments] == ["# a remark"]
-    rows = list(table.rows())
-    assert [(row.cells["id"], row.number("x"), row.place.record) for row in rows] == [
+    rows = list(table.rows)
+    assert [(row.text("id"), row.number("x"), row.place.record) for row in rows] == [
         ("a, b", 1.5, 5),
         ("c", None, 6),
     ]
-    assert list(table.rows()) == rows
+    assert list(table.rows) == rows
 
 
 def read_numbers(path):
     """Read the column x of a table."""
-    table = Table.read(path)
+    table = read_records(path)
     table.require("id", "x")
-    return [row.required("x") for row in table.rows()]
+    return [row.required("x") for row in table.rows]
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_damaged_tables_name_file_and_record(tmp_path, text, record, words):
 
 
 def test_cells_may_be_missing_at_the_end_of_a_ragged_table(tmp_path):
-    rows = read_rows(written(tmp_path, "id,x,y\n1,2\n3\n"), ["id", "x"])
+    rows = list(read_records(written(tmp_path, "id,x,y\n1,2\n3\n"), ragged=True).rows)
     assert [row.number("x") for row in rows] == [2.0, None]
     with pytest.raises(InputError, match=r"record 3: column x: must have a value"):
         rows[1].required("x")

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from message_codes import coded, codes
 from photogram import InputError
 from photogram.cli import app
-from photogram.io.rows import read_rows
+from photogram.io.delimited import read_records
 from photogram.stellar import ARCSEC, Site, apparent_places, calibrate, landmark, read_plain, sidereal_time
 from photogram.stellar.places import epoch
 from photogram.stellar.sky import HOUR
@@ -128,10 +128,10 @@ def test_apparent_places_as_a_command(tmp_path):
     utc = "1966-03-01T21:03:05"
     run = CliRunner().invoke(app, ["stellar-camera", "places", str(out), "--utc", utc, "--faintest", "2"])
     assert run.exit_code == 0, run.output
-    rows = read_rows(out, ("star", "ra_rad", "dec_rad"))
+    rows = list(read_records(out).rows)
     stars = Catalogue.hipparcos().brighter(2.0)
     places = np.array([[row.required("ra_rad"), row.required("dec_rad")] for row in rows])
-    assert [row.cells["star"] for row in rows] == list(stars.ids)
+    assert [row.text("star") for row in rows] == list(stars.ids)
     assert np.array_equal(places, apparent_places(stars, utc))
 
 

@@ -14,9 +14,10 @@ from photogram.absolute_orientation.stations import (
 )
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
+from photogram.io.column_table import ColumnTable, TableRow
+from photogram.io.delimited import cells, read_records
 from photogram.io.files import read_lines
 from photogram.io.places import Place, at_place
-from photogram.io.rows import Row, Table, cells
 from photogram.words import phrase
 
 __all__ = ["header", "is_csv", "read_csv", "spelling"]
@@ -60,17 +61,17 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         contains file, record and text.
     """
     path = path_of("path", path)
-    table = Table.read(path, comment="#", spelling=spelling)
+    table = read_records(path, spelling=lambda names: [spelling(name) for name in names])
     _check_header(table)
-    rows = list(table.rows())
+    rows = list(table.rows)
     if not rows:
         raise InputError(phrase("orientation.no-stations"), file=path)
-    known: dict[str, Place] = {}
+    known: dict[str, TableRow] = {}
     for row in rows:
-        if not row.cells["id"]:
-            raise row.place.error(phrase("orientation.no-id"))
-        if known.setdefault(row.cells["id"], row.place) is not row.place:
-            raise row.place.error(phrase("orientation.repeated", station=row.cells["id"]))
+        if not row.text("id"):
+            raise row.error(phrase("orientation.no-id"))
+        if known.setdefault(row.text("id"), row) is not row:
+            raise row.error(phrase("orientation.repeated", station=row.text("id")))
     weighted = [name for name in MODEL_SD_COLUMNS if name in table.columns]
     if weighted and len(weighted) < 3:
         raise InputError(phrase("orientation.incomplete-sd", names=weighted), file=path)
@@ -83,7 +84,7 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
     model_sd = numbers(MODEL_SD_COLUMNS, None) if weighted else None
     with at_place(Place(path)):
         return Stations(
-            [row.cells["id"] for row in rows],
+            [row.text("id") for row in rows],
             control,
             model,
             control_sd=control_sd,
@@ -93,16 +94,16 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         )
 
 
-def _check_header(table: Table) -> None:
+def _check_header(table: ColumnTable) -> None:
     allowed = (*REQUIRED, *OPTIONAL)
     table.require(*REQUIRED)
     if unknown := [name for name in table.columns if name not in allowed]:
         raise table.head.error(phrase("orientation.column", column=unknown[0], names=list(allowed)))
 
 
-def _number(row: Row, column: str, blank: float | None) -> float:
+def _number(row: TableRow, column: str, blank: float | None) -> float:
     """Read a number; infinity only as a standard deviation of control."""
-    text = row.cells.get(column, "")
+    text = row.text(column)
     if column in CONTROL_SD_COLUMNS and text.lower() in ("inf", "+inf", "infinity"):
         return math.inf
     if not text and blank is not None:

@@ -18,10 +18,10 @@ from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLU
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.delimited import LONGEST_RECORD, cells
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
-from photogram.io.rows import LONGEST_RECORD, cells
 from photogram.io.writing import OutputSet
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import Phrase, phrase

@@ -12,7 +12,7 @@ from photogram.comparator.correction import Correction
 from photogram.comparator.csvfile import Table
 from photogram.comparator.readings import LARGEST_UM
 from photogram.errors import InputError
-from photogram.io.rows import cells
+from photogram.io.delimited import cells
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
@@ -31,12 +31,12 @@ def correct_table(
     inside the calibrated range. With `invert`, readings are computed from corrected coordinates.
     """
     places = []
-    for row in table.records.rows():
+    for row in table.records.rows:
         xy = table.coordinates_um(row)
         if xy is None:
-            raise row.place.error(_of_coordinates(phrase("error.empty")))
+            raise row.error(_of_coordinates(phrase("error.empty")))
         if (largest := max(map(abs, xy))) > LARGEST_UM:
-            raise row.place.error(_of_coordinates(phrase("error.most", value=largest, high=LARGEST_UM)))
+            raise row.error(_of_coordinates(phrase("error.most", value=largest, high=LARGEST_UM)))
         places.append(xy)
     if not places:
         raise InputError(phrase("error.empty-file", content="measurements"), file=table.records.path)
@@ -51,17 +51,17 @@ def correct_table(
             # Rounding may make a zero variance negative.
             values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
     if not np.isfinite(values).all():
-        place = table.records.records[int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])]
-        raise place.error(phrase("comparators.infinite"))
+        row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+        raise table.records.error(row, phrase("comparators.infinite"))
     reach = correction.reach(readings)
     remarks = _outside(correction, table, readings, reach, extrapolate=extrapolate)
     in_range = ["" if np.isnan(far) else "yes" if far <= 1 + ROUNDING else "no" for far in reach.tolist()]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([*table.records.columns, *columns])
-    for place, numbers, within in zip(table.records.records, values.tolist(), in_range, strict=True):
+    for row, numbers, within in zip(table.records.rows, values.tolist(), in_range, strict=True):
         texts = [f"{number:.4f}" for number in numbers]
-        writer.writerow([*cells(place, table.records.delimiter), *texts, within])
+        writer.writerow([*cells(row.place, table.records.delimiter), *texts, within])
     return buffer.getvalue().encode(), remarks
 
 
@@ -80,7 +80,7 @@ def _outside(
         return []
     worst = int(reach.argmax())
     x, y = readings[worst].tolist()
-    identity, place = correction.identity, table.records.records[worst]
+    identity, place = correction.identity, table.records.place(worst)
     farthest = {"x": x, "y": y, "reach": float(reach[worst])}
     farthest["range"] = f" ({identity.range_text})" if identity else ""
     if reach[worst] > EDGE and not extrapolate:

@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from photogram.io import rows
+from photogram.io.column_table import ColumnTable, TableRow
+from photogram.io.delimited import read_records
 from photogram.io.places import Place
-from photogram.io.rows import Row
 from photogram.messages import unknown_name
 from photogram.words import phrase
 
@@ -44,7 +44,7 @@ class Setting:
 class Table:
     """Table with coordinates."""
 
-    records: rows.Table
+    records: ColumnTable
     settings: Mapping[str, Setting]
     unit: str  # um or mm
 
@@ -52,13 +52,13 @@ class Table:
         """Return the text of a setting; empty if it is missing."""
         return self.settings[key].text if key in self.settings else ""
 
-    def coordinates_um(self, row: Row) -> tuple[float, float] | None:
+    def coordinates_um(self, row: TableRow) -> tuple[float, float] | None:
         """Return x and y of a row in micrometres; None if both are blank."""
         x, y = row.number(f"x_{self.unit}"), row.number(f"y_{self.unit}")
         if x is None and y is None:
             return None
         if x is None or y is None:
-            raise row.place.error(phrase("comparators.coordinate"))
+            raise row.error(phrase("comparators.coordinate"))
         factor = MICROMETRES[self.unit]
         return x * factor, y * factor
 
@@ -68,7 +68,7 @@ def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -
 
     `keys` are the possible settings, None for any.
     """
-    records = rows.Table.read(path, comment="#", spelling=str.lower)
+    records = read_records(path, spelling=lambda names: [name.lower() for name in names])
     records.require(*columns)
     settings: dict[str, Setting] = {}
     for place in records.comments:

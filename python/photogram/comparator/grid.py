@@ -140,7 +140,7 @@ def read_grid(path: Path) -> Grid:
     path = path_of("path", path)
     table = read_table(path, "point", keys=KEYS)
     points, xy = [], []
-    for row in table.records.rows():
+    for row in table.records.rows:
         coordinates = table.coordinates_um(row)
         if coordinates is not None:
             points.append(row.integer("point"))

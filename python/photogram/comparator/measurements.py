@@ -15,8 +15,8 @@ from photogram.comparator.csvfile import Setting, Table, read_table
 from photogram.comparator.grid import Grid, find_grid
 from photogram.comparator.readings import LARGEST_UM, Reading, Session, collect_cases
 from photogram.errors import InputError
+from photogram.io.column_table import TableRow
 from photogram.io.numbers import is_whole_number
-from photogram.io.rows import Row
 from photogram.words import phrase
 
 T = TypeVar("T")
@@ -100,7 +100,7 @@ def read_csv(
     cases = collect_cases(
         _reading(row, xy, only_plate)
         for table in tables
-        for row in table.records.rows()
+        for row in table.records.rows
         if (xy := table.coordinates_um(row)) is not None
     )
     session = Session(
@@ -143,7 +143,7 @@ def _named_grids(table: Table) -> list[Grid]:
     return [find_grid(name if is_whole_number(name) else str(folder / name)) for name in names]
 
 
-def _reading(row: Row, xy_um: tuple[float, float], only_plate: int) -> Reading:
+def _reading(row: TableRow, xy_um: tuple[float, float], only_plate: int) -> Reading:
     leg = row.integer("leg", 0)
     check_number(row.place, "leg", leg, 0, MAX_LEG)
     return Reading(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +19,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import missing_columns, unknown_name
 from photogram.words import Phrase, phrase
 
+COMMENT = "#"  # First character of comments
 TRUE, FALSE = (
     frozenset({"true", "yes", "on", "1", "t", "y"}),
     frozenset({"false", "no", "off", "0", "f", "n"}),
@@ -48,9 +49,42 @@ class TableRow(NamedTuple):
     table: ColumnTable
     row: int
 
+    @property
+    def place(self) -> Place:
+        """Location of the row."""
+        return self.table.place(self.row)
+
     def error(self, message: str | Phrase) -> InputError:
         """Return an error with the location of the row."""
         return self.table.error(self.row, message)
+
+    def text(self, column: str) -> str:
+        """Return a cell; empty if the column is missing."""
+        cells = self.table.cells.get(column)
+        return "" if cells is None else cells[self.row]
+
+    def number(self, column: str) -> float | None:
+        """Return a finite number; None if the cell is blank or the column is missing."""
+        text = self.text(column)
+        if not text:
+            return None
+        commas = self.table.delimiter != "," and "." not in text
+        text = text.replace(",", ".") if commas else text
+        return self.place.number(text, phrase("cells.cell", column=column))
+
+    def required(self, column: str) -> float:
+        """Return a finite number."""
+        value = self.number(column)
+        if value is None:
+            raise self.error(phrase("error.column", column=column, message=phrase("error.empty")))
+        return value
+
+    def integer(self, column: str, default: int | None = None) -> int:
+        """Return an integer that is not negative; `default` if missing."""
+        text = self.text(column)
+        if not text and default is not None:
+            return default
+        return self.place.whole(text, phrase("cells.cell", column=column))
 
 
 @dataclass(frozen=True)
@@ -77,6 +111,17 @@ class ColumnTable:
     def headings(self) -> list[tuple[str, str]]:
         """Internal name and name in the file of each column."""
         return list(zip(self.columns, self.own or self.columns, strict=True))
+
+    @property
+    def rows(self) -> Iterator[TableRow]:
+        """The rows of a table of :func:`photogram.io.delimited.read_records`."""
+        return map(self.at, range(self.count))
+
+    @property
+    def comments(self) -> list[Place]:
+        """The comments of a text file."""
+        lines = enumerate(self._lines, 1)
+        return [Place(self.path, row, line) for row, line in lines if line.lstrip().startswith(COMMENT)]
 
     @cached_property
     def _lines(self) -> list[str]:

@@ -8,6 +8,7 @@ result and the location of every cell.
 from __future__ import annotations
 
 import codecs
+import csv
 import itertools
 import re
 from collections import deque
@@ -21,17 +22,17 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io.column_table import ColumnTable, Names, merged
-from photogram.io.files import read_beginning, read_text, reading
+from photogram.io.column_table import COMMENT, ColumnTable, Names, merged
+from photogram.io.files import read_beginning, read_lines, read_text, reading
 from photogram.io.places import Place
-from photogram.io.rows import DELIMITERS, LONGEST_RECORD, cells
 from photogram.words import Phrase, phrase
 
+DELIMITERS = ("\t", ";", ",", "|")  # Possible delimiters in a header, in order of priority
+LONGEST_RECORD = 100_000  # Characters of a record; the module `csv` rejects cells above 131,072
 LARGE = 1 << 16  # Size (bytes) of a table above which the extension module reads it
 PIECE = 1 << 22  # Bytes of a large table per read
 BATCH = 1 << 25  # Approximate bytes of a batch
 ROW = 1 << 5  # Bytes of a row of Parquet in a batch
-COMMENT = "#"
 TITLES = 30  # Number of lines below titles that are searched for a header
 NAMELESS = "?"  # The first column if each row has one cell more than the header
 Spelling = Callable[[Sequence[str]], Sequence[str]]
@@ -122,6 +123,49 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
         return Place(path, first), tuple(columns), tuple(columns), _delimiter(sample)
 
     return next(_read(path, header, numbers, None))
+
+
+def read_records(path: Path, *, spelling: Spelling = tuple, ragged: bool = False) -> ColumnTable:
+    """Read a table of texts whose first line names the columns.
+
+    Lines without content are skipped. If `ragged` is True, cells may be missing at the end of a line.
+    `spelling` returns the names of all columns from those in the file.
+    """
+    lines = [line if line.strip(" \t,;|") else "" for line in read_lines(path)]
+    head, delimiter = _head(path, "\n".join(lines), (), spelling, None)
+    columns = _named(head, _split(head, delimiter), spelling)
+    assert head.record is not None
+    rows, records = _by_lines(path, lines, head.record, columns, delimiter, (), ragged=ragged)
+    cells = {name: [row[k] for row in rows] for k, name in enumerate(columns)}
+    return ColumnTable(path, head, columns, len(rows), cells, records, delimiter)
+
+
+def renaming(aliases: Mapping[str, Collection[str]]) -> Spelling:
+    """Return a spelling that renames columns by their first alias, in small letters."""
+
+    def spelling(names: Sequence[str]) -> Sequence[str]:
+        found, lowered = list(names), [name.casefold() for name in names]
+        for column, others in aliases.items():
+            if column not in found and (own := next((each for each in others if each in lowered), None)):
+                found[lowered.index(own)] = column
+        return found
+
+    return spelling
+
+
+def cells(place: Place, delimiter: str = ",", *, blanks: bool = False) -> list[str]:
+    """Split a record at a delimiter, except inside quotation marks.
+
+    `blanks`: whether blanks may precede quotation marks.
+    """
+    text = place.text or ""
+    if len(text) > LONGEST_RECORD:
+        raise place.error(phrase("error.too-long", length=len(text), most=LONGEST_RECORD))
+    try:
+        row = next(csv.reader([text], delimiter=delimiter, skipinitialspace=blanks))
+    except csv.Error as error:
+        raise place.error(phrase("error.parse", format="CSV", reason=str(error))) from None
+    return [cell.strip() for cell in row]
 
 
 _Header = tuple[Place, tuple[str, ...], tuple[str, ...], str]
@@ -228,6 +272,8 @@ def _by_lines(
     columns: Sequence[str],
     delimiter: str,
     numbers: Collection[str],
+    *,
+    ragged: bool = False,
 ) -> tuple[list[list[str]], list[int]]:
     """Split the lines below a header into rows of equal width.
 
@@ -241,6 +287,7 @@ def _by_lines(
             continue
         place = Place(path, record, line)
         cells = _split(place, delimiter)
+        cells += [""] * (width - len(cells)) if ragged else []
         if len(cells) != width:
             # A delimiter at the end of every line produces an additional empty cell.
             if len(cells) == width + 1 and not cells[-1]:

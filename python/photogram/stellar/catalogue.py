@@ -12,7 +12,8 @@ import numpy as np
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io.rows import Row, read_rows
+from photogram.io.column_table import TableRow
+from photogram.io.delimited import read_records, renaming
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import ARCSEC
 from photogram.words import phrase
@@ -111,19 +112,21 @@ class Catalogue:
             If the file cannot be read, if a column is missing, if a value is invalid, or if a star is
             repeated. The message names the record.
         """
-        rows = read_rows(path, ("id", "ra_deg", "dec_deg", "magnitude"), _ALIASES)
-        first: dict[str, Row] = {}
+        given = read_records(path, spelling=renaming(_ALIASES), ragged=True)
+        given.require("id", "ra_deg", "dec_deg", "magnitude")
+        rows = list(given.rows)
+        first: dict[str, TableRow] = {}
         for row in rows:
-            name = row.cells.get("id", "")
+            name = row.text("id")
             if first.setdefault(name, row) is not row:
-                raise row.place.error(phrase("error.repeated", kind="star", name=name))
+                raise row.error(phrase("error.repeated", kind="star", name=name))
             if not abs(row.required("dec_deg")) <= 90:
                 limits = phrase("error.range", low=-90, high=90, value=row.required("dec_deg"))
-                raise row.place.error(phrase("error.column", column="dec_deg", message=limits))
-        values = [[row.required(name) if name in row.cells else 0.0 for name in _COLUMNS[1:]] for row in rows]
+                raise row.error(phrase("error.column", column="dec_deg", message=limits))
+        values = [[row.required(name) if name in given else 0.0 for name in _COLUMNS[1:]] for row in rows]
         table = np.array(values, float).reshape(-1, 6)
         return cls(
-            tuple(row.cells.get("id", "") for row in rows),
+            tuple(row.text("id") for row in rows),
             np.radians(table[:, :2]),
             _MAS * table[:, 2:4],
             _MAS * table[:, 4],

@@ -13,9 +13,9 @@ import numpy as np
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.io.column_table import TableRow
+from photogram.io.delimited import read_records, renaming
 from photogram.io.places import Place, at_place
-from photogram.io.rows import Row
-from photogram.io.rows import Table as ImageTable
 from photogram.io.toml import Document, KeyPlace, Table, read_document
 from photogram.messages import unknown_name
 from photogram.show.angles import ARCSEC
@@ -216,29 +216,30 @@ class _Exposures:
     def __init__(self, tables: list[Table], file: Path, blind: bool) -> None:
         self.tables, self.blind = tables, blind
         self.names = tuple(table.word("name") for table in tables)
-        self.rows: dict[str, list[Row]] = {name: [] for name in self.names}
+        self.rows: dict[str, list[TableRow]] = {name: [] for name in self.names}
         for table, name in zip(tables, self.names, strict=True):
             if self.names.count(name) > 1:
                 raise table.error("name", phrase("error.repeated", kind="exposure", name=name))
         # A table of one exposure may omit its name.
         single = self.names[0] if len(self.names) == 1 else ""
-        images = ImageTable.read(file, ragged=True)
+        images = read_records(file, ragged=True)
         lowered = {name.casefold() for name in images.columns}
         pairs = {name: f"y{name[1:]}" for name in _FIRST_PIXELS}
         heading = next((name for name in pairs if {name, pairs[name]} <= lowered), "x_px")
         self.offset = _FIRST_PIXELS["x_px"] - _FIRST_PIXELS[heading]
-        images = images.renamed({"x_px": [heading], "y_px": [pairs[heading]], **_ALIASES})
+        aliases = {"x_px": [heading], "y_px": [pairs[heading]], **_ALIASES}
+        images = images.renamed(dict(zip(images.columns, renaming(aliases)(images.columns), strict=True)))
         images.require(*(() if single else ("exposure",)), "x_px", "y_px")
-        for row in images.rows():
-            name = row.cells.get("exposure", "") or single
+        for row in images.rows:
+            name = row.text("exposure") or single
             if name not in self.rows:
-                raise row.place.error(unknown_name("exposure", name, self.names))
+                raise row.error(unknown_name("exposure", name, self.names))
             self.rows[name].append(row)
 
     @property
     def named(self) -> Set[str]:
         """Stars named by images."""
-        return {star_key(row.cells.get("star", "")) for rows in self.rows.values() for row in rows} - {""}
+        return {star_key(row.text("star")) for rows in self.rows.values() for row in rows} - {""}
 
     def read(
         self, catalogue: Catalogue, frame: tuple[float, float], site: Site, earth: Earth
@@ -251,7 +252,7 @@ class _Exposures:
             with at_place(KeyPlace(table, "utc")):
                 epoch(utc)
             stars = None
-            if any(row.cells.get("star") for row in rows):
+            if any(row.text("star") for row in rows):
                 stars = np.array([_star(row, index) for row in rows], np.int64)
             if self.blind:
                 attitude = np.full(3, np.nan) if stars is not None else np.zeros(3)
@@ -261,26 +262,26 @@ class _Exposures:
             yield Exposure(utc, xy, attitude, stars)
 
 
-def _by_magnitude(rows: list[Row]) -> list[Row]:
+def _by_magnitude(rows: list[TableRow]) -> list[TableRow]:
     magnitudes = [row.number("magnitude") for row in rows]
     faint = [math.inf if magnitude is None else magnitude for magnitude in magnitudes]
     return [rows[i] for i in sorted(range(len(rows)), key=lambda i: faint[i])]
 
 
-def _image(row: Row, frame: tuple[float, float], offset: float) -> tuple[float, float]:
+def _image(row: TableRow, frame: tuple[float, float], offset: float) -> tuple[float, float]:
     xy = row.required("x_px") + offset, row.required("y_px") + offset
     if not all(-size <= value <= 2 * size for value, size in zip(xy, frame, strict=True)):
-        raise row.place.error(phrase("stars.outside", x=xy[0], y=xy[1], width=frame[0], height=frame[1]))
+        raise row.error(phrase("stars.outside", x=xy[0], y=xy[1], width=frame[0], height=frame[1]))
     return xy
 
 
-def _star(row: Row, index: dict[str, int]) -> int:
-    name = row.cells.get("star", "")
+def _star(row: TableRow, index: dict[str, int]) -> int:
+    name = row.text("star")
     if not name:
         return -1
     found = index.get(name, index.get(star_key(name), -1))
     if found < 0:
-        raise row.place.error(phrase("stars.not-in-catalogue", star=name))
+        raise row.error(phrase("stars.not-in-catalogue", star=name))
     return found
 
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Bools, Floats
+from photogram.io.column_table import TableRow
+from photogram.io.delimited import read_records
 from photogram.io.places import Place, at_place
-from photogram.io.rows import Row, read_rows
 from photogram.io.toml import Document, Table, read_document
 from photogram.lazy_dataclasses import fields
 from photogram.show.angles import ARCSEC
@@ -86,20 +87,20 @@ def _problem(document: Document) -> Problem:
     unit = camera.positive("prior_unit_m") if "prior_unit_m" in camera else None
     initial, fixed = _camera(camera, known)
     stars, images = document.table("stars"), document.table("images")
-    star_rows = read_rows(stars.path("file"), ("star", "ra_rad", "dec_rad"))
-    image_rows = read_rows(images.path("file"), ("star", "point", "x_m", "y_m"))
+    star_rows = _rows(stars, "star", "ra_rad", "dec_rad")
+    image_rows = _rows(images, "star", "point", "x_m", "y_m")
     station = replace(site(document.table("station")), effects=effects(document.optional("places")))
-    ids = tuple(row.cells.get("star", "") for row in star_rows)
+    ids = tuple(row.text("star") for row in star_rows)
     place: dict[str, int] = {}
     for index, row in enumerate(star_rows):
         if place.setdefault(star_key(ids[index]), index) != index:
-            raise row.place.error(phrase("error.repeated", kind="star", name=ids[index]))
+            raise row.error(phrase("error.repeated", kind="star", name=ids[index]))
         if not _is_landmark(row) and abs(row.required("dec_rad")) > math.pi / 2:
-            raise row.place.error(phrase("stars.declination", star=ids[index], value=row.required("dec_rad")))
+            raise row.error(phrase("stars.declination", star=ids[index], value=row.required("dec_rad")))
     for row in image_rows:
-        name = row.cells.get("star", "")
+        name = row.text("star")
         if star_key(name) not in place:
-            raise row.place.error(phrase("stars.unlisted", star=name))
+            raise row.error(phrase("stars.unlisted", star=name))
     star_weight, image_weight = _common_weight(stars), _common_weight(images)
     places, weights = _stars(star_rows, star_weight, station)
     options = _options(document)
@@ -112,11 +113,11 @@ def _problem(document: Document) -> Problem:
     problem = Problem(
         site=station,
         star_ids=ids,
-        star_names=tuple(row.cells.get("name") or row.cells.get("star", "") for row in star_rows),
+        star_names=tuple(row.text("name") or row.text("star") for row in star_rows),
         star_places=places,
         star_weights=weights,
-        image_points=tuple(row.cells.get("point", "") for row in image_rows),
-        image_stars=np.array([place[star_key(row.cells.get("star", ""))] for row in image_rows], np.int64),
+        image_points=tuple(row.text("point") for row in image_rows),
+        image_stars=np.array([place[star_key(row.text("star"))] for row in image_rows], np.int64),
         image_groups=np.array(groups, np.int64),
         image_xy=_pairs(image_rows, "x_m", "y_m"),
         image_weights=_matrices([_weight(row, image_weight, _IMAGE_WEIGHT) for row in image_rows]),
@@ -174,7 +175,14 @@ def _common_weight(table: Table) -> list[float] | None:
     return table.numbers("weight", 3) if "weight" in table else None
 
 
-def _pairs(rows: list[Row], first: str, second: str) -> Floats:
+def _rows(table: Table, *columns: str) -> list[TableRow]:
+    """Return the rows of the file of a table, with required columns."""
+    found = read_records(table.path("file"), ragged=True)
+    found.require(*columns)
+    return list(found.rows)
+
+
+def _pairs(rows: list[TableRow], first: str, second: str) -> Floats:
     return np.array([[row.required(first), row.required(second)] for row in rows]).reshape(-1, 2)
 
 
@@ -182,17 +190,17 @@ def _matrices(weights: list[Floats]) -> Floats:
     return np.array(weights).reshape(-1, 2, 2)
 
 
-def _weight(row: Row, common: list[float] | None, names: tuple[str, str, str]) -> Floats:
+def _weight(row: TableRow, common: list[float] | None, names: tuple[str, str, str]) -> Floats:
     first, second, cross = common if common is not None else [row.number(name) or 0.0 for name in names]
     return np.array([[first, cross], [cross, second]])
 
 
-def _is_landmark(row: Row) -> bool:
+def _is_landmark(row: TableRow) -> bool:
     """Return whether a row has a terrestrial direction instead of a star position."""
-    return bool(row.cells.get("azimuth_north_deg"))
+    return bool(row.text("azimuth_north_deg"))
 
 
-def _stars(rows: list[Row], common: list[float] | None, station: Site) -> tuple[Floats, Floats]:
+def _stars(rows: list[TableRow], common: list[float] | None, station: Site) -> tuple[Floats, Floats]:
     places, weights = [], []
     for row in rows:
         weight = _star_weight(row, common)
@@ -209,14 +217,14 @@ def _stars(rows: list[Row], common: list[float] | None, station: Site) -> tuple[
     return np.array(places).reshape(-1, 2), _matrices(weights)
 
 
-def _star_weight(row: Row, common: list[float] | None) -> Floats:
-    if row.cells.get("unknown", "") in ("1", "true", "yes"):
+def _star_weight(row: TableRow, common: list[float] | None) -> Floats:
+    if row.text("unknown") in ("1", "true", "yes"):
         return np.zeros((2, 2))
     return _weight(row, common, _STAR_WEIGHT)
 
 
 def _groups_and_times(
-    table: Table, rows: Sequence[Row], landmarks: Set[str], sidereal: Callable[[str], float]
+    table: Table, rows: Sequence[TableRow], landmarks: Set[str], sidereal: Callable[[str], float]
 ) -> tuple[list[int], list[float]]:
     """Return groups and sidereal times of images.
 
@@ -226,21 +234,21 @@ def _groups_and_times(
     corrections = table.numbers("time_corrections_rad", 3, [0.0, 0.0, 0.0])
     groups, times = [], []
     for row in rows:
-        name, digits = row.cells.get("orientation", ""), row.cells.get("point", "").removeprefix("-")
+        name, digits = row.text("orientation"), row.text("point").removeprefix("-")
         if name:
             if name not in GROUPS:
                 message = phrase("error.choice", value=name, names=GROUPS)
-                raise row.place.error(phrase("error.column", column="orientation", message=message))
+                raise row.error(phrase("error.column", column="orientation", message=message))
             group = GROUPS.index(name)
         elif digits.isascii() and digits.isdigit():
             # The trail is the last three digits.
             trail = int(digits[-3:])
             group = 0 if trail < post else 1 if trail < event else 2
         else:
-            raise row.place.error(phrase("stars.no-orientation", point=row.cells.get("point", "")))
-        if star_key(row.cells.get("star", "")) in landmarks:
+            raise row.error(phrase("stars.no-orientation", point=row.text("point")))
+        if star_key(row.text("star")) in landmarks:
             time = HOUR
-        elif utc := row.cells.get("utc", ""):
+        elif utc := row.text("utc"):
             with at_place(row.place):
                 time = sidereal(utc) + corrections[group]
         else:

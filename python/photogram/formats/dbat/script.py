@@ -19,9 +19,9 @@ from photogram.formats.project import Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import cells
 from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place, at_place, image_size, one_word, positive
-from photogram.io.rows import cells
 from photogram.messages import Message
 from photogram.words import phrase
 
