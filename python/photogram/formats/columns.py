@@ -190,21 +190,21 @@ def settled(
     if name == "control":
         table = _with_roles(table, columns, messages)
     table = in_units(table, units, name, messages, columns.headings)
-    ready = dict(table.ready)
+    cells = dict(table.cells)
     for column, own in table.headings:
         heading = columns.headings.get(column, own)
         if column in ("x", "y") and is_angular(own):
             letters = "NS" if column == "x" else "EW"
-            ready[column] = table.numbers(column, read=partial(_on_axis, letters))
+            cells[column] = table.numbers(column, read=partial(_on_axis, letters))
         if column == "sd_xy":
-            ready["sd_x"] = ready["sd_y"] = table.numbers(column, infinite=True)
+            cells["sd_x"] = cells["sd_y"] = table.numbers(column, infinite=True)
         elif column in ("x", "y", "z") and heading.startswith("-") and heading.lower() != own:
-            ready[column] = -table.numbers(column)
-    wide = tuple(each for each in ("sd_x", "sd_y") if each in ready and each not in table.columns)
+            cells[column] = -table.numbers(column)
+    wide = tuple(each for each in ("sd_x", "sd_y") if each in cells and each not in table.columns)
     check_unread(table, columns, known, name, messages)
     return replace(
         table,
-        ready=ready,
+        cells=cells,
         columns=(*table.columns, *wide),
         own=(*(table.own or table.columns), *("" for _ in wide)),
     )
@@ -218,7 +218,7 @@ def in_units(
     headings: Mapping[str, str] = MappingProxyType({}),
 ) -> ColumnTable:
     """Return a table in internal units, by units and factors of its headings."""
-    ready, remarks = dict(table.ready), list[Phrase]()
+    cells, remarks = dict(table.cells), list[Phrase]()
     for column, own in table.headings:
         heading = headings.get(column, own)
         heading = heading if units_of(heading) else own
@@ -246,13 +246,13 @@ def in_units(
             factor /= coverage
             parts.append(phrase("columns.divided", k=coverage))
         if factor != 1.0:
-            ready[column] = scaled(table.numbers(column, infinite=column.startswith("sd")), factor)
+            cells[column] = scaled(table.numbers(column, infinite=column.startswith("sd")), factor)
         if parts:
             remarks.append(phrase("columns.converted", heading=own, column=column, parts=parts))
     remark = Message(phrase("columns.units", table=name, parts=remarks), table.path)
     if remarks and remark not in messages:
         messages.append(remark)
-    return replace(table, ready=ready)
+    return replace(table, cells=cells)
 
 
 def _has_notes(column: str, own: str, word: str) -> bool:
@@ -338,7 +338,7 @@ def _role_columns(table: ColumnTable, columns: Columns) -> list[str]:
     return [
         column
         for column in table.columns
-        if column and column not in columns.ignored and column != "point" and column in table.cells
+        if column not in ("", "point", *columns.ignored) and isinstance(table.cells[column], list)
         if "check" in {_role(cell, columns) for cell in table.texts(column)}
     ]
 
@@ -405,8 +405,8 @@ def _unread(table: ColumnTable, known: Collection[str]) -> list[tuple[str, str]]
 
 
 def _is_numeric(table: ColumnTable, column: str) -> bool:
-    if column not in table.cells:
-        return isinstance(table.ready.get(column), np.ndarray)
+    if not isinstance(own := table.cells.get(column), list):
+        return isinstance(own, np.ndarray)
     cells = {cell for cell in table.texts(column) if cell}
     return bool(cells) and all(_is_number(cell) for cell in cells)
 

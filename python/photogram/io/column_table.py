@@ -43,6 +43,9 @@ class Names:
         return Names([self.names[code] for code in kept.tolist()], codes.reshape(-1), self.distinct)
 
 
+Cells = Sequence[str] | Names | Floats
+
+
 class TableRow(NamedTuple):
     """A row, whose location is found on demand."""
 
@@ -61,7 +64,7 @@ class TableRow(NamedTuple):
     def text(self, column: str) -> str:
         """Return a cell; empty if the column is missing."""
         cells = self.table.cells.get(column)
-        return "" if cells is None else cells[self.row]
+        return "" if cells is None else cells[self.row]  # type: ignore[index, return-value]
 
     def number(self, column: str) -> float | None:
         """Return a finite number; None if the cell is blank or the column is missing."""
@@ -95,12 +98,11 @@ class ColumnTable:
     head: Place  # Record with the column names
     columns: tuple[str, ...]  # Column names in small letters
     count: int  # Number of rows
-    cells: Mapping[str, Sequence[str]]  # Columns of text
+    cells: Mapping[str, Cells]  # Columns: texts, or already numbers or names
     records: Sequence[int]  # Number of the record of each row
     delimiter: str = ","
-    # Columns already read as numbers or names
-    ready: Mapping[str, Floats | Names] = field(default_factory=dict)
-    numeric: frozenset[str] = frozenset()  # Columns whose cells define the number format
+    # Number format of columns of texts that have it in common
+    marks: Mapping[str, Marks] = field(default_factory=dict)
     # Names of the columns in the file, in small letters; empty for unnamed ones
     own: tuple[str, ...] = ()
 
@@ -126,11 +128,6 @@ class ColumnTable:
     @cached_property
     def _lines(self) -> list[str]:
         return [] if self.path.suffix == ".parquet" else read_text(self.path).split("\n")
-
-    @cached_property
-    def _marks(self) -> Marks:
-        numbers = [cells for name, cells in self.cells.items() if name in self.numeric]
-        return marks_of((cell for column in numbers for cell in column), self.delimiter)
 
     def place(self, row: int) -> Place:
         """Return the location of a row."""
@@ -161,37 +158,34 @@ class ColumnTable:
         """Return the table with new names of some columns."""
         columns = tuple(names.get(column, column) for column in self.columns)
         cells = {names.get(column, column): own for column, own in self.cells.items()}
-        ready = {names.get(column, column): own for column, own in self.ready.items()}
-        return replace(self, columns=columns, cells=cells, ready=ready)
+        return replace(self, columns=columns, cells=cells)
 
     def some(self, rows: Sequence[int]) -> ColumnTable:
         """Return the table with selected rows, in this order."""
-        cells = {column: [own[row] for row in rows] for column, own in self.cells.items()}
-        ready = {
-            column: own.some(rows) if isinstance(own, Names) else own[rows]
-            for column, own in self.ready.items()
-        }
+        cells: dict[str, Cells] = {}
+        for column, own in self.cells.items():
+            if isinstance(own, Names):
+                cells[column] = own.some(rows)
+            else:
+                cells[column] = own[rows] if isinstance(own, np.ndarray) else [own[row] for row in rows]
         records = [self.records[row] for row in rows]
-        return replace(self, count=len(rows), cells=cells, ready=ready, records=records)
+        return replace(self, count=len(rows), cells=cells, records=records)
 
     def joined(self, other: ColumnTable) -> ColumnTable:
         """Return the table with the rows of another batch of its file."""
-        cells = {column: [*own, *other.cells[column]] for column, own in self.cells.items()}
-        ready: dict[str, Floats | Names] = {}
-        for column, own in self.ready.items():
-            more = other.ready[column]
-            if isinstance(own, Names) and isinstance(more, Names):
-                codes = np.append(own.rows, more.rows + len(own.names))
-                ready[column] = merged(codes, [*own.names, *more.names])
+        cells: dict[str, Cells] = {}
+        for column, own in self.cells.items():
+            more = other.cells[column]
+            if isinstance(own, np.ndarray):
+                cells[column] = np.append(own, more)  # type: ignore[arg-type]
             else:
-                ready[column] = np.append(own, more)  # type: ignore[arg-type]
+                cells[column] = [*self.texts(column), *other.texts(column)]
         records = [*self.records, *other.records]
-        return replace(self, count=self.count + other.count, cells=cells, ready=ready, records=records)
+        return replace(self, count=self.count + other.count, cells=cells, records=records)
 
     def with_texts(self, column: str, texts: Sequence[str]) -> ColumnTable:
         """Return the table with new texts in a column."""
-        ready = {name: own for name, own in self.ready.items() if name != column}
-        return replace(self, cells={**self.cells, column: texts}, ready=ready)
+        return replace(self, cells={**self.cells, column: texts})
 
     def require(self, *columns: str) -> None:
         """Reject a table without these columns."""
@@ -200,9 +194,8 @@ class ColumnTable:
 
     def names(self, column: str) -> Names:
         """Return a column of names, without outer blanks."""
-        found = self.ready.get(column)
-        if not isinstance(found, Names):
-            found = factorised(self._cells(column))
+        cells = self._texts(column)
+        found = cells if isinstance(cells, Names) else factorised(cells)
         if found.distinct or _all_apart(found.names):
             return found
         for name in found.names:
@@ -229,19 +222,19 @@ class ColumnTable:
 
     def texts(self, column: str, default: str = "") -> list[str]:
         """Return a column of text, without outer blanks; empty cells have the default."""
-        found = self.ready.get(column)
-        if isinstance(found, Names):
-            return [found.names[row] or default for row in found.rows]
         if column not in self.columns:
             return [default] * self.count
-        return [cell or default for cell in self._cells(column)]
+        found = self._texts(column)
+        if isinstance(found, Names):
+            return [found.names[row] or default for row in found.rows]
+        return [cell or default for cell in found]
 
-    def _cells(self, column: str) -> Sequence[str]:
-        """Return text cells of a column; reject Parquet numbers."""
-        numbers = self.ready.get(column)
-        if numbers is None:
-            return self.cells[column]
-        if not np.isnan(numbers).all():  # type: ignore[arg-type]
+    def _texts(self, column: str) -> Sequence[str] | Names:
+        """Return the texts of a column; reject numbers."""
+        cells = self.cells[column]
+        if not isinstance(cells, np.ndarray):
+            return cells
+        if not np.isnan(cells).all():
             raise self.head.error(phrase("cells.decimals", column=column))
         return [""] * self.count
 
@@ -257,7 +250,7 @@ class ColumnTable:
 
         `infinite` permits `inf`; `read` replaces :func:`finite_number`.
         """
-        found = self.ready.get(column)
+        found = self.cells.get(column)
         if isinstance(found, np.ndarray):
             # The file contains numbers; NaN is an empty cell.
             if not infinite and np.isinf(found).any():
@@ -270,7 +263,7 @@ class ColumnTable:
             return np.full(self.count, default)
         convert = finite_number if read is None else read
         cells = self.texts(column)
-        marks = self._marks if column in self.numeric else marks_of(cells, self.delimiter)
+        marks = self.marks.get(column) or marks_of(cells, self.delimiter)
         values = np.empty(self.count)
         for row, cell in enumerate(cells):
             if not cell:

@@ -22,8 +22,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io.column_table import COMMENT, ColumnTable, Names, merged
+from photogram.io.column_table import COMMENT, Cells, ColumnTable, Names, merged
 from photogram.io.files import read_beginning, read_lines, read_text, reading
+from photogram.io.numbers import marks_of
 from photogram.io.places import Place
 from photogram.words import Phrase, phrase
 
@@ -196,8 +197,10 @@ def _read(
     if rows and len(rows[0]) > len(columns):
         own, columns = ("", *own), (NAMELESS, *columns)
     cells = {name: [row[k] for row in rows] for k, name in enumerate(columns) if name}
-    numeric = frozenset(numbers).intersection(columns)
-    yield ColumnTable(path, head, columns, len(rows), cells, records, delimiter, {}, numeric, own)
+    numeric = [name for name in cells if name in numbers]
+    marks = marks_of((cell for name in numeric for cell in cells[name]), delimiter)
+    formats = dict.fromkeys(numeric, marks)
+    yield ColumnTable(path, head, columns, len(rows), cells, records, delimiter, formats, own)
 
 
 def _head(
@@ -356,34 +359,34 @@ def _of_reader(path: Path, header: _Header, reader: _photocore.TableReader, firs
     """Return the table of a reader, from its first record."""
     head, own, columns, delimiter = header
     contents = dict(zip(columns, reader.columns(), strict=True))
-    ready = _decoded(contents, "utf-8") or _decoded(contents, "cp1252")
-    if ready is None:
+    cells = _decoded(contents, "utf-8") or _decoded(contents, "cp1252")
+    if cells is None:
         raise _IrregularError
-    values = next(iter(ready.values()))
+    values = next(iter(cells.values()))
     count = len(values.rows if isinstance(values, Names) else values)
     if not count:
         raise _IrregularError
-    return ColumnTable(path, head, columns, count, {}, range(first, first + count), delimiter, ready, own=own)
+    return ColumnTable(path, head, columns, count, cells, range(first, first + count), delimiter, own=own)
 
 
 def _decoded(
     contents: Mapping[str, Floats | tuple[bytes, Indices, bool]], encoding: str
-) -> dict[str, Floats | Names] | None:
+) -> dict[str, Cells] | None:
     """Return columns with decoded names; None for another encoding."""
-    ready: dict[str, Floats | Names] = {}
+    cells: dict[str, Cells] = {}
     for column, content in contents.items():
         if isinstance(content, np.ndarray):
-            ready[column] = content
+            cells[column] = content
             continue
         text, rows, distinct = content
         try:
             names = text.decode(encoding).split("\n")[:-1]
         except UnicodeDecodeError:
             return None
-        ready[column] = (
+        cells[column] = (
             Names(names, rows, distinct) if text.isascii() else merged(rows, list(map(str.strip, names)))
         )
-    return ready
+    return cells
 
 
 def _parquet(
@@ -425,8 +428,7 @@ def _of_arrow(
 
     head, own = Place(path), tuple(name.strip().lower() for name in table.column_names)
     columns = _named(head, own, spelling)
-    ready: dict[str, Floats | Names] = {}
-    cells: dict[str, Sequence[str]] = {}
+    cells: dict[str, Cells] = {}
     for name, column in zip(columns, table.columns, strict=True):
         is_number = types.is_floating(column.type) or types.is_integer(column.type)
         is_text = types.is_string(column.type) or types.is_large_string(column.type)
@@ -435,10 +437,10 @@ def _of_arrow(
         if is_text or digits or types.is_dictionary(column.type):
             texts, codes = coded(column)
             empty = [""] * bool((codes < 0).any())  # The last name
-            ready[name] = merged(codes % (len(texts) + 1), [*(str(text).strip() for text in texts), *empty])
+            cells[name] = merged(codes % (len(texts) + 1), [*(str(text).strip() for text in texts), *empty])
         elif is_number:
-            ready[name] = column.to_numpy().astype(float)
+            cells[name] = column.to_numpy().astype(float)
         else:
             cells[name] = ["" if each is None else str(each) for each in column.to_pylist()]
     records = range(first, first + table.num_rows)
-    return ColumnTable(path, head, columns, table.num_rows, cells, records, ready=ready, own=own)
+    return ColumnTable(path, head, columns, table.num_rows, cells, records, own=own)

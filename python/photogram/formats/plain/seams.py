@@ -90,10 +90,10 @@ def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
     found = table.some([*range(table.count), *more])
     cells = dict(found.cells)
     for name in (each for each in table.columns if each.startswith("sd_")):
-        if name in cells:
-            cells[name] = [*cells[name][: table.count], *[""] * len(more)]
+        if isinstance(own := table.cells[name], np.ndarray):
+            cells[name] = np.append(own, np.full(len(more), np.nan))
         else:
-            found.ready[name][table.count :] = np.nan  # type: ignore[index]
+            cells[name] = [*table.texts(name), *[""] * len(more)]
     halves = [seams[texts[row]].half for row in more]
     return replace(found, cells=cells).with_texts("photo", [*texts, *halves])
 
