@@ -18,7 +18,7 @@ CATALOGUE = frozenset(
         *("control-point", "control-heights", "control-shift", "control-set", "control-scale"),
         *("control-rotation", "gnss-heights", "gnss-shift", "gnss-set", "gnss-drift", "time-offset"),
         *("lever-arm", "boresight", "camera-f", "camera-point", "camera-term", "readout-time", "scale"),
-        *("bending", "observation"),
+        *("bending", "observation", "gnss-next", "gnss-previous", "camera-affinity", "camera-f-strip"),
     }
 )
 """Codes of all hypotheses that the golden network with observed attitudes permits."""
@@ -91,7 +91,7 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
             found[tested["code"][place], place].append(tested["probability"][place])
     codes = {code for code, _ in found}
     assert codes <= CATALOGUE
-    assert len(codes) >= (len(CATALOGUE) if photos > 10 else 15), CATALOGUE - codes
+    assert len(codes) >= (len(CATALOGUE) if photos > 10 else 19), CATALOGUE - codes
     assert (freedom < 50) is (photos < 10)
     least = min(kstest(values, "uniform").pvalue for values in found.values())
     assert least > 0.01 / len(found), (least, len(found))

@@ -56,7 +56,9 @@ from photogram.results.result import Result
 from photogram.results.snooping_log import Aside, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped, recorded
-from photogram.statistics.findings import Tested
+from photogram.results.type_factors import type_factors
+from photogram.statistics.findings import IMAGES, Tested
+from photogram.statistics.weight_rules import needed, wrong_types
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -160,8 +162,12 @@ def snoop_block(
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
         parts = trial, tests, facts, point_axes(block), standing.sum_and_freedom, MAX_BIAS_RATIO
-        found = hypotheses(*parts, known=options.is_known)
-        return found.common_errors()
+        found, known = hypotheses(*parts, known=options.is_known), options.is_known
+        if errors := found.common_errors():
+            return errors
+        # Factors of images are estimated, and need no stop.
+        types = type_factors(trial, tests, MAX_BIAS_RATIO, standing.sum_and_freedom) if known else []
+        return [needed(each) for each in wrong_types(types, found.odds()) if each.group != IMAGES]
 
     try:
         trial = block_trial(block, None, core, threads, control=control)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from photogram.messages import Message
-from photogram.results.findings import type_factors
 from photogram.results.result import Result
-from photogram.results.tables import Tests
 from photogram.statistics import global_test
 from photogram.words import phrase
 
@@ -19,8 +17,8 @@ def weight_hints(result: Result) -> list[Message]:
     With v'Pv the sum of squares of a type and r the sum of its redundancy numbers, the factor is the root of
     v'Pv / r. A type is reported if v'Pv and the median of the standardized residuals exceed their limits.
     """
-    found = []
-    for each in type_factors(Tests(result), result.block.image_unit):
+    found, summary = [], result.reliability_summary
+    for each in () if summary is None else summary.types:
         enough = each.redundancy >= LEAST_REDUNDANCY
         test = global_test(each.squares, round(each.redundancy)) if enough else None
         if test is None:

@@ -19,8 +19,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
 from photogram.results.tables import Tests
-from photogram.statistics.evidence import MEDIAN
-from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text, TypeFactor
+from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
@@ -50,7 +49,6 @@ def network_findings(
     tests, summary = Tests(result), result.reliability_summary
     lost = None if summary is None else summary.downweighted
     test = _robust_test(result) if result.loss else result.global_test
-    rejected = test is not None and (test.rejected_high or test.rejected_low)
     assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
     rivals, known = largest_odds(fixed), result.KNOWN and summary is not None
@@ -62,7 +60,7 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=type_factors(tests, result.given.image_unit, images=rejected) if known else [],
+        types=list(summary.types) if known and summary is not None else [],
         odds=-math.inf if summary is None else summary.hypotheses.odds(rivals),
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
@@ -76,24 +74,6 @@ def network_findings(
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )
-
-
-def type_factors(tests: Tests, unit: str, *, images: bool = True) -> list[TypeFactor]:
-    """Return the sums of squares and redundancy numbers of observed types; `unit` is that of `images`."""
-    found = []
-    for each in tests.normal if images else tests.normal[1:]:
-        for kind, components in each.groups.items():
-            observed = each.observed[:, components]
-            values = each.residuals, each.sd, each.redundancy, each.values
-            residuals, sd, redundancy, w = (own[:, components][observed] for own in values)
-            if observed.any():
-                equal = each.type == "image" and np.ptp(sd) <= 1e-9 * sd[0]
-                given = float(sd[0]) if equal else math.nan
-                squares, r = float(np.sum((residuals / sd) ** 2)), float(np.nansum(redundancy))
-                tested = np.abs(w[np.isfinite(w)])
-                median = float(np.median(tested)) / MEDIAN if tested.size else math.nan
-                found.append(TypeFactor(kind, squares, r, median, given, unit))
-    return found
 
 
 def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:

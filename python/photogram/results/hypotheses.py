@@ -30,7 +30,14 @@ EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise
 DRAWN = 300  # Largest number of points whose changes are stored for plots
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
-OF_CAMERAS = frozenset({"camera-f", "camera-point", "camera-term", "readout-time"})
+OF_CAMERAS = frozenset(
+    {
+        *("camera-f", "camera-f-single", "camera-point", "camera-term", "readout-time"),
+        *("camera-affinity", "camera-radial"),
+    }
+)
+OF_PHOTOS = ("gnss-next", "gnss-previous")  # Positions of other photos: their parameter is 0 or 1
+WHOLE = 0.1  # Standard deviation of this parameter if it is 1
 EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
 ABSURD = 5.0  # Standard deviations of plausible sizes beyond which an error has no plausible size
 ABSURD_PART, UNKNOWN_PART = 0.9, 0.7
@@ -140,9 +147,13 @@ class Hypotheses:
         if self.code[row] == "observation":
             return f" {self.suspects.unit(int(self.suspects.row_starts[self.group[row]]))}".rstrip()
         units = {
-            **dict.fromkeys(("camera-f", "camera-point"), self.suspects.given.image_unit),
+            **dict.fromkeys(
+                ("camera-f", "camera-f-strip", "camera-f-single", "camera-point"),
+                self.suspects.given.image_unit,
+            ),
             **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
             **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
+            **dict.fromkeys(("camera-affinity", "camera-radial", *OF_PHOTOS), ""),
             **dict.fromkeys(("time-offset", "readout-time"), self.times),
         }
         return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()
@@ -377,6 +388,8 @@ def hypotheses(
 
     odds = _log_odds(change(statistic), k, np.maximum(found["observations"], k + 1), count)
     odds -= np.nansum(np.square(estimate / found["plausible"]), axis=1) / 2
+    shares = np.isin(found["code"], OF_PHOTOS)
+    odds[shares] -= np.square((estimate[shares, 0] - 1.0) / WHOLE) / 2
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
     checked = -math.inf if agreement is None else largest_odds([agreement.points])

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from photogram.results.parts import Terms
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
-    from photogram.statistics.findings import Removed
+    from photogram.statistics.findings import Removed, TypeFactor
 
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
 REMARKS = 5  # Number of messages of a `repr`
@@ -249,6 +249,7 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
         from photogram.results.network_trial import LostSupportError, Out
         from photogram.results.reliability import Reliability
         from photogram.results.reliability_summary import reliability_summary
+        from photogram.statistics.weight_rules import wrong_types
 
         weight = "known" if self.KNOWN else "unknown"
         try:
@@ -257,7 +258,7 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
             # Other results remain valid; a network that is singular by rounding has a message already.
             return None
         facts = self._hypothesis_facts()
-        errors, lost = self._evaluated(found, facts), found.downweighted
+        errors, types, lost = *self._evaluated(found, facts), found.downweighted
         if lost is not None and (lost.removed.excessive or lost.unsupported):
             # A common error may be the reason: the loss removes observations that have it.
             trial, level, power = self._trial(), found.level, found.power
@@ -265,18 +266,21 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
             with suppress(LostSupportError, _photocore.BlockError, _photocore.CollectionError):
                 all_ = Reliability(trial, self.covariances, level=level, power=power, unit_weight=weight)
                 # Check points were compared with the robust solution.
-                whole = self._evaluated(all_, facts | {"agreement": None})
-                errors = whole if whole.common() else errors
-        return reliability_summary(found, errors, heights=self.geographic)
+                whole, whole_types = self._evaluated(all_, facts | {"agreement": None})
+                if whole.common() or wrong_types(whole_types, whole.odds()):
+                    errors, types = whole, whole_types
+        return reliability_summary(found, errors, types, heights=self.geographic)
 
-    def _evaluated(self, found: Reliability, facts: Facts) -> Hypotheses:
-        """Evaluate the hypotheses of the catalogue with some facts."""
+    def _evaluated(self, found: Reliability, facts: Facts) -> tuple[Hypotheses, list[TypeFactor]]:
+        """Evaluate the hypotheses of the catalogue with some facts, and standard deviations by type."""
         from photogram.results.hypotheses import hypotheses
+        from photogram.results.type_factors import type_factors
 
         axes = self._terms.point_axes
         standing = found.standing.sum_and_freedom if self.KNOWN else self.sum_and_freedom
         parts = found.trial, found.tests, facts, axes, standing, self.max_bias_ratio
-        return hypotheses(*parts, known=self.KNOWN)
+        types = type_factors(found.trial, found.tests, self.max_bias_ratio, standing) if self.KNOWN else []
+        return hypotheses(*parts, known=self.KNOWN), types
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""

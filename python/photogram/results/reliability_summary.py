@@ -7,7 +7,7 @@ and selected inverse at the adjusted values.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any
 
@@ -20,6 +20,7 @@ from photogram.results.network_trial import NamedSuspects, Standing, Tests
 from photogram.results.reliability import Downweighted, Inseparable, Reliability
 from photogram.show.page import Part, Remarks, about
 from photogram.show.quantity import Quantities, Quantity, Table, column, for_people, members
+from photogram.statistics.findings import TypeFactor
 from photogram.statistics.reliability import TESTABLE
 
 LISTED = 5  # Listed observations of each type
@@ -57,6 +58,7 @@ class ReliabilitySummary:
     hypotheses: Hypotheses  # Errors of sets and single observations, and their effects if undetected
     standing: Standing  # sum of squares and degrees of freedom of the tested observations
     downweighted: Downweighted | None  # observations that a robust loss excludes from the tests
+    types: tuple[TypeFactor, ...]  # agreement of the standard deviations by type
 
     @cached_property
     def listed(self) -> Listed:
@@ -137,16 +139,19 @@ class ReliabilitySummary:
         }
 
 
-def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: bool) -> ReliabilitySummary:
+def reliability_summary(
+    found: Reliability, hypotheses: Hypotheses, types: Sequence[TypeFactor], *, heights: bool
+) -> ReliabilitySummary:
     """Return the summary of the reliability of a network.
 
-    `hypotheses` are errors of sets and single observations; `heights` restricts effects on own points to
-    heights, because plan coordinates are angles.
+    `hypotheses` are errors of sets and single observations, `types` the agreement of standard deviations;
+    `heights` restricts effects on own points to heights, because plan coordinates are angles.
     """
     summary = ReliabilitySummary(
         **{name: getattr(found, name) for name in _SHARED},
         list_groups=partial(_listed, found, heights=heights),
         hypotheses=hypotheses,
+        types=tuple(types),
     )
     if len(found.suspects) > MOST_WAITING:
         summary.listed  # noqa: B018

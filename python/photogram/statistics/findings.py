@@ -15,7 +15,13 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
+from photogram.statistics.distributions import (
+    LEVEL,
+    critical_chi_square,
+    critical_fisher,
+    log_chi_square,
+    log_fisher,
+)
 from photogram.statistics.limits import GlobalTest, externally_studentized
 from photogram.words import Phrase
 
@@ -158,27 +164,49 @@ class Systematic:
 
 @dataclass(frozen=True)
 class TypeFactor:
-    """Agreement of the given standard deviations of a type of observation with its residuals."""
+    """Agreement of the given standard deviations of a type of observation with its residuals.
+
+    If these standard deviations are too small by a factor F, the sum of squares q has the expectation r +
+    (F^2 - 1) s, s the sum of R_ij^2. q r / s is approximately a multiple of chi-square with r^2 / s degrees
+    of freedom (Satterthwaite 1946). Without s, it is replaced by r, its largest value.
+    """
 
     group: Text
     squares: float  # q and r: weighted sum of squares, and sum of redundancy numbers
     redundancy: float
-    median: float  # Factor of the standard deviations from the median test value
-    sd: float  # The given standard deviation of images, with its unit; NaN if there are several
-    unit: str
+    median: float = math.nan  # Factor of the standard deviations from the median test value
+    sd: float = math.nan  # The given standard deviation of images, with its unit; NaN if there are several
+    unit: str = ""
+    spread: float = math.nan  # s; NaN if it is not required
+
+    @property
+    def _spread(self) -> float:
+        return self.redundancy if math.isnan(self.spread) else self.spread
+
+    @property
+    def _freedom(self) -> float:
+        """Degrees of freedom of the test."""
+        return self.redundancy**2 / self._spread
 
     @property
     def factor(self) -> float:
-        """Factor of the standard deviations: the root of q / r."""
-        return math.sqrt(self.squares / self.redundancy)
+        """Factor of the standard deviations, from the expectation of q."""
+        return math.sqrt(max(1.0 + (self.squares - self.redundancy) / self._spread, 0.0))
 
     @property
     def log_odds(self) -> float:
         """Log odds of this factor against none; minus infinity if it is small or of few values."""
-        if self.redundancy < 1.0 or not min(self.factor, self.median) > NOMINAL:
+        enough = self.redundancy >= (1.0 if math.isnan(self.spread) else LEAST_REDUNDANCY)
+        if not enough or not min(self.factor, self.median) > NOMINAL:
             return -math.inf
-        gain = self._log_likelihood(self.factor) - self._log_likelihood(1.0)
-        return gain - math.log(self.redundancy) / 2
+        ratio, freedom = self.squares / self.redundancy, self._freedom
+        return freedom / 2 * (ratio - 1.0 - math.log(ratio)) - math.log(freedom) / 2
+
+    @property
+    def undetected(self) -> float:
+        """The smallest factor that a test of the level 0.001 detects with the power 0.80."""
+        limit, least = (critical_chi_square(level, self._freedom) for level in (0.001, 0.80))
+        return math.sqrt(1.0 + (limit / least - 1.0) * self.redundancy / self._spread)
 
     def opposes(self, factor: float) -> bool:
         """Whether a common factor of all standard deviations makes those of this type wrong.
@@ -213,6 +241,7 @@ MOST: Mapping[Text, float] = {
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 EVIDENCE = 2.0  # Difference of log likelihoods that decides: 1.92 at the ends of a 95 percent interval
 NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least
+LEAST_REDUNDANCY = 0.5  # Of a type with a known s: below, q is a nearly singular mixture
 MOST_OTHERS = 0.05  # Of all other types; one observation of each may be removed
 
 

@@ -265,7 +265,7 @@ def _remedy(e: Evidence) -> Phrase | str:
 
 def _too_much_removed(e: Evidence) -> Phrase | None:
     found = e.found.snooped
-    if found is None or not found.removed or not found.excessive:
+    if found is None or not found.removed or not found.excessive or weight_rules.are_alike(e):
         return None
     shares = [
         Phrase("part.share", {"percent": 100 * found.share(kind), "kind": kind}) for kind in found.excessive

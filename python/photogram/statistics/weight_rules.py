@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from photogram.statistics.evidence import Evidence
 from photogram.statistics.findings import ALTERNATIVES, TypeFactor
@@ -37,16 +38,26 @@ def common_factor(far: bool, e: Evidence) -> Phrase | None:
     return Phrase(f"verdict.weights{scaled}", {"factor": e.interval()})
 
 
+def are_alike(e: Evidence) -> bool:
+    """Whether the standard deviations of all residuals are too small, not a few residuals too large."""
+    return e.high and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust
+
+
 def wrong_type(e: Evidence) -> Phrase | None:
     """Return types whose standard deviations, too small, explain more than errors of values."""
-    if e.pattern or e.found.robust:
+    if e.pattern:
         return None
-    wrong = [each for each in e.found.types if each.log_odds > e.found.odds + math.log(ALTERNATIVES)]
+    wrong = wrong_types(e.found.types, e.found.odds)
     wrong = [each for each in wrong if not each.factor < WRONG_ALIKE * e.factor]
-    return Phrase("verdict.weights-of-types.alone", {"types": list(map(_needed, wrong))}) if wrong else None
+    return Phrase("verdict.weights-of-types.alone", {"types": list(map(needed, wrong))}) if wrong else None
 
 
-def _needed(each: TypeFactor) -> Phrase:
+def wrong_types(types: Iterable[TypeFactor], odds: float) -> list[TypeFactor]:
+    """Return types whose factor has larger log odds than errors of values."""
+    return [each for each in types if each.log_odds > odds + math.log(ALTERNATIVES)]
+
+
+def needed(each: TypeFactor) -> Phrase:
     """Return the factor of standard deviations that a type needs."""
     fields = {"kind": each.group, "factor": each.factor}
     sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor, "unit": each.unit}
@@ -72,7 +83,7 @@ def types_with_common_factor(e: Evidence) -> Phrase | None:
         if each.opposes(f):
             others.append(each.group)
         elif each.redundancy >= 1.0:
-            causes.append(_needed(each))
+            causes.append(needed(each))
     return (
         Phrase("verdict.weights-of-types", {"types": causes, "others": others}) if others and causes else None
     )

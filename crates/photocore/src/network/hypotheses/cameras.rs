@@ -1,4 +1,4 @@
-//! Fixed parameters of cameras: principal distance, principal point, each term of distortion.
+//! Parameters of cameras: fixed principal distance, principal point and terms of distortion; the principal distance of some photos.
 
 use super::super::trial::Trial;
 use super::catalogue::{Catalogue, put};
@@ -7,22 +7,31 @@ use crate::geometry::camera::each_camera;
 use crate::geometry::{Camera, CameraModel};
 
 /// Cameras that are tested, those with the most photos.
-const MOST_CAMERAS: usize = 4;
+pub(super) const MOST_CAMERAS: usize = 4;
 /// Different cameras from which on none is tested: each photo has its own.
 const MOST_GROUPS: usize = 32;
 /// Terms of distortion of each.
 const MOST_TERMS: usize = 6;
+/// Sets of photos of each: strips, or cameras with equal parameters.
+const MOST_SETS: usize = 8;
 /// Plausible error of the principal distance, relative.
 const DISTANCE: f64 = 0.05;
 /// Plausible error of the principal point, in widths of the image.
 const POINT: f64 = 0.02;
 
 const DISTANCES: [&str; 4] = ["f", "c", "fx", "fy"];
-const POINTS: [&str; 4] = ["cx", "cy", "xp", "yp"];
+pub(super) const POINTS: [&str; 4] = ["cx", "cy", "xp", "yp"];
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
+    for photos in equal_cameras(catalogue).into_iter().take(MOST_CAMERAS) {
+        of_camera(catalogue, trial, trial.camera_of_photo[photos[0]], &photos);
+        of_sets(catalogue, trial, &photos);
+    }
+}
+
+/// The photos of each camera, those of the most photos first. Cameras with equal parameters are one: a block may have one for each photo.
+pub(super) fn equal_cameras(catalogue: &Catalogue<'_>) -> Vec<Vec<usize>> {
     let bundle = catalogue.bundle;
-    // Cameras with equal parameters are one: a block may have one for each photo.
     let mut groups: Vec<(&'static str, Vec<f64>, Vec<usize>)> = vec![];
     for (photo, images) in bundle.images_on.iter().enumerate() {
         // What a scanned film sees is not the image of its camera.
@@ -34,13 +43,11 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
         match groups.iter().position(|own| own.0 == name && own.1 == parameters) {
             Some(place) => groups[place].2.push(photo),
             None if groups.len() < MOST_GROUPS => groups.push((name, parameters, vec![photo])),
-            None => return,
+            None => return vec![],
         }
     }
     groups.sort_by_key(|own| std::cmp::Reverse(own.2.len()));
-    for (_, _, photos) in groups.into_iter().take(MOST_CAMERAS) {
-        of_camera(catalogue, trial, trial.camera_of_photo[photos[0]], &photos);
-    }
+    groups.into_iter().map(|own| own.2).collect()
 }
 
 fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos: &[usize]) {
@@ -68,8 +75,33 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
     }
 }
 
+/// The principal distance, fixed or free, of the photos of a strip, and of one of several cameras with equal parameters.
+fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize]) {
+    let camera: Camera = catalogue.stations.photos[photos[0]].camera.clone();
+    let named = camera.parameter_names().iter().enumerate();
+    let distances: Vec<usize> = named.filter(|own| DISTANCES.contains(&own.1.0)).map(|own| own.0).collect();
+    let strips = &catalogue.facts.position_sets;
+    let of_strips = photos.iter().filter_map(|&photo| Some((photo, strips.get(photo).copied().flatten()?)));
+    let of_cameras = photos.iter().map(|&photo| (photo, trial.camera_of_photo[photo]));
+    let (of_strips, of_cameras): (Vec<_>, Vec<_>) = (of_strips.collect(), of_cameras.collect());
+    for (code, of) in [("camera-f-strip", of_strips), ("camera-f-single", of_cameras)] {
+        let mut sets: Vec<usize> = of.iter().map(|own| own.1).collect();
+        sets.sort_unstable();
+        sets.dedup();
+        if distances.is_empty() || !(2..=MOST_SETS).contains(&sets.len()) {
+            continue;
+        }
+        for set in sets {
+            let column = catalogue.add((code, Some(set)), &["f"], &[DISTANCE * camera.scale()])[0];
+            for &(photo, _) in of.iter().filter(|own| own.1 == set) {
+                catalogue.cameras[photo].extend(distances.iter().map(|&parameter| (parameter, column)));
+            }
+        }
+    }
+}
+
 impl Catalogue<'_> {
-    /// Partials of an image by fixed parameters of its camera.
+    /// Partials of an image by parameters of its camera.
     pub(super) fn camera_partials(
         &self,
         (image, local, row): (usize, usize, usize),

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::super::model::{Bundle, Owner};
 use super::super::stations::Stations;
 use super::super::trial::Trial;
+use super::deformations::Deformations;
 use super::facts::Facts;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Shared};
 use crate::normals::Layout;
@@ -54,6 +55,8 @@ pub(super) struct Catalogue<'a> {
     pub(super) cameras: Vec<Vec<(usize, usize)>>,
     /// Column of the readout time of the camera of each photo.
     pub(super) shutters: Vec<Option<usize>>,
+    /// Deformations of the images of each photo.
+    pub(super) deformations: Vec<Option<Deformations>>,
     pub(super) camera_of_photo: &'a [usize],
 }
 
@@ -76,6 +79,7 @@ impl<'a> Catalogue<'a> {
             single: HashMap::new(),
             cameras: vec![vec![]; photos],
             shutters: vec![None; photos],
+            deformations: vec![None; photos],
             camera_of_photo: &trial.camera_of_photo,
         }
     }
@@ -190,7 +194,8 @@ impl AdditionalParameters for Catalogue<'_> {
 
     fn locals(&self) -> Option<Vec<usize>> {
         let cameras = self.cameras.iter().any(|own| !own.is_empty());
-        if cameras || !self.fixed.is_empty() || self.shutters.iter().any(Option::is_some) {
+        let deformed = self.deformations.iter().any(Option::is_some);
+        if cameras || deformed || !self.fixed.is_empty() || self.shutters.iter().any(Option::is_some) {
             return None;
         }
         let single = self.single.keys().filter_map(|of| match *of {
@@ -236,6 +241,7 @@ impl AdditionalParameters for Catalogue<'_> {
         if let Some(image) = image {
             self.camera_partials(image, equation, shared, partials);
             self.shutter_partials(image, equation, partials);
+            self.deformation_partials(image, equation, partials);
         }
     }
 }

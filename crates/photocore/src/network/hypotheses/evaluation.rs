@@ -10,7 +10,7 @@ use super::facts::Facts;
 use super::groups::{single_errors, worst};
 use super::hypothesis::{About, Hypotheses, Hypothesis};
 use super::judged::{Criteria, Judged};
-use super::{attitudes, cameras, control, form, positions, shutter};
+use super::{assignment, attitudes, cameras, control, deformations, form, positions, shutter};
 use crate::adjustment::{Leverages, correlation_above, whitening};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 use crate::{Threads, parallel};
@@ -21,11 +21,13 @@ fn catalogue<'a>(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Catal
     let (bundle, points) = (catalogue.bundle, catalogue.control_points(trial));
     control::add(&mut catalogue, &points);
     cameras::add(&mut catalogue, trial);
+    deformations::add(&mut catalogue, trial);
     // Poses that are made of several blocks, or are vectors, have no unknowns of their own that could be displaced.
     if bundle.mounts.is_empty() && matches!(bundle.poses, PoseNumbers::Angles(_)) {
         attitudes::add(&mut catalogue);
         if bundle.space == ObjectSpace::Rectangular {
             positions::add(&mut catalogue);
+            assignment::add(&mut catalogue);
             form::add(&mut catalogue, &points);
             shutter::add(&mut catalogue, trial);
         }

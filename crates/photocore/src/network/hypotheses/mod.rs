@@ -4,10 +4,12 @@
 //! minimal detectable bias (MDB), and what an undetected error of that size does to the points: internal and external reliability
 //! (Baarda 1968), for one observation and for an error that a whole set has in common.
 
+mod assignment;
 mod attitudes;
 mod cameras;
 mod catalogue;
 mod control;
+mod deformations;
 mod effect;
 mod evaluation;
 mod facts;

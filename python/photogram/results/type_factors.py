@@ -1,0 +1,71 @@
+"""Agreement of given standard deviations with residuals, by type of observation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from photogram.arguments.types import Indices
+from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial, Tests
+from photogram.statistics.evidence import MEDIAN
+from photogram.statistics.findings import NOMINAL, Text, TypeFactor
+from photogram.statistics.limits import global_test
+from photogram.statistics.reliability import TESTABLE
+
+MOST_ROWS = 64  # Largest number of observations with an exact sum of R_ij^2
+FEW, WEAK = 20.0, 0.1
+"""Redundancy, and mean redundancy, below which chi-square with r degrees of freedom is wrong."""
+
+
+def type_factors(
+    trial: NetworkTrial, tests: Tests, limit: float, standing: tuple[float, float]
+) -> list[TypeFactor]:
+    """Return the agreement of the standard deviations of each type.
+
+    Images are included if the global test of their sum of squares and degrees of freedom rejects. `limit`:
+    undetected factors of standard deviations that matter.
+    """
+    suspects, test = trial.suspects, global_test(*standing)
+    images = test is not None and (test.rejected_high or test.rejected_low)
+    used = tests.active & (suspects.kinds <= OBSERVATION) & (images | (suspects.kinds != IMAGE))
+    found: dict[Text, list[Indices]] = {}
+    for kind in np.unique(suspects.kinds[used]).tolist():
+        groups = np.flatnonzero(used & (suspects.kinds == kind))
+        if kind != OBSERVATION:
+            found[suspects.type(kind, 0)] = [groups]
+            continue
+        for group in groups:
+            found.setdefault(suspects.type(kind, int(suspects.subjects[group])), []).append(group)
+    return [_factor(trial, tests, kind, np.hstack(groups), limit) for kind, groups in found.items()]
+
+
+def _factor(trial: NetworkTrial, tests: Tests, kind: Text, groups: Indices, limit: float) -> TypeFactor:
+    """Return the agreement of the standard deviations of some groups."""
+    suspects = trial.suspects
+    own = np.zeros(len(suspects), dtype=bool)
+    own[groups] = True
+    rows = np.flatnonzero(np.repeat(own, np.diff(suspects.row_starts)) & np.isfinite(tests.redundancy))
+    residuals, redundancy, sd = tests.residual[rows], tests.redundancy[rows], trial.deviations[rows]
+    squares, r = float(np.nansum(residuals**2)), float(redundancy.sum())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        w = np.abs(residuals) / np.sqrt(redundancy)
+    w = w[np.isfinite(w) & (redundancy > TESTABLE)]
+    is_control = bool(suspects.kinds[groups[0]] == CONTROL)
+    equal = suspects.kinds[groups[0]] == IMAGE and len(sd) and np.ptp(sd) <= 1e-9 * sd[0]
+    spread = math.nan
+    if len(rows) <= MOST_ROWS and r < max(FEW, WEAK * len(rows)):
+        mixed = TypeFactor(kind, squares, r, spread=float(np.square(redundancy).sum()))
+        # The squares of R outside the diagonal increase the sum.
+        if squares > NOMINAL**2 * r or (is_control and mixed.undetected > limit):
+            columns = trial.core.responses(groups.tolist())
+            spread = float(np.square(columns[:, rows]).sum())
+    return TypeFactor(
+        kind,
+        squares,
+        r,
+        median=float(np.median(w)) / MEDIAN if w.size else math.nan,
+        sd=float(sd[0]) if equal else math.nan,
+        unit=suspects.given.image_unit,
+        spread=spread,
+    )
