@@ -1460,7 +1460,8 @@ class NetworkTrial:
         with NaN for missing values. `effects` by row: points beyond the limit, the same without points of
         the group, the largest change in standard deviations, its point and coordinate, the largest change,
         and the changes of `checks`. `sets`: dictionaries with `parameters`, `plausible`, `estimate`, its
-        `cofactors`, and `error`. `correlations`: (s, s), of the scores of sets.
+        `cofactors`, `error`, and the changes of `checks` by each parameter, (c, 3, k) row by row.
+        `correlations`: (s, s), of the scores of sets.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:

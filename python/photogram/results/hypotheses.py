@@ -44,6 +44,7 @@ ABSURD_PART, UNKNOWN_PART = 0.9, 0.7
 """Least parts of this excess that errors without a plausible size, or with an unknown one, explain."""
 LISTED = 10  # Rows of each table of documents
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
+SINGULAR = 1e-10  # Relative eigenvalue of directions that nothing determines
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 
 DATUM = frozenset(
@@ -59,7 +60,9 @@ DATUM = frozenset(
         "scale",
     }
 )
-"""Errors that only change the datum: assumptions, unless an independent source tests them."""
+"""Errors that only change the datum: assumptions, unless an independent source tests them.
+
+Then sizes that it does not detect are graded, whatever their plausible size."""
 
 UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
@@ -121,7 +124,9 @@ class Hypotheses:
     def _is_harmful(self, row: int) -> bool:
         """Whether an undetected error moves too many points."""
         code, effect = self.code[row], self.effects[row]
-        if effect.checked or code in UNGRADED or code in DATUM or self.undetected(row) < RARE:
+        if effect.checked or code in UNGRADED:
+            return False
+        if np.isnan(self.mdb[row, 0]) if code in DATUM else self.undetected(row) < RARE:
             return False
         return effect.others >= max(FEWEST, math.ceil(SHARE * self.points))
 
@@ -254,6 +259,15 @@ class Hypotheses:
         axis = f"{parameters[k]} " if len(estimate) > 1 else ""
         return f"{axis}{estimate[k]:.4g}{self._unit(row)} (sd {sd:.2g})"
 
+    def of_checks(self) -> list[Phrase]:
+        """Return single errors that explain differences of check points best, the most likely first."""
+        odds, n = self.log_odds, math.log(ALTERNATIVES)
+        first = int(np.nanargmax(odds)) if len(odds) else 0
+        if first < len(self.sets) or not self.by_checks[first] > n or self.probability[first] > DETECTION[0]:
+            return []
+        likely = np.flatnonzero(odds > odds[first] - n)
+        return [self.name(row) for row in likely[np.argsort(-odds[likely], kind="stable")].tolist()]
+
     @property
     def common_is_harmful(self) -> bool:
         """Whether the most likely of these errors moves a point beyond the limit."""
@@ -357,21 +371,28 @@ def hypotheses(
     adjusted = np.flatnonzero(np.bincount(suspects.points[images]))
     drawn = sampled(adjusted, DRAWN)
     core = {**NO_FACTS, **facts}
-    timed, agreement, places = (core.pop(name, None) for name in ("timed", "agreement", "check_places"))
+    timed, agreement = (core.pop(name, None) for name in ("timed", "agreement"))
     checks = len(core["checks"])
     core["checks"] = [*core["checks"], *drawn.tolist()]
     found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
+    groups = _groups(suspects, found["group"], found["index"])
     for row, (*sizes, changes) in found["effects"].items():
         of_checks, of_points = np.split(changes, [checks])
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = np.zeros(0) if agreement is None else np.abs(of_checks) / agreement.sd
         detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
         effects[row] = Effect(detected, of_points, *sizes)
-        tested = known and row < len(found["sets"]) and agreement is not None and agreement.joint is not None
-        if tested and _with_checks(found, row, of_checks, places, core["centre"], agreement.joint):
+        if not known or agreement is None or agreement.joint is None:
+            continue
+        group = int(groups[row])
+        if group >= 0:
+            _single_with_checks(
+                found, row, trial.deviations[suspects.rows(group)], of_checks, agreement.joint
+            )
+        elif _with_checks(found, row, checks, agreement.joint):
             relative.add(row)
     statistic, estimate = found["statistic"], found["estimate"]
     kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
@@ -398,7 +419,7 @@ def hypotheses(
     return Hypotheses(
         **{name: found[name] for name in same},
         code=np.array(found["code"], dtype=np.str_),
-        group=_groups(suspects, found["group"], found["index"]),
+        group=groups,
         rank=found["rank"].astype(np.int64),
         statistic=statistic,
         log_odds=odds,
@@ -416,39 +437,26 @@ def hypotheses(
     )
 
 
-def _with_checks(
-    found: Facts,
-    row: int,
-    changes: Floats,
-    places: Floats,
-    centre: ArrayLike | None,
-    joint: tuple[Indices, Floats, Floats],
-) -> bool:
+def _with_checks(found: Facts, row: int, checks: int, joint: tuple[Indices, Floats, Floats]) -> bool:
     """Test a set with check points as further observations; return whether only these test it.
 
     Differences D of check points with the covariance C are independent of the residuals. If the parameters
-    change them by G, D adds G' C^-1 D to the score and G' C^-1 G to the redundancy. G is known for one
-    parameter, from the (c, 3) `changes` by its error, and for the datum: a shift, scale or rotation.
+    change them by G, D adds G' C^-1 D to the score and G' C^-1 G to the redundancy.
     """
     own, (flat, differences, covariance) = found["sets"][row], joint
     hidden = bool(found["rank"][row] == 0)
-    if hidden and found["code"][row] in DATUM:
-        from_centre = places - (0.0 if centre is None else np.asarray(centre))
-        moves = [_similar(name, from_centre) for name in own["parameters"]]
-    elif len(own["parameters"]) == 1 and own["error"] is not None:
-        moves = [changes / own["error"][0]]
-    else:
-        return False
-    g = np.column_stack([move.ravel()[flat] for move in moves])
-    k = len(moves)
-    if not np.isfinite(g).all():
+    k = len(own["parameters"])
+    g = np.reshape(own["at_checks"], (-1, 3, k))[:checks].reshape(-1, k)[flat]
+    if not np.isfinite(g).all() or not g.any():
         return False
     weighted = np.linalg.solve(covariance, g)
     redundancy, score = g.T @ weighted, weighted.T @ differences
     if not hidden:
-        redundancy += 1.0 / np.reshape(own["cofactors"], (k, k))
-        score += np.asarray(own["estimate"]) / own["cofactors"]
-    cofactors = np.linalg.pinv(redundancy, hermitian=True)
+        # Directions without redundancy have no cofactors.
+        own_part = np.linalg.pinv(np.reshape(own["cofactors"], (k, k)), hermitian=True, rcond=SINGULAR)
+        redundancy += own_part
+        score += own_part @ own["estimate"]
+    cofactors = np.linalg.pinv(redundancy, hermitian=True, rcond=SINGULAR)
     estimate = cofactors @ score
     statistic = float(score @ estimate)
     found["statistic"][row], found["rank"][row] = statistic, k
@@ -458,13 +466,28 @@ def _with_checks(
     return hidden
 
 
-def _similar(parameter: str, places: Floats) -> Floats:
-    """Return the changes of places by a shift, a scale or a rotation."""
-    if parameter == "scale":
-        return places
-    if parameter in "XYZ":
-        return np.broadcast_to(np.eye(3)["XYZ".index(parameter)], places.shape)
-    return np.cross(np.eye(3)[("omega", "phi", "kappa").index(parameter)], places)
+def _single_with_checks(
+    found: Facts, row: int, sd: Floats, changes: Floats, joint: tuple[Indices, Floats, Floats]
+) -> None:
+    """Test a group with check points as further observations, along its least detectable direction.
+
+    This direction d is an eigenvector of R in unit weight. Check points have the `changes` G by an error d.
+    """
+    flat, differences, covariance = joint
+    g, d = changes.ravel()[flat], found["mdb"][row, : len(sd)]
+    if len(d) != len(sd) or not np.isfinite(g).all() or not g.any():
+        return
+    weighted = np.linalg.solve(covariance, g)
+    redundancy, score, before = float(g @ weighted), float(weighted @ differences), 0.0
+    if np.isfinite(d).all():
+        estimate = found["estimate"][row, : len(sd)]
+        own, part = found["noncentrality"][row], found["redundancy"][row] * float(d @ (estimate / sd**2))
+        redundancy, score, before = redundancy + own, score + part, part**2 / own
+    statistic = float(np.nan_to_num(found["statistic"][row])) - before + score**2 / redundancy
+    rank = max(found["rank"][row] + np.isnan(d[0]), 1)
+    found["statistic"][row], found["rank"][row] = statistic, rank
+    found["probability"][row] = math.exp(float(log_chi_square(statistic, float(rank))))
+    found["observations"][row] += len(flat)
 
 
 def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:

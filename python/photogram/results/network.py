@@ -48,6 +48,7 @@ JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
 REMARKS = 5  # Number of messages of a `repr`
 
 
+LEVEL, POWER = 0.001, 0.80  # Significance level and power of minimal detectable errors
 MAX_BIAS_RATIO = 6.0  # Permitted effect of undetected errors on points, in standard deviations
 
 
@@ -208,7 +209,7 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
     def _trial(self) -> NetworkTrial: ...
 
     def reliability(
-        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
+        self, *, level: float = LEVEL, power: float = POWER, unit_weight: str = "known"
     ) -> Reliability:
         """Return detectable gross errors and effects of others (docs/blunders.md).
 
@@ -247,29 +248,35 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
         if not (computed and self.converged and self.degrees_of_freedom > 0):
             return None
         from photogram.results.network_trial import LostSupportError, Out
-        from photogram.results.reliability import Reliability
+        from photogram.results.reliability import Reliability, downweighted
         from photogram.results.reliability_summary import reliability_summary
         from photogram.statistics.weight_rules import wrong_types
 
-        weight = "known" if self.KNOWN else "unknown"
-        try:
+        refused = LostSupportError, _photocore.BlockError, _photocore.CollectionError
+        facts, weight = self._hypothesis_facts(), "known" if self.KNOWN else "unknown"
+        found = evaluated = lost = None
+        # Other results remain valid; a network that is singular by rounding has a message already.
+        with suppress(*refused):
             found = self.reliability(unit_weight=weight)
-        except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
-            # Other results remain valid; a network that is singular by rounding has a message already.
-            return None
-        facts = self._hypothesis_facts()
-        errors, types, lost = *self._evaluated(found, facts), found.downweighted
-        if lost is not None and (lost.removed.excessive or lost.unsupported):
+        if found is not None:
+            evaluated, lost = self._evaluated(found, facts), found.downweighted
+        elif self.loss is not None:
+            lost = downweighted(self._trial(), self._terms, self.image_weights, self.used_images)
+        if lost is not None and (found is None or lost.removed.excessive or lost.unsupported):
             # A common error may be the reason: the loss removes observations that have it.
-            trial, level, power = self._trial(), found.level, found.power
+            trial = self._trial()
             trial.out = Out(np.zeros(len(trial.deviations), dtype=bool))
-            with suppress(LostSupportError, _photocore.BlockError, _photocore.CollectionError):
-                all_ = Reliability(trial, self.covariances, level=level, power=power, unit_weight=weight)
+            with suppress(*refused):
+                whole = Reliability(
+                    trial, self.covariances, lost, level=LEVEL, power=POWER, unit_weight=weight
+                )
                 # Check points were compared with the robust solution.
-                whole, whole_types = self._evaluated(all_, facts | {"agreement": None})
-                if whole.common() or wrong_types(whole_types, whole.odds()):
-                    errors, types = whole, whole_types
-        return reliability_summary(found, errors, types, heights=self.geographic)
+                errors, types = self._evaluated(whole, facts | {"agreement": None})
+                if errors.common() or wrong_types(types, errors.odds()):
+                    found, evaluated = found or whole, (errors, types)
+        if found is None or evaluated is None:
+            return None
+        return reliability_summary(found, *evaluated, heights=self.geographic)
 
     def _evaluated(self, found: Reliability, facts: Facts) -> tuple[Hypotheses, list[TypeFactor]]:
         """Evaluate the hypotheses of the catalogue with some facts, and standard deviations by type."""

@@ -219,10 +219,8 @@ class Result(OnFilm, AdjustedNetwork):
     def _hypothesis_facts(self) -> dict[str, Any]:
         from photogram.results.network_trial import block_facts
 
-        checks = self.check_points
-        facts = block_facts(self.block, self.photo_positions)
-        facts |= {"check_places": self.point_positions[checks.rows], "agreement": checks.agreement}
-        return facts | {"checks": checks.rows.tolist()}
+        checks, facts = self.check_points, block_facts(self.block, self.photo_positions)
+        return facts | {"agreement": checks.agreement, "checks": checks.rows.tolist()}
 
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
         """Return the given block with adjusted values of free unknowns.

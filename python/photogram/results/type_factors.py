@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial, Tests
 from photogram.statistics.evidence import MEDIAN
-from photogram.statistics.findings import NOMINAL, Text, TypeFactor
+from photogram.statistics.findings import CONTROL_POINTS, NOMINAL, Agreement, Text, TypeFactor
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
+from photogram.words import Phrase, phrase
 
 MOST_ROWS = 64  # Largest number of observations with an exact sum of R_ij^2
+DETECTED = 2.3  # Factor that differences of three check points detect
 FEW, WEAK = 20.0, 0.1
 """Redundancy, and mean redundancy, below which chi-square with r degrees of freedom is wrong."""
 
@@ -38,6 +41,22 @@ def type_factors(
         for group in groups:
             found.setdefault(suspects.type(kind, int(suspects.subjects[group])), []).append(group)
     return [_factor(trial, tests, kind, np.hstack(groups), limit) for kind, groups in found.items()]
+
+
+def unchecked_types(
+    types: Iterable[TypeFactor], limit: float, control_sd: float, checks: Agreement | None
+) -> list[Phrase]:
+    """Return messages on undetected factors of the standard deviations of control beyond a `limit`.
+
+    Points near control points would be wrong by such factors. `control_sd` is the given standard deviation;
+    check points detect a factor if it is larger than DETECTED standard deviations of their differences.
+    """
+    detected = math.inf if checks is None else DETECTED * float(np.nanmedian(checks.sd)) / control_sd
+    return [
+        phrase("unchecked.sd", kind=each.group, factor=each.undetected)
+        for each in types
+        if each.group == CONTROL_POINTS and limit < each.undetected < detected
+    ]
 
 
 def _factor(trial: NetworkTrial, tests: Tests, kind: Text, groups: Indices, limit: float) -> TypeFactor:

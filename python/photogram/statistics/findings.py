@@ -203,9 +203,17 @@ class TypeFactor:
         return freedom / 2 * (ratio - 1.0 - math.log(ratio)) - math.log(freedom) / 2
 
     @property
+    def is_rejected(self) -> bool:
+        """Whether these standard deviations are notably too small at the level 0.001."""
+        if not self.redundancy >= LEAST_REDUNDANCY or not min(self.factor, self.median) > NOMINAL:
+            return False
+        limit = critical_chi_square(TYPE_LEVEL, self._freedom)
+        return self.squares / self.redundancy * self._freedom > limit
+
+    @property
     def undetected(self) -> float:
         """The smallest factor that a test of the level 0.001 detects with the power 0.80."""
-        limit, least = (critical_chi_square(level, self._freedom) for level in (0.001, 0.80))
+        limit, least = (critical_chi_square(level, self._freedom) for level in (TYPE_LEVEL, 0.80))
         return math.sqrt(1.0 + (limit / least - 1.0) * self.redundancy / self._spread)
 
     def opposes(self, factor: float) -> bool:
@@ -241,6 +249,7 @@ MOST: Mapping[Text, float] = {
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 EVIDENCE = 2.0  # Difference of log likelihoods that decides: 1.92 at the ends of a 95 percent interval
 NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least
+TYPE_LEVEL = 0.001  # Significance level of the standard deviations of a type
 LEAST_REDUNDANCY = 0.5  # Of a type with a known s: below, q is a nearly singular mixture
 MOST_OTHERS = 0.05  # Of all other types; one observation of each may be removed
 
@@ -306,6 +315,7 @@ class Findings:
     # Detected common errors of sets of observations, and whether they forbid the use
     common: Sequence[Text] = ()
     common_is_harmful: bool = False
+    of_checks: Sequence[Text] = ()  # Single errors that explain differences of check points
     # Undetectable errors that affect many points, the worst first
     unchecked: Sequence[Text] = ()
     snooped: Removed | None = None

@@ -301,7 +301,9 @@ def _set_aside(much: bool, e: Evidence) -> Phrase | None:
 
 
 def _checks(e: Evidence) -> Phrase | None:
-    points = e.disagreement(WITHHELD)
+    points, errors = e.disagreement(WITHHELD), list(e.found.of_checks)
+    if points and errors:
+        return Phrase("verdict.check-points.named", {"points": points, "errors": errors})
     return Phrase("verdict.check-points", {"points": points}) if points else None
 
 

@@ -47,7 +47,10 @@ def wrong_type(e: Evidence) -> Phrase | None:
     """Return types whose standard deviations, too small, explain more than errors of values."""
     if e.pattern:
         return None
-    wrong = wrong_types(e.found.types, e.found.odds)
+    # Log odds of errors of values that tests do not detect say nothing.
+    only = not e.single and not e.found.common
+    wrong = [each for each in e.found.types if each.is_rejected] if only else []
+    wrong = wrong or wrong_types(e.found.types, e.found.odds)
     wrong = [each for each in wrong if not each.factor < WRONG_ALIKE * e.factor]
     return Phrase("verdict.weights-of-types.alone", {"types": list(map(needed, wrong))}) if wrong else None
 

@@ -131,6 +131,7 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
         row.set_item("estimate", own.judged.estimate)?;
         row.set_item("cofactors", own.judged.cofactors)?;
         row.set_item("error", own.judged.error)?;
+        row.set_item("at_checks", PyArray1::from_vec(py, own.at_checks))?;
         Ok(row)
     };
     columns.set_item("sets", all.into_iter().map(of_set).collect::<PyResult<Vec<_>>>()?)?;

@@ -66,11 +66,13 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
     hypotheses.extend(others.take(MOST_TERMS).map(|&own| ("camera-term", vec![own], f64::NAN)));
     for (code, parameters, size) in hypotheses.into_iter().filter(|own| !own.1.is_empty()) {
         let names: Vec<&'static str> = parameters.iter().map(|own| own.1).collect();
+        // One error of both principal distances; another scale of one axis is an affinity.
+        let names = if names == ["fx", "fy"] { vec!["fx, fy"] } else { names };
         let plausible = if size.is_finite() { vec![size; names.len()] } else { vec![] };
         let columns = catalogue.add((code, Some(camera)), &names, &plausible);
         for &photo in photos {
-            let own = parameters.iter().zip(&columns).map(|(own, &column)| (own.0, column));
-            catalogue.cameras[photo].extend(own);
+            let own = parameters.iter().zip(columns.iter().cycle());
+            catalogue.cameras[photo].extend(own.map(|(own, &column)| (own.0, column)));
         }
     }
 }

@@ -93,6 +93,36 @@ impl<'a> Sample<'a> {
         Changes { locals, others }
     }
 
+    /// Changes of the check points by a unit of each of the first parameters: three rows per point, NaN for points that do not take part.
+    pub fn at_checks(
+        &self,
+        parameters: &dyn AdditionalParameters,
+        effects: &DMatrix<f64>,
+        count: usize,
+        threads: &Threads,
+    ) -> DMatrix<f64> {
+        let mut found = DMatrix::from_element(3 * self.checks.len(), count, f64::NAN);
+        let (errors, first) = (DMatrix::identity(effects.ncols(), count), self.locals.len());
+        let others = effects.columns(0, count).into_owned();
+        let model = &self.trial.assembled.problem.model;
+        let mut locals = vec![];
+        for (check, index) in self.checks.iter().enumerate().filter_map(|(check, at)| Some((check, (*at)?))) {
+            match index.checked_sub(first) {
+                None => locals.push((3 * check, self.locals[index])),
+                Some(behind) => {
+                    let place = model.of_point(model.locals + behind).start - 3 * model.locals;
+                    found.rows_mut(3 * check, 3).copy_from(&others.rows(place, 3));
+                }
+            }
+        }
+        let (rows, places): (Vec<usize>, Vec<usize>) = locals.into_iter().unzip();
+        let problem = &self.trial.assembled.problem;
+        let parts = (&others, &errors);
+        let changes = self.linearized.changes_of_locals(problem, parameters, parts, &places, threads);
+        rows.iter().zip(changes).for_each(|(&row, own)| found.rows_mut(row, 3).copy_from(&own.rows(0, 3)));
+        found
+    }
+
     /// The effect of one of these errors; `own` are points that it belongs to.
     pub fn effect(&self, changes: &Changes, error: usize, own: &[usize], limit: f64) -> Effect {
         let model = &self.trial.assembled.problem.model;

@@ -55,6 +55,8 @@ impl Trial {
         let mut catalogue = catalogue(self, found, facts);
         worst.iter().for_each(|&k| catalogue.add_single(&singles[k].error));
         let sums = linearized.additional(problem, &catalogue, threads);
+        let of_sets = sums.score.len() - worst.len();
+        let at_checks = sample.at_checks(&catalogue, &sums.effects, of_sets, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
             let seen: Vec<usize> = (0..cause.columns.len())
@@ -83,6 +85,7 @@ impl Trial {
                 plausible,
                 judged,
                 effect: None,
+                at_checks: at_checks.select_columns(&own).transpose().as_slice().to_vec(),
             });
             columns.push(own);
         }

@@ -104,6 +104,7 @@ impl Trial {
                 plausible: vec![],
                 judged: judged.in_units(&units),
                 effect: None,
+                at_checks: vec![],
             };
             Single { hypothesis, suspect, error }
         };
