@@ -58,7 +58,7 @@ def adjustment_lines() -> list[str]:
     """Show the figures of the packaged plate."""
     # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
     noisy = ("weighted sum of squares, plate", "weighted sum of squares, stars")
-    figures = section_lines(plate(), "How much, how good", "Remarks")
+    figures = section_lines(plate(), "Size and fit", "Remarks")
     summary = [line for title, lines in titled_lines(plate().document(), []) for line in (title, *lines, "")]
     return [*summary, *(line for line in figures if not line.startswith(noisy))]
 
@@ -95,7 +95,7 @@ def refraction_lines() -> list[str]:
 
 def night_lines() -> list[str]:
     """Show the figures and the camera of the packaged night."""
-    return section_lines(night(), "How much, how good", "Camera")
+    return section_lines(night(), "Size and fit", "Camera")
 
 
 def lens_lines() -> list[str]:

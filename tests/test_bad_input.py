@@ -277,7 +277,7 @@ def test_no_control_and_no_weights(small_block):
         # The middle photo of the first strip sees most; that of the other strip at the other end is farthest.
         assert result.messages[0].code == "free.minimum"
         assert "phi of 0102" in str(result.messages[0])
-        assert str(result.messages[0]) in " ".join(result.report().split("How much")[0].split())
+        assert str(result.messages[0]) in " ".join(result.report().split("Size")[0].split())
         assert np.nansum(result.redundancy) == pytest.approx(result.degrees_of_freedom, abs=1e-6)
     # Distances are those of the scale that was held; their ratios are those of the controlled block.
     ratio = [
@@ -295,7 +295,7 @@ def test_no_control_but_weights(small_block):
     result = adjust(weighted)
     assert result.converged
     assert result.messages[0].code == "free.weights.photos"
-    assert str(result.messages[0]) in " ".join(result.report().split("How much")[0].split())
+    assert str(result.messages[0]) in " ".join(result.report().split("Size")[0].split())
 
 
 def test_block_in_two_parts(small_block):

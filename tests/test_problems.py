@@ -161,7 +161,7 @@ def test_giant_says_that_the_global_test_fails(run, project):
     for kind in ("images", "control points"):
         assert f" {kind} have T beyond" in " ".join(" ".join(lines[2:12]).split()), kind
     report = (project.with_name("wrong-adjusted") / "report.txt").read_text()
-    assert "the global test fails" in report[: report.index("How much, how good")]
+    assert "the global test fails" in report[: report.index("Size and fit")]
 
 
 def test_reports_do_not_differ_from_run_to_run(run, project, tmp_path):

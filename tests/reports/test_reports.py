@@ -14,7 +14,7 @@ import photogram
 from photogram import InnerConstraints, adjust, simulate, snoop
 
 EXAMPLES = str(Path(photogram.__file__).parent / "examples")
-NETWORK = ["Verdict", "Plan of the network", "How much, how good", "Image residuals", "Redundancy", "Tests"]
+NETWORK = ["Verdict", "Plan of the network", "Size and fit", "Image residuals", "Redundancy", "Tests"]
 NETWORK += ["Worst observations", "Photos", "Points", "Iterations", "Reproducibility"]
 COMMANDS = {
     "adjust --example": (
@@ -34,7 +34,7 @@ COMMANDS = {
     "collection --example --out out": ("out", [*NETWORK, "Cameras"]),
     "plan --out out": (
         "out",
-        ["Plan of the network", "Side by side", "How much", "New points", "Photos", "Control"],
+        ["Plan of the network", "Side by side", "Size", "New points", "Photos", "Control"],
     ),
     "check --example": ("example-checked", ["Verdict", "Plan of the network", "Reproducibility"]),
     "giant check --example": ("galveston-checked", ["Verdict", "Findings", "Key numbers"]),
@@ -48,7 +48,7 @@ COMMANDS = {
     ),
     "stellar-camera --example": (
         "plate-calibrated",
-        ["Stars and residuals", "How much, how good", "Parameters", "Worst observations", "Distortion"],
+        ["Stars and residuals", "Size and fit", "Parameters", "Worst observations", "Distortion"],
     ),
     "stellar-camera exposures --example": (
         "night-calibrated",

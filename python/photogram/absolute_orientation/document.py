@@ -58,7 +58,7 @@ def orientation_document(result: Orientation) -> Document:
             Section.of(of_parameters),
             Section.of(control(result)),
             Section.of(rejected(result)),
-            Section("size", "How much, how good", [Facts("How much", size), Facts("How good", quality)]),
+            Section("size", "Size and fit", [Facts("Size", size), Facts("Fit", quality)]),
             tests_section(result.verdict),
             Section.of(points(result)),
             Section.of(cycles(result)),

@@ -97,7 +97,7 @@ class Plan(Documented):
             sections=[
                 Section("network", "Plan of the network", [drawing] if any(new) else []),
                 Section("comparison", "Side by side", [_comparison(patterns)] if all(new) else []),
-                Section("size", "How much", [_size(patterns)]),
+                Section("size", "Size", [_size(patterns)]),
                 layers("points", "New points", points_table, about("plan.points")),
                 layers("photos", "Photos", _photos),
                 layers("motion", "Motion", _motion),
@@ -359,7 +359,7 @@ def _size(patterns: Sequence[Pattern]) -> Table:
     }
     values = np.array([*rows.values()], dtype=str).T
     columns = [Quantity(own, head=each.name) for each, own in zip(patterns, values, strict=True)]
-    return Table("", "How much", [Quantity([*rows], kind="name", head=" "), *columns])
+    return Table("", "Size", [Quantity([*rows], kind="name", head=" "), *columns])
 
 
 def advice(patterns: Sequence[Pattern]) -> list[Phrase]:

@@ -139,12 +139,12 @@ def size_section(
 ) -> Section:
     """Return the sizes of the network, and its accuracy."""
     parts: list[Part] = [
-        Facts("How much", [*size, Fact.of("Degrees of freedom", result.degrees_of_freedom)]),
-        Facts("How good", [*good, *_images_facts(result)]),
+        Facts("Size", [*size, Fact.of("Degrees of freedom", result.degrees_of_freedom)]),
+        Facts("Fit", [*good, *_images_facts(result)]),
         *tables,
         _precision_table(result),
     ]
-    return Section("size", "How much, how good", parts)
+    return Section("size", "Size and fit", parts)
 
 
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:

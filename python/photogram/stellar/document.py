@@ -37,11 +37,11 @@ MAX_WORST_COORDINATES = 25
 def plate_document(result: Result) -> Document:
     """Return the document of a plate."""
     problem = result.problem
-    size = [Facts("How much", _much(result)), Facts("How good", _good(result))]
+    size = [Facts("Size", _much(result)), Facts("Fit", _good(result))]
     of_solution = _solution_sections(result)
     sections = [
         Section("pictures", "Stars and residuals", [pictures(sketches(result))]),
-        Section("size", "How much, how good", size),
+        Section("size", "Size and fit", size),
         of_solution.pop("parameters"),
         of_solution.pop("derived"),
         Section.of(tables.worst(result, MAX_WORST_COORDINATES)),
@@ -101,7 +101,7 @@ def _combined(result: Result) -> list[Section]:
     names = sorted({name for pair in combined.pairs for name in pair}, key=GROUPS.index)
     intro = f"ORIENTATIONS FROM {', '.join(names).upper()} CONSTRAINED TO COMMON VALUES"
     good = [*_good(combined), *_residuals(combined)]
-    size = [Facts("How much", _much(combined)), Facts("How good", good)]
+    size = [Facts("Size", _much(combined)), Facts("Fit", good)]
     sections = [Section("combined", "Combined solution", size, intro)]
     for key, section in _solution_sections(combined).items():
         title = f"Combined solution: {section.title}"

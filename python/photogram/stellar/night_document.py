@@ -36,7 +36,7 @@ def night_document(result: CalibratedNight) -> Document:
     layers = Layers("exposure-layers", tables.exposures(result, MAX_EXPOSURES))
     sections = [
         Section("pictures", "Stars and residuals", [pictures(sketches(result))]),
-        Section("size", "How much, how good", [Facts("How much", much), Facts("How good", good)]),
+        Section("size", "Size and fit", [Facts("Size", much), Facts("Fit", good)]),
         Section("camera", "Camera", [tables.parameters(result), correlation]),
         Section("exposures", "Exposures", [layers]),
         Section("lens", "Lens", [tables.lens_tests(result), tables.lenses(result)], lens),
