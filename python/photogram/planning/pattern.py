@@ -254,7 +254,8 @@ class Pattern:
         if not result.degrees_of_freedom > 0:
             return None
         # In a plan, all points have given coordinates, but these check nothing.
-        return result._evaluated(result.reliability(), block_facts(self.block, result.photo_positions))
+        found, _ = result._evaluated(result.reliability(), block_facts(self.block, result.photo_positions))
+        return found
 
     @property
     def known_rms_sd(self) -> tuple[float, float, float] | None:

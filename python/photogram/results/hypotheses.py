@@ -262,7 +262,9 @@ class Hypotheses:
     def of_checks(self) -> list[Phrase]:
         """Return single errors that explain differences of check points best, the most likely first."""
         odds, n = self.log_odds, math.log(ALTERNATIVES)
-        first = int(np.nanargmax(odds)) if len(odds) else 0
+        if np.isnan(odds).all():
+            return []
+        first = int(np.nanargmax(odds))
         if first < len(self.sets) or not self.by_checks[first] > n or self.probability[first] > DETECTION[0]:
             return []
         likely = np.flatnonzero(odds > odds[first] - n)
