@@ -372,7 +372,7 @@ def test_reliability():
         if r > 0.01
     )
     assert effects.max() == pytest.approx(largest, rel=1e-4)
-    assert "image" in found.observations().frame()["kind"].tolist()
+    assert "image" in found.table()["kind"].tolist()
     assert len(found.table()) == len(found.redundancy)
 
 

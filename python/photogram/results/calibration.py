@@ -384,10 +384,8 @@ def _field_remarks(result: Result, found: Calibration) -> list[str]:
     at = field.largest
     x, y = field.positions[at]
     (dx, dy), (sx, sy) = field.vectors[at], np.sqrt(np.diag(field.covariances[at]))
-    return [
-        f"{', '.join(field.names)}: at the most {factor * dx:.3f} and {factor * dy:.3f} {written} (sd"
-        f" {factor * sx:.3f} and {factor * sy:.3f}), at x {x:.4g}, y {y:.4g} {unit}"
-    ]
+    sizes = {"dx": factor * dx, "dy": factor * dy, "sx": factor * sx, "sy": factor * sy, "small": written}
+    return [about("field", names=list(field.names), x=x, y=y, unit=unit, **sizes)]
 
 
 def calibration_members(result: Result) -> list[dict[str, Any]]:

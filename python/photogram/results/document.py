@@ -22,8 +22,7 @@ from photogram.results.features import features_members, features_section
 from photogram.results.film_report import films_section
 from photogram.results.network_tables import control, plan_deviations, point_axes
 from photogram.results.trajectories import notable, trajectories_table
-from photogram.show.cells import unit_written
-from photogram.show.page import Document, Fact, Section, about, conventions, significant
+from photogram.show.page import Document, Fact, Section, about, conventions
 from photogram.show.quantity import Quantity, Table, chosen, for_people, members, named, records
 
 if TYPE_CHECKING:
@@ -69,21 +68,20 @@ def block_document(result: Result) -> Document:
 
 def _accuracy(result: Result) -> list[Fact]:
     axes, found = point_axes(result.block), list[Fact]()
-    factors = np.array([axis.factor for axis in axes])
+    factors, names = np.array([axis.factor for axis in axes]), ", ".join(axis.name for axis in axes)
+    unit = "" if result.geographic else axes[2].small
     check = result.used_points & (result.point_kinds == "check")
     if check.any():
-        columns = (result.point_differences[check] * factors).T
-        worst = zip(axes, (rms_of(column[np.isfinite(column)]) for column in columns), strict=True)
-        note = ", ".join(f"{axis.name} {significant(each, 2)}" for axis, each in worst if math.isfinite(each))
-        unit = "" if result.geographic else f" {axes[2].small}"
-        found.append(Fact.of("Check points", int(np.count_nonzero(check)), note=f"rms {note}{unit}"))
-    height = result.point_sd[result.used_points]
-    known = height[np.isfinite(height).all(axis=1)] * factors
-    if len(known):
-        x, y, z = (significant(float(each), 2) for each in np.median(known, axis=0))
-        units = [unit_written(axis.small) for axis in axes]
-        note = f"{axes[0].name} {x} {units[0]}, {axes[1].name} {y} {units[1]}"
-        found.append(Fact(f"sd of points in {axes[2].name}, median", z, units[2], note))
+        columns, note = (
+            (result.point_differences[check] * factors).T,
+            about("check-points.used", n=check.sum()),
+        )
+        rms = [rms_of(column[np.isfinite(column)]) for column in columns]
+        found.append(Fact.of(f"rms of check points in {names}", rms, unit, note, figures=2))
+    known = result.point_sd[result.used_points]
+    if len(known := known[np.isfinite(known).all(axis=1)]):
+        median = np.median(known * factors, axis=0)
+        found.append(Fact.of(f"sd of points in {names}, median", median, unit, figures=2))
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from photogram.results.films import numbers_of_film
 from photogram.results.network_trial import OBSERVATION, type_name
 from photogram.results.tables import Tests
 from photogram.show.page import Drawing, Part, Section, about
-from photogram.show.quantity import Axis, Kind, Quantity, Table, for_people, members_of_each, of_each
+from photogram.show.quantity import Axis, Quantity, Table, for_people, members_of_each, of_each
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -188,24 +189,17 @@ def mark_table(result: Result) -> list[Quantity]:
         np.mean([each["residual_mm"] for each in own], axis=0) if own else (np.nan, np.nan)
         for own in readings.values()
     ]
-    given, values, changes, sd = (
-        [each.given.position[:2] for each in every],
-        *([getattr(each, what) for each in every] for what in ("values", "change", "sd")),
-    )
-
-    def places(of: Any, kind: Kind, head: str, decimals: int, member: str = "") -> Quantity:
-        pairs = np.array(of).reshape(-1, 2)
-        return Quantity(pairs, _MM, kind, member=member, head=head, decimals=decimals)
-
+    places, of_marks = partial(Quantity, axes=_MM, decimals=4), partial(of_each, [*every], axes=_MM)
+    given = np.array([each.given.position[:2] for each in every])
     return [
         Quantity(list(readings), kind="name", member="fiducial", head="Fiducial"),
         Quantity([len(own) for own in readings.values()], head="Photos", decimals=0),
-        places(given, "value", "{}", 4, "certificate_mm"),
-        places(values, "value", "adjusted {}", 4, "value_mm"),
-        places(changes, "difference", "d {}", 2),
-        places(sd, "deviation", "sd {}", 2, "sd_mm"),
+        places(given, kind="value", member="certificate_mm", head="{}"),
+        of_marks("values", kind="value", member="value_mm", head="adjusted {}", decimals=4),
+        of_marks("change", kind="difference", member="", head="d {}", decimals=2),
+        of_marks("sd", kind="deviation", member="sd_mm", head="sd {}", decimals=2),
         Quantity([each.covariance for each in every], member="covariance_mm2"),
-        places(means, "difference", "mean residual {}", 2),
+        places(np.reshape(means, (-1, 2)), kind="difference", head="mean residual {}", decimals=2),
         Quantity(list(readings.values()), member="readings"),
     ]
 
@@ -213,19 +207,16 @@ def mark_table(result: Result) -> list[Quantity]:
 def scanner_table(result: Result) -> list[Quantity]:
     of = {id(film.scanner): film.readings for _, film in result.films}
     every = [each for each in result.unknowns if id(each.given) in of]
-    values, changes, sd = (
-        np.array([getattr(each, what) for each in every]).reshape(-1, 3)
-        for what in ("values", "change", "sd")
-    )
+    of_scanners = partial(of_each, every, axes=_DEVICE)
     readings = [of[id(each.given)] for each in every]
     return [
         of_each(every, "name", kind="name", member="scanner", head="Scanner"),
         *members_of_each(readings, pitch_mm="pitch", origin="origin", rows_down="down"),
         Quantity([["Sx", "Sy", "alpha_rad"]] * len(every), member="components"),
         *members_of_each(every, calibration="given.position"),
-        Quantity(values, _DEVICE, "value", member="value", head="{}", decimals=8),
-        Quantity(changes, _DEVICE, "difference", head="d {}"),
-        Quantity(sd, _DEVICE, "deviation", member="sd", head="sd {}"),
+        of_scanners("values", kind="value", member="value", head="{}", decimals=8),
+        of_scanners("change", kind="difference", member="", head="d {}"),
+        of_scanners("sd", kind="deviation", head="sd {}"),
         *members_of_each(every, "covariance"),
     ]
 

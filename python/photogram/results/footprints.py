@@ -17,6 +17,7 @@ from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.fixed_tests import as_adjusted
+from photogram.show.style import round_length
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -191,6 +192,4 @@ def fitting_scale(found: Ellipses, places: Floats) -> float:
     spacing = math.sqrt(
         max(float(extent[0] * extent[1]), float(extent.max()) ** 2 / len(places)) / known.sum()
     )
-    wanted = SHARE * spacing / typical if typical > 0 else 1.0
-    power = 10.0 ** math.floor(math.log10(wanted)) if wanted > 1 else 1.0
-    return max([step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted], default=1.0)
+    return max(round_length(SHARE * spacing / typical), 1.0) if typical > 0 else 1.0

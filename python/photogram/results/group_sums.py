@@ -21,7 +21,7 @@ from photogram.messages import by_name
 from photogram.results.grouping import Grouping, GroupsArgument, grouped, observables
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Brief, Tabular
-from photogram.show.page import Document, Section
+from photogram.show.page import Document, Section, about
 from photogram.show.quantity import Table, column, of_each
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
@@ -129,8 +129,8 @@ class GroupSums(Tabular, Brief):
             column("probability_above", high, "p high", figures=2),
         ]
         tested = sum(test is not None for test in tests)
-        names = ", ".join(each.name for each in self.rejected) or "none"
-        note = f"Beyond their limits, of {tested} tested at {100 * self.level:g} percent together: {names}."
+        names = [each.name for each in self.rejected] or ["none"]
+        note = about("groups", n=tested, percent=100 * self.level, names=names)
         title = "Groups of observations"
         return Document(title, "", sections=[Section.of(Table("groups", title, columns, note))])
 

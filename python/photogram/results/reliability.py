@@ -30,8 +30,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results import network_trial
 from photogram.results.covariance import Covariances, Selection
-from photogram.show.cells import written
-from photogram.show.forms import table_text
+from photogram.show.methods import Tabular
+from photogram.show.page import Document, Section, about
 from photogram.show.quantity import Table, column
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.findings import Removed
@@ -39,8 +39,6 @@ from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_d
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from photogram.results.parts import Terms
 
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
@@ -64,7 +62,7 @@ class Inseparable:
         return f"either {self.first} or {self.second} (correlation {self.correlation:.3f})"
 
 
-class Reliability:
+class Reliability(Tabular):
     """The reliability of all observations of a network, from row blocks of R.
 
     Arrays contain G groups of observations (`suspects`), or their M rows in the order of the groups; rows are
@@ -242,8 +240,8 @@ class Reliability:
     def row_groups(self) -> Indices:
         return np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
 
-    def observations(self) -> Table:
-        """Return the declared table of observations; displays show the worst."""
+    def document(self) -> Document:
+        """Return the document: all observations, of which reports show the worst."""
         suspects, groups = self.suspects, self.row_groups()
         rows = range(len(groups))
         names = np.array([str(suspects.name(group)) for group in range(len(suspects))], dtype=object)
@@ -265,27 +263,16 @@ class Reliability:
             column("group_external_sd", self.group_external[groups]),
         ]
         weight = "known" if self.known else f"estimated with {self.standing.degrees_of_freedom} degrees"
-        note = (
-            f"Errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
-            f" {self.level:g}, unit weight {weight}."
-        )
+        note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
         if count := int(self.untestable.sum()):
-            first = ", ".join(names[np.flatnonzero(self.untestable)[:3]])
-            note += f" {count} groups are checked by no other observation, such as {first}."
+            first = names[np.flatnonzero(self.untestable)[:3]].tolist()
+            note += f" {about('reliability-unchecked', n=count, names=first)}"
         testable, kinds = self.redundancy > TESTABLE, suspects.kinds[groups]
         of_kinds = [testable & (kinds == kind) for kind in range(len(suspects.kind_names))]
         worst = [int(np.where(own, self.external, -math.inf).argmax()) for own in of_kinds if own.any()]
         shown = np.array(worst, dtype=np.int64)
-        return Table("observations", "Reliability of observations", columns, note, shown=shown)
-
-    def table(self) -> pd.DataFrame:
-        """Return a data frame, a row for each observation, with its unit."""
-        return self.observations().frame()
-
-    def lines(self) -> list[str]:
-        """Return report lines: the largest undetected effect of every type."""
-        table = written(self.observations())
-        return [table.note, *table_text(table)]
+        table = Table("observations", "Reliability of observations", columns, note, shown=shown)
+        return Document(table.title, "", sections=[Section.of(table)])
 
 
 def _shown(redundancy: Floats) -> Floats:
