@@ -169,12 +169,17 @@ def calibrations(result: Result) -> list[Calibration]:
         held_up = [test.name for test in lens if re.fullmatch(r"[Kk]\d", test.name)][:-1]
         candidates = [test for test in lens if not test.significant and test.name not in held_up]
         removable = max(candidates, key=lambda test: test.probability, default=None)
+        names, table = each.names, each.correlations
+        every = (
+            Correlation(names[i], names[j], float(table[i, j])) for i, j in combinations(each.estimated, 2)
+        )
+        pairs = [pair for pair in every if abs(pair.coefficient) > CORRELATED]
         found.append(
             Calibration(
                 camera=each,
                 parameters=parameters,
                 groups=tuple(joint_test(result, each, names) for names in _families(each)),
-                correlations=_correlations(each),
+                correlations=tuple(sorted(pairs, key=lambda pair: -abs(pair.coefficient))),
                 poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
                 terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
                 removable=None if removable is None else removable.name,
@@ -211,13 +216,6 @@ def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
     families = [tuple(names) for names in by_family.values() if len(names) > 1]
     radial = [tuple(names[1:]) for letter, names in by_family.items() if letter in "Kk" and len(names) > 2]
     return families + radial
-
-
-def _correlations(camera: AdjustedCamera) -> tuple[Correlation, ...]:
-    table, names = camera.correlations, camera.names
-    pairs = [(i, j) for i, j in combinations(camera.estimated, 2) if abs(table[i, j]) > CORRELATED]
-    pairs.sort(key=lambda pair: -abs(table[pair]))
-    return tuple(Correlation(names[i], names[j], float(table[i, j])) for i, j in pairs)
 
 
 def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> tuple[PoseCorrelation, ...]:
@@ -388,12 +386,9 @@ def _field_remarks(result: Result, found: Calibration) -> list[str]:
     return [about("field", names=list(field.names), x=x, y=y, unit=unit, **sizes)]
 
 
-def calibration_members(result: Result) -> list[dict[str, Any]]:
-    return [_member(result, each) for each in calibrations(result)]
-
-
-def _member(result: Result, found: Calibration) -> dict[str, Any]:
+def calibration_member(result: Result, found: Calibration) -> dict[str, Any]:
     curve, field = distortion_curve(result, found.camera), lens_field(result, found.camera)
+    of_curve = ("direction", "balanced_at", "balanced_distance", "sd", "balanced")
     return {
         "camera": found.camera.name,
         "parameters": records(parameters_table(found).columns),
@@ -409,10 +404,8 @@ def _member(result: Result, found: Calibration) -> dict[str, Any]:
         "removable": found.removable,
         "remarks": found.remarks(),
         "distortion": curve
-        and members(curve, "direction", observed_radius="observed")
-        | members(curve, "balanced_at", "balanced_distance", radius="radii", distortion="values")
-        | members(curve, "sd", sd_of_mapping="sd_mapping")
-        | members(curve, "balanced", balanced_sd="sd_balanced"),
+        and members(curve, *of_curve, radius="radii", distortion="values", balanced_sd="sd_balanced")
+        | members(curve, observed_radius="observed", sd_of_mapping="sd_mapping"),
         "field": field
         and members(field, terms="names", position="positions", vector="vectors", covariance="covariances"),
     }

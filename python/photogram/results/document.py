@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -11,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.network.structuring import structure
 from photogram.results import network_document as of_network
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
-from photogram.results.calibration import calibration_members, cameras_section, gains_section
+from photogram.results.calibration import calibration_member, calibrations, cameras_section, gains_section
 from photogram.results.datum import observed_control
 from photogram.results.features import features_members, features_section
 from photogram.results.film_report import films_section
@@ -24,6 +22,7 @@ from photogram.results.network_tables import control, plan_deviations, point_axe
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.page import Document, Fact, Section, about, conventions
 from photogram.show.quantity import Quantity, Table, chosen, for_people, members, named, records
+from photogram.statistics.freedom import root_mean
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -72,11 +71,8 @@ def _accuracy(result: Result) -> list[Fact]:
     unit = "" if result.geographic else axes[2].small
     check = result.used_points & (result.point_kinds == "check")
     if check.any():
-        columns, note = (
-            (result.point_differences[check] * factors).T,
-            about("check-points.used", n=check.sum()),
-        )
-        rms = [rms_of(column[np.isfinite(column)]) for column in columns]
+        note = about("check-points.used", n=int(check.sum()))
+        rms = [root_mean(column**2) for column in (result.point_differences[check] * factors).T]
         found.append(Fact.of(f"rms of check points in {names}", rms, unit, note, figures=2))
     known = result.point_sd[result.used_points]
     if len(known := known[np.isfinite(known).all(axis=1)]):
@@ -111,7 +107,7 @@ def _differences(result: Result) -> Table:
         "check points": declared.check_points,
     }
     found = {
-        kind: [rms_of(column[np.isfinite(column)]) for column in named(table(result), "d").values.T]
+        kind: [root_mean(column**2) for column in named(table(result), "d").values.T]
         for kind, table in kinds.items()
     }
     known = {kind: values for kind, values in found.items() if np.isfinite(values).any()}
@@ -159,10 +155,6 @@ def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
     return "bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)", figures
 
 
-def rms_of(values: Floats) -> float:
-    return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
-
-
 def _members(result: Result) -> dict[str, Any]:
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
     test = result.global_test
@@ -171,7 +163,23 @@ def _members(result: Result) -> dict[str, Any]:
         Quantity(covariances[:, place, place], member="position_covariance"),
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
     )
-    return {
+    of_camera = ("name", "photos", "images", "covariance")
+    of_unknown = ("kind", "name", "position", "observations", "components", "units", "change", "sd")
+    of_unknown += ("redundancy", "standardized", "covariance")
+    found: dict[str, Any] = {}
+    if result.cameras:
+        found["cameras"] = [
+            members(each, *of_camera, model="camera.model", image_unit="camera.unit")
+            | {"parameters": records(declared.camera_parameters([each]))}
+            for each in result.cameras
+        ]
+        found["calibrations"] = [calibration_member(result, each) for each in calibrations(result)]
+    if result.unknowns:
+        found["unknowns"] = [
+            members(each, *of_unknown, matrix="attitude", sd_given="given.deviations", value="values")
+            for each in result.unknowns
+        ]
+    return found | {
         **of_network.network_members(result, of_photos),
         "title": result.block.title,
         "units": _units(result),
@@ -189,34 +197,10 @@ def _members(result: Result) -> dict[str, Any]:
         "unit_variance": result.unit_variance,
         "global_test": test
         and members(test, "variance", "limits", "level", "probability") | {"rejected": side},
-        **_of_some(result),
+        **({} if result.features is None else {"features": features_members(result.features)}),
         "observations_beside_images": _beside_images(result),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
     }
-
-
-def _of_some(result: Result) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    if result.cameras:
-        found["cameras"] = [
-            members(each, "name", model="camera.model", image_unit="camera.unit")
-            | members(each, "photos", "images")
-            | {"parameters": records(declared.camera_parameters([each])), "covariance": each.covariance}
-            for each in result.cameras
-        ]
-        found["calibrations"] = calibration_members(result)
-    if result.unknowns:
-        found["unknowns"] = [
-            members(each, "kind", "name", "position", matrix="attitude")
-            | members(
-                each, "observations", "components", "units", sd_given="given.deviations", value="values"
-            )
-            | members(each, "change", "sd", "redundancy", "standardized", "covariance")
-            for each in result.unknowns
-        ]
-    if result.features is not None:
-        found["features"] = features_members(result.features)
-    return found
 
 
 _SUMS = ("camera", "ground", "plates", "observations", "total")

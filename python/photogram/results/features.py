@@ -270,9 +270,8 @@ def _member(feature: Feature) -> dict[str, Any]:
     numbers = np.hstack([feature.deviations, feature.deviation_sd]).tolist()
     form = members(feature, "statistic", "freedom", "probability", sentence="form")
     return {
-        **members(feature, "name", "kind", "points"),
+        **members(feature, "name", "kind", "points", "covariance"),
         "quantities": [vars(each) for each in feature.quantities],
-        "covariance": feature.covariance,
         "deviations": [
             {"point": point, **dict(zip(named, row, strict=True))}
             for point, row in zip(feature.points, numbers, strict=False)

@@ -130,11 +130,10 @@ class ReliabilitySummary:
     def document(self) -> dict[str, Any]:
         return {
             **members(self, "level", "power"),
+            **members(self.listed, "points_looked_into"),
+            **members(self.listed, points_on_two_photos="two_rays", inseparable_found="pairs_found"),
             "unit_weight": "known" if self.known else "unknown",
-            "points_on_two_photos": self.listed.two_rays,
             "inseparable": [members(pair, "first", "second", "correlation") for pair in self.listed.pairs],
-            "inseparable_found": self.listed.pairs_found,
-            "points_looked_into": self.listed.points_looked_into,
             "hypotheses": self.hypotheses.document(),
         }
 

@@ -185,7 +185,11 @@ def sheet(table: Quantities) -> list[Column]:
             continue
         name = _RENAMED.get(each.name, each.name)
         if each.kind == "name":
-            found.append(Column(name, _repeated(each.values), "", each.about))
+            values: Any = np.asarray(each.values)
+            if values.dtype.kind not in "iu":  # Numbers of photos and points are not repeated texts
+                few, rows = np.unique(values.astype(str), return_inverse=True)
+                values = Repeated(few.tolist(), rows)
+            found.append(Column(name, values, "", each.about))
         elif each.single:
             unit = "1" if each.kind == "number" else "as the column unit says"
             found.append(Column(name, np.asarray(each.values), unit, each.about.removesuffix(": {}")))
@@ -195,15 +199,6 @@ def sheet(table: Quantities) -> list[Column]:
                 unit = "1" if each.kind == "number" else axis.unit
                 found.append(Column(own, column, unit, each.about.format(axis.name)))
     return found
-
-
-def _repeated(names: Any) -> Any:
-    """Return names as a categorical column; numbers of photos and points unchanged."""
-    values = np.asarray(names)
-    if values.dtype.kind in "iu":
-        return values
-    few, rows = np.unique(values.astype(str), return_inverse=True)
-    return Repeated(few.tolist(), rows)
 
 
 def written(

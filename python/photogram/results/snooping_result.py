@@ -105,7 +105,7 @@ class Snooped(Brief, Documented):
             "before": _standing(outcome.before),
             "after": _standing(outcome.standing),
             "rounds": [
-                members(each, "number", *_STANDING, limit_p="limit") | members(each, "removed", "returned")
+                members(each, "number", *_STANDING, "removed", "returned", limit_p="limit")
                 for each in outcome.rounds
             ],
             "exchanged_names": [
@@ -207,20 +207,17 @@ def log_table(log: Sequence[Removal]) -> Table:
     states = [f"kept: {each.kept}" if each.kept else state for each, state in zip(log, states, strict=True)]
     columns = [
         of_each(log, "round", head="Round", decimals=0),
-        of_each(log, "kind", kind="name"),
         of_each(log, "name", kind="name", head="What"),
         Quantity([*map(estimated_errors, log)], kind="name", head="Estimated error"),
-        *members_of_each(log, "components", "units", estimated_error="error", estimated_error_sd="error_sd"),
-        *members_of_each(log, prediction_T="prediction", predicted_error="prediction_error"),
+        *members_of_each(log, "kind", "components", "units", "dimension", "log10_p", "returned"),
+        *members_of_each(log, "prediction_log10_p", prediction_T="prediction", limit_p="limit"),
+        *members_of_each(log, estimated_error="error", estimated_error_sd="error_sd"),
+        *members_of_each(log, predicted_error="prediction_error", first_T="first_statistic"),
+        *members_of_each(log, T="statistic", F="fisher"),
         Quantity([[*map(str, each.consequences)] for each in log], member="consequences"),
-        *members_of_each(log, "dimension", first_T="first_statistic", T="statistic", F="fisher"),
         Quantity(np.exp([each.log_probability for each in log]), member="p"),
-        of_each(log, "log10_p"),
-        of_each(log, "limit", member="limit_p"),
         of_each(log, "redundancy", head="Redundancy", decimals=3),
         Quantity(rivals, member="rivals"),
-        of_each(log, "prediction_log10_p"),
-        of_each(log, "returned"),
         Quantity([str(each.kept) or None for each in log], member="kept"),
         Quantity([rivals_of(each.rivals[:3], 2) for each in log], kind="name", head="Or instead"),
         Quantity(states, kind="name", head="Now"),

@@ -195,3 +195,9 @@ def _contributions(name: str, values: ArrayLike) -> Floats:
 def _freedom(variance: float, half: float) -> float:
     """Return the degrees of freedom of a variance, given half of its own variance."""
     return variance**2 / half if half > 0 else math.inf
+
+
+def root_mean(squares: Floats) -> float:
+    """Return the root mean of known values; NaN without any."""
+    known = squares[np.isfinite(squares)]
+    return math.sqrt(float(known.mean())) if known.size else math.nan

@@ -24,7 +24,7 @@ from photogram.results.statement.comparison import LEVEL, PARTS, Compared
 from photogram.statistics import error_radii
 from photogram.statistics.agreement import SINGULAR, quadratic, root_of, scale_of
 from photogram.statistics.distributions import critical_normal, critical_student, log_chi_square
-from photogram.statistics.freedom import effective_freedom, rmse_interval
+from photogram.statistics.freedom import effective_freedom, rmse_interval, root_mean
 
 LEAST = 6  # Minimum number of heights for a surface
 FLAT = 1e-6  # Width of collinear points relative to their extent
@@ -370,12 +370,6 @@ def _sized(values: Floats, names: tuple[str, ...], *, radial: bool = False) -> S
     mean = math.nan if radial else float(some.mean())
     sd = math.nan if radial or len(own) < 2 else float(some.std(ddof=1))
     return Sized(len(own), mean, sd, root_mean(some**2), float(abs(values[worst])), names[worst])
-
-
-def root_mean(squares: Floats) -> float:
-    """Return the root mean of known values; NaN without any."""
-    known = squares[np.isfinite(squares)]
-    return math.sqrt(float(known.mean())) if known.size else math.nan
 
 
 def _radii(plan: Floats, heights: Floats) -> dict[str, dict[str, Any] | None]:

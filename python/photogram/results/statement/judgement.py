@@ -12,13 +12,14 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
 from photogram.results.statement.budget import budget_fields
 from photogram.results.statement.comparison import LEVEL, LeftOut, limit_of
-from photogram.results.statement.figures import Figures, Prediction, Surface, root_mean
+from photogram.results.statement.figures import Figures, Prediction, Surface
 from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.standards import Asprs, wording
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.show.quantity import members
 from photogram.statistics.distributions import critical_normal
+from photogram.statistics.freedom import root_mean
 from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
@@ -99,7 +100,8 @@ def judged(found: Statement) -> Judged:
     """Return the verdict of all findings."""
     texts, asprs, test = found.texts, found.standards.asprs, found.standards.lengths
     whole = None if test is None else test.together
-    side = _side(found.of_all)
+    overall = found.of_all and _whole(found.of_all)
+    side = overall and overall.rejected
     holds = {
         "high": side == "high",
         "low": side == "low",
@@ -132,11 +134,6 @@ def judged(found: Statement) -> Judged:
 
 def _whole(of_all: Figures) -> Prediction | None:
     return of_all.prediction["all"] or of_all.prediction["h"] or of_all.prediction["plan"]
-
-
-def _side(of_all: Figures | None) -> str | None:
-    whole = None if of_all is None else _whole(of_all)
-    return None if whole is None else whole.rejected
 
 
 def _doubtful(of_all: Figures | None) -> bool:

@@ -26,12 +26,12 @@ from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
 from photogram.results.result import Result
 from photogram.results.statement import comparison, lengths
-from photogram.results.statement.figures import Figures, root_mean
+from photogram.results.statement.figures import Figures
 from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
-from photogram.statistics.freedom import rmse_interval
+from photogram.statistics.freedom import rmse_interval, root_mean
 
 ASPRS_POINTS = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
 MOST_STEPS = 10  # Number of steps of 1,000 km2, after which the number of check points is constant
