@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.results.network_tables import iteration_table
+from photogram.show.page import about
 from photogram.show.quantity import Axis, Quantity, Table, chosen, column
 from photogram.statistics.reliability import TESTABLE
 
@@ -46,15 +47,9 @@ def control(result: Orientation) -> Table:
 
 
 def _test(result: Orientation) -> str:
-    if not math.isfinite(result.limit):
-        return "No single coordinate is tested: it takes two degrees of freedom."
-    kind = (
-        "standardized residual w, normal distribution"
-        if result.decided_by_w
-        else f"studentized residual t, Student with {result.degrees_of_freedom - 1} degrees of freedom"
-    )
-    tests = int(np.isfinite(result.tested).sum())
-    return f"Test: {kind}; limit {result.limit:.2f} (5 percent for all {tests} tests together)."
+    law = "none" if not math.isfinite(result.limit) else "normal" if result.decided_by_w else "student"
+    tests, freedom = int(np.isfinite(result.tested).sum()), result.degrees_of_freedom - 1
+    return about(f"orientation.{law}", freedom=freedom, limit=result.limit, tests=tests)
 
 
 def model_residuals(result: Orientation) -> Table:

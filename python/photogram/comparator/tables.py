@@ -14,7 +14,7 @@ from photogram.comparator.fits import Decomposition, Residuals
 from photogram.comparator.outliers import FarPointing, Screening
 from photogram.comparator.polynomial import TERMS
 from photogram.comparator.variance import PolynomialTest
-from photogram.show.page import probability_written
+from photogram.show.page import about, probability_written
 from photogram.show.quantity import Axis, Quantity, Table, component, members, members_of_each, of_each
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def terms(test: PolynomialTest) -> Table:
         of_each(found, "probability", head="p", figures=2),
     ]
     p = "" if test.probability is None else f", p = {probability_written(test.probability)}"
-    note = f"All terms together: F = {test.ratio:.2f} with {first} and {second} degrees of freedom{p}."
+    note = about("polynomial", ratio=test.ratio, first=first, second=second, p=p)
     return Table("polynomial.terms", "Terms and their tests", columns, note)
 
 

@@ -227,13 +227,11 @@ def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
 def features_section(features: Features | None, picture: Drawing | None = None) -> Section:
     if not features:
         return Section("features", "Features", [])
-    k = f"{features.k:g}"
-    if features.coverage is not None:
-        student = f"Student with {features.freedom:.4g} degrees of freedom"
-        law = "normal" if math.isinf(features.freedom) else student
-        k = f"{features.k:.3f} ({100 * features.coverage:g} %, {law})"
+    law = "given" if features.coverage is None else "normal" if math.isinf(features.freedom) else "student"
+    note = about(
+        f"coverage.{law}", k=features.k, p=100 * (features.coverage or 0.0), freedom=features.freedom
+    )
     columns, by = quantity_columns(features), unit_deviations(features)
-    note = f"Coverage factor k = {k}."
     parts: list[Part] = [Table("features", "Quantities of features", columns, note, deviations=by)]
     if tested := [each for each in features if each.statistic is not None]:
         forms = [

@@ -32,8 +32,8 @@ from photogram.results.fixed_tests import score
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
 from photogram.show.methods import Brief, Tabular
-from photogram.show.page import Document, Remarks, Section
-from photogram.show.quantity import Table, of_each
+from photogram.show.page import Document, Section, about
+from photogram.show.quantity import Quantity, Table, of_each
 from photogram.statistics.agreement import quadratic
 from photogram.words import phrase
 
@@ -118,14 +118,12 @@ class Comparison(Tabular, Brief):
 
     def statement(self) -> str:
         """Return a statement on the criterion."""
-        if len(self.models) < 2:
-            return f"{self.best.name} is the only model"
-        rival = self.models[1]
-        difference = rival.bic - self.best.bic
-        size = "decisive" if difference > DECISIVE else "positive" if difference > POSITIVE else "none"
-        if size == "none":
-            return f"{self.best.name} and {rival.name} are as good as each other (BIC {difference:.1f} apart)"
-        return f"{self.best.name} is better than {rival.name}: {size} evidence (BIC {difference:.1f} apart)"
+        best, *rivals = self.models
+        if not rivals:
+            return about("models.only", best=best.name)
+        apart = rivals[0].bic - best.bic
+        size = "decisive" if apart > DECISIVE else "positive" if apart > POSITIVE else "none"
+        return about(f"models.{size}", best=best.name, rival=rivals[0].name, difference=apart)
 
     def document(self) -> Document:
         """Return the document: models, the best first, and tests against larger models."""
@@ -140,12 +138,16 @@ class Comparison(Tabular, Brief):
             of_each(self.models, "checks", name="rms_check", head="rms of checks", figures=5),
         ]
         models = Table("models", "Models", columns, self.statement())
-        nested = [
-            f"{small} within {large}: T {value:.3f} with {dimension}, probability {probability:.2g}"
-            for small, large, value, dimension, probability in self.nested
+        small, large, statistic, dimension, p = zip(*self.nested, strict=True) if self.nested else ((),) * 5
+        tests = [
+            Quantity(small, kind="name", head="Model"),
+            Quantity(large, kind="name", head="Within"),
+            Quantity(statistic, head="T", decimals=3),
+            Quantity(dimension, head="Dimension", decimals=0),
+            Quantity(p, head="p", figures=2),
         ]
-        sections = [Section.of(models), Section("nested", "Nested models", [Remarks(nested)])]
-        return Document("Models of the same observations", "", sections=sections)
+        nested = Table("nested", "Nested models", tests)
+        return Document("Models of the same observations", "", sections=[*map(Section.of, (models, nested))])
 
 
 def terms_test(result: Result, names: Sequence[str], *, camera: str | None = None) -> TermsTest:

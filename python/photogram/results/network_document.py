@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Indices
+from photogram.lazy_dataclasses import replace
 from photogram.plots.accessor import sketch_of
 from photogram.results import network_sections as sections
 from photogram.results import network_tables as declared
@@ -66,7 +67,7 @@ def network_document(
     first = Fact.of("Weighted sum of squares at first", result.initial_weighted_sum_of_squares, figures=7)
     course = [Fact("Status", result.status), first]
     if result.loss is not None:
-        course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
+        course.append(Fact("Robust loss", about("loss", name=result.loss[0], scale=result.loss[1])))
     summary = result.reliability_summary
     reliability = [] if summary is None else summary.parts(result._terms.linear_unit)
     return verdict_document(
@@ -129,9 +130,9 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
     }
 
 
-def used_fact(name: str, used: Bools) -> Fact:
+def used_fact(name: str, used: Bools, of: str = "used of") -> Fact:
     """Return the number of used items of a type."""
-    return Fact(name, f"{np.count_nonzero(used)} used of {len(used)}")
+    return Fact(name, f"{np.count_nonzero(used)} {of} {used.size}")
 
 
 def size_section(
@@ -156,11 +157,11 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
         sigma, note = math.sqrt(variance), ""
         for test in result.verdict.tests:
             if test.kind == GLOBAL and test.limits[0] is not None and test.limits[1] is not None:
-                note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
+                note = about("expected", low=math.sqrt(test.limits[0]), high=math.sqrt(test.limits[1]))
     found = [
         Fact.of("Standard deviation of unit weight", sigma, note=note, decimals=3),
-        Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
-        Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
+        Fact("Photos", about("count", n=photos), note=about("photos", points=points, images=images)),
+        Fact("Degrees of freedom", about("count", n=result.degrees_of_freedom)),
         Fact.of("Iterations", len(result.iterations), note=result.status),
     ]
     if images:
@@ -183,11 +184,10 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     redundancy = result.redundancy[used]
     if np.isfinite(redundancy).all():
         least, note = (redundancy.mean(), redundancy.min()), about("redundancy-numbers")
-        hidden = f"{int(np.count_nonzero(redundancy <= _NOT_CHECKED))} of {redundancy.size}"
-        below = f"redundancy below {_NOT_CHECKED:g}"
+        hidden, below = redundancy <= _NOT_CHECKED, about("redundancy-below", limit=_NOT_CHECKED)
         facts += [
             Fact.of("Redundancy numbers of images, mean and least", least, note=note, decimals=3),
-            Fact("Image coordinates that nothing checks", hidden, note=below),
+            replace(used_fact("Image coordinates that nothing checks", hidden, "of"), note=below),
         ]
     return facts
 

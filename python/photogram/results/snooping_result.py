@@ -149,8 +149,8 @@ class Snooped(Brief, Documented):
         return [
             Fact("Unit weight", "known: chi-square tests" if options.is_known else "unknown: F tests"),
             Fact.of(name, level, note=tests),
-            Fact("Unit variance before", _said(outcome.before)),
-            Fact("Unit variance after", _said(outcome.standing), note=biased if self.removed else ""),
+            Fact("Unit variance before", _variance(outcome.before)),
+            Fact("Unit variance after", _variance(outcome.standing), note=biased if self.removed else ""),
             Fact.of("Rounds", len(outcome.rounds)),
             Fact.of("Taken out", len(self.removed), note=taken_out),
         ]
@@ -249,14 +249,13 @@ def _standing(standing: Standing) -> dict[str, Any]:
     return members(standing, *_STANDING) | {"variance_of_unit_weight": variance}
 
 
-def _said(standing: Standing) -> str:
+def _variance(standing: Standing) -> str:
     test = global_test(*standing.sum_and_freedom)
     if test is None:
-        return "undefined: no degrees of freedom"
-    said = "too high" if test.rejected_high else "too low" if test.rejected_low else "as expected"
-    expected = f"{test.limits[0]:.3f} to {test.limits[1]:.3f}"
-    freedom = standing.degrees_of_freedom
-    return f"{test.variance:.4f} with {freedom} degrees of freedom, expected {expected}: {said}"
+        return about("variance.undefined")
+    side = "high" if test.rejected_high else "low" if test.rejected_low else "good"
+    (low, high), freedom = test.limits, standing.degrees_of_freedom
+    return about(f"variance.{side}", value=test.variance, freedom=freedom, low=low, high=high)
 
 
 def rivals_of(rivals: Iterable[Rival], figures: int) -> str:
