@@ -133,8 +133,8 @@ class Plan(Documented):
         marks = [*panels[-1].marks, *labelled.values()]
         panels[-1] = replace(panels[-1], marks=marks, legend="beside", shades=shades)
         width, height = np.ptp(limits, axis=0).tolist()
-        columns = 1 if width > MAX_SIDE_BY_SIDE * height else len(panels)
-        longer = PANEL if columns > 1 else 2 * PANEL
+        wide = width > MAX_SIDE_BY_SIDE * height
+        columns, longer = (1, 2 * PANEL) if wide else (len(panels), PANEL)
         across, up = longer * np.array([width, height]) / max(width, height) + [0.5, 1.0]
         return Plot(columns * max(across, 4.0) + 3.0, len(panels) // columns * up + 0.4, panels, columns)
 

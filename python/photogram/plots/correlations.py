@@ -39,7 +39,8 @@ def _matrix(each: Correlated) -> Panel:
         rows, columns = np.nonzero(~np.eye(count, dtype=bool))
         values = each.coefficients[rows, columns].tolist()
         texts = [
-            f"{value:.2f}".replace("0.", ".", 1) if abs(value) < 0.995 else f"{value:.3f}" for value in values
+            f"{value:z.2f}".replace("0.", ".", 1) if abs(value) < 0.995 else f"{value:.3f}"
+            for value in values
         ]
         colours = ["white" if abs(value) > 0.7 else "black" for value in values]
         marks.append(Texts(np.column_stack([columns, rows]).astype(float), texts, 6.5, colours, "middle"))

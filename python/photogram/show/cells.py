@@ -65,16 +65,16 @@ def _written(parts: Sequence[Part], words: Words, draw: Draw) -> list[Any]:
 def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
     """Return a part of a document; a declared table becomes a formatted one.
 
-    Columns without a head are omitted. The standard deviations of a table define the decimals of its
-    components: two digits of the median. `numeral` converts numbers to the format of a language.
+    Columns without a head or content are omitted. The standard deviations of a table define the decimals of
+    its components: two digits of the median. `numeral` converts numbers to the format of a language.
     """
     if not isinstance(part, quantity.Table):
         return part
     columns = part.columns
     if part.shown is not None:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
-    visible = [column for each in columns if each.head for column in _columns(each, part.deviations, numeral)]
-    return page.Table(part.title, visible, part.note)
+    written = [column for each in columns if each.head for column in _columns(each, part.deviations, numeral)]
+    return page.Table(part.title, [each for each in written if {*each.cells} - {"", "–"}], part.note)
 
 
 def _columns(each: Quantity, by: Floats | None, numeral: Callable[[str], str]) -> Iterator[Column]:

@@ -45,7 +45,9 @@ def page_html(page: Document) -> bytes:
 
 
 def _file(name: str) -> str:
-    return files("photogram.show").joinpath("templates", name).read_text(encoding="utf-8")
+    """Return a template without indentation and lines of comments."""
+    content = files("photogram.show").joinpath("templates", name).read_text(encoding="utf-8")
+    return re.sub(r"^ *(//.*\n)?", "", content, flags=re.MULTILINE)
 
 
 def _list(name: str, items: Iterable[str], **attributes: str) -> str:

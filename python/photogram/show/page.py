@@ -41,7 +41,8 @@ class Column:
 
     @property
     def toned(self) -> list[tuple[str, Tone]]:
-        return [*zip(self.cells, self.tones or [""] * len(self.cells), strict=True)]
+        plain: Tone = ""
+        return [*zip(self.cells, self.tones or [plain] * len(self.cells), strict=True)]
 
 
 @dataclass(frozen=True)
