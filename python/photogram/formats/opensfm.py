@@ -11,7 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
-from photogram.formats.block_contents import correlated_control, posed
+from photogram.formats.block_contents import known_points, posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format
 from photogram.formats.images import Y_DOWN, lens_with, named_pixels, sizes_of, to_corner
@@ -292,25 +292,20 @@ def _control(project: Project) -> bytes:
 
     Points with unknown coordinates are omitted.
     """
-    block = project.block
-    positions = block.point_positions.copy()
-    places = {name: row for row, name in enumerate(block.point_ids)}
-    for name, each in correlated_control(block).items():
-        positions[places[name]] = each.observed
-    own = np.flatnonzero(np.isfinite(positions).all(axis=1))
-    if not len(own) or not _placed_frame(project):
+    known = known_points(project)
+    own = np.flatnonzero(np.isfinite(known.positions).all(axis=1)).tolist()
+    if not own or not _placed_frame(project):
         return b""
     from photogram.formats.crs import GEOGRAPHIC, from_frame
 
-    found = positions.copy()
-    found[own], _ = from_frame(GEOGRAPHIC, positions[own], np.zeros((len(own), 3, 3)), project.frame)
-    known = {block.point_ids[row]: found[row].tolist() for row in own.tolist()}
+    found, _ = from_frame(GEOGRAPHIC, known.positions[own], np.zeros((len(own), 3, 3)), project.frame)
+    places = {project.block.point_ids[known.rows[k]]: xyz for k, xyz in zip(own, found.tolist(), strict=True)}
     lines = ["WGS84"]
     # OpenSfM counts pixels from the centre of the first one and ends names at blanks.
     for photo, point, column, row in named_pixels(project):
-        if point in known:
+        if point in places:
             names = ("_".join(name.split()) for name in (photo, point))
-            lines.append(" ".join([*map(repr, [*known[point], column - 0.5, row - 0.5]), *names]))
+            lines.append(" ".join([*map(repr, [*places[point], column - 0.5, row - 0.5]), *names]))
     return ("\n".join(lines) + "\n").encode() if len(lines) > 1 else b""
 
 

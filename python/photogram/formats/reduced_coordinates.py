@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.block_contents import correlated_control, posed
+from photogram.formats.block_contents import known_points, posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
@@ -145,16 +145,10 @@ def reduced_images(project: Project, digits: int | None = None) -> ReducedImages
 
 def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
     """Return control and check points, and their fixed or weighted coordinates."""
-    block = project.block
-    full = correlated_control(block)
-    found = {}
-    for row, name in enumerate(block.point_ids):
-        position, held = block.point_positions[row], np.isfinite(block.point_sd[row])
-        if name in full:
-            position, held = full[name].observed, np.ones(3, dtype=bool)
-        if np.isfinite(position).any():
-            found[name] = np.asarray(position), held
-    return found
+    known = known_points(project)
+    held = np.isfinite(known.sd) & ~known.checks[:, np.newaxis]
+    names = [project.block.point_ids[row] for row in known.rows]
+    return dict(zip(names, zip(known.positions, held, strict=True), strict=True))
 
 
 def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[Phrase]:

@@ -391,7 +391,7 @@ class Trajectory:
         Meaning of the rotation coefficients. `vector`: rotation vectors about the axes of the photo, A = A0
         Exp(r). `zxz`: radians added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its
         axes to the axes of a camera that looks along +z, x right, y down. Polynomials instead of a table are
-        equivalent to a table sampled from them (`formats.csm.photos.with_polynomial_pointing`).
+        equivalent to a table sampled from them.
 
     Attributes
     ----------

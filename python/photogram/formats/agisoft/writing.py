@@ -10,9 +10,8 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.agisoft import FILE
-from photogram.formats.block_contents import correlated_control, posed
+from photogram.formats.block_contents import KnownPoints, known_points, posed
 from photogram.formats.images import Y_DOWN, known_size, lens_with, to_corner
-from photogram.formats.plain.tables import covariances_of
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.lazy_dataclasses import dataclass
@@ -28,7 +27,8 @@ _TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3",
 
 def cannot_hold(project: Project) -> list[Phrase]:
     """Return images of tie points, incomplete control, and digits of the earth."""
-    block, marked = project.block, _marked(project)
+    block, known = project.block, known_points(project)
+    marked = np.isin(np.arange(len(block.point_ids)), np.array(known.rows, dtype=int)[_complete(known)])
     partial = np.isfinite(block.point_positions).any(axis=1) & ~marked
     counts = {
         "lost.ties": np.count_nonzero(~marked[block.image_points]),
@@ -180,34 +180,25 @@ def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
     return f'<reference {attributes} enabled="{"false" if check else "true"}"/>'
 
 
-def _marked(project: Project) -> Bools:
+def _complete(known: KnownPoints) -> Bools:
     """Return which points are markers: complete control, and check points."""
-    block, full = project.block, correlated_control(project.block)
-    known = np.isfinite(block.point_positions).all(axis=1)
-    held = np.isfinite(block.point_sd)
-    correlated = np.array([name in full for name in block.point_ids], dtype=bool)
-    return np.asarray(correlated | (known & (held.all(axis=1) | ~held.any(axis=1))))
+    held = np.isfinite(known.sd).all(axis=1) | known.checks
+    return np.asarray(np.isfinite(known.positions).all(axis=1) & held)
 
 
 def _markers(project: Project, world: _World) -> list[str]:
-    block, full = project.block, correlated_control(project.block)
-    rows = np.flatnonzero(_marked(project)).tolist()
-    if not rows:
+    known = known_points(project)
+    own = np.flatnonzero(_complete(known)).tolist()
+    if not own:
         return []
-    positions, sd = block.point_positions[rows].copy(), block.point_sd[rows]
-    checks: Bools = np.asarray(~np.isfinite(sd).any(axis=1))
-    if block.point_check_sd is not None:
-        sd = np.where(checks[:, np.newaxis], block.point_check_sd[rows], sd)
-    covariances = covariances_of(np.where(np.isfinite(sd), sd, 0.0))
-    for k, row in enumerate(rows):
-        if (each := full.get(block.point_ids[row])) is not None:
-            positions[k], covariances[k], checks[k] = each.observed, each.precision, False
-    positions, deviations = world.references(positions, covariances)
-    lines = [f'<markers next_id="{len(rows)}" next_group_id="0">']
-    for k, row in enumerate(rows):
-        reference = _reference(positions[k], deviations[k], bool(checks[k]))
-        lines.append(f'<marker id="{k}" label={quoteattr(block.point_ids[row])}>{reference}</marker>')
-    return [*lines, "</markers>", *_locations(project, {row: k for k, row in enumerate(rows)})]
+    positions, deviations = world.references(known.positions[own], known.covariances[own])
+    lines = [f'<markers next_id="{len(own)}" next_group_id="0">']
+    for k, (row, sd) in enumerate(zip(own, deviations, strict=True)):
+        name = quoteattr(project.block.point_ids[known.rows[row]])
+        reference = _reference(positions[k], sd, bool(known.checks[row]))
+        lines.append(f'<marker id="{k}" label={name}>{reference}</marker>')
+    markers = {known.rows[row]: k for k, row in enumerate(own)}
+    return [*lines, "</markers>", *_locations(project, markers)]
 
 
 def _locations(project: Project, markers: Mapping[int, int]) -> list[str]:

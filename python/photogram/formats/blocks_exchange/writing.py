@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.block_contents import correlated_control
+from photogram.formats.block_contents import known_points
 from photogram.formats.blocks_exchange import FILE
 from photogram.formats.blocks_exchange.reading import CENTER
 from photogram.formats.images import Y_DOWN, lens_with, sizes_of, to_corner
@@ -113,23 +113,18 @@ def _points(project: Project) -> list[str]:
         block.image_photos.tolist(), block.image_points.tolist(), corner, strict=True
     ):
         images[point].append(f"<Measurement><PhotoId>{photo}</PhotoId><x>{x!r}</x><y>{y!r}</y></Measurement>")
-    full = correlated_control(block)
+    known = known_points(project)
+    places = {row: k for k, row in enumerate(known.rows)}
     control, ties = ["<ControlPoints>"], ["<TiePoints>"]
-    checks, check_sd = set(project.checks), block.point_check_sd
     for row, name in enumerate(block.point_ids):
-        position, sd = block.point_positions[row], block.point_sd[row]
-        if name in full:
-            position, sd = full[name].observed, np.sqrt(np.diag(full[name].precision))
-        told = f"<Name>{escape(name)}</Name>"
-        if name in full or row in checks or np.isfinite(sd).any():
-            if check_sd is not None and row in checks:
-                sd = check_sd[row]
-            given = _given(position, sd, row in checks)
-            control += ["<ControlPoint>", told, *given, *images[row], "</ControlPoint>"]
+        title = f"<Name>{escape(name)}</Name>"
+        if (k := places.get(row)) is not None:
+            given = _given(known.positions[k], known.sd[k], bool(known.checks[k]))
+            control += ["<ControlPoint>", title, *given, *images[row], "</ControlPoint>"]
             continue
         start = project.starts[row]
-        known = [f"<Position>{_xyz(start)}</Position>"] if np.isfinite(start).all() else []
-        ties += ["<TiePoint>", told, *known, *images[row], "</TiePoint>"]
+        position = [f"<Position>{_xyz(start)}</Position>"] if np.isfinite(start).all() else []
+        ties += ["<TiePoint>", title, *position, *images[row], "</TiePoint>"]
     return [*control, "</ControlPoints>", *ties, "</TiePoints>"]
 
 

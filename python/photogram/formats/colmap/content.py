@@ -53,17 +53,17 @@ POINT = np.dtype([("number", "<u8"), ("xyz", "<f8", 3), ("rgb", "u1", 3), ("erro
 class Form(NamedTuple):
     """Form of a field: a character of `struct`, a key of `WORDS`, `name`, `features`, or a record.
 
-    `count` is the number of values, of groups with these names, or of records: a function of the previous
+    `number` is the number of values, of groups with these names, or of records: a function of the previous
     fields. None: one value for each name.
     """
 
     kind: str | type
     names: tuple[str, ...]
-    count: Callable[[dict[str, Any]], int] | None
+    number: Callable[[dict[str, Any]], int] | None
 
 
-def _stored(kind: str | type, names: str = "", count: Callable[[dict[str, Any]], int] | None = None) -> Any:
-    return field(metadata={"form": Form(kind, tuple(names.split()), count)})
+def _stored(kind: str | type, names: str = "", number: Callable[[dict[str, Any]], int] | None = None) -> Any:
+    return field(metadata={"form": Form(kind, tuple(names.split()), number)})
 
 
 @cache
@@ -122,8 +122,8 @@ class Rig:
 
     number: int = _stored("I", "RIG_ID")
     count: int = _stored("I", "NUM_SENSORS")
-    reference: tuple[Sensor, ...] = _stored(Sensor, count=lambda own: min(own["count"], 1))
-    sensors: tuple[MountedSensor, ...] = _stored(MountedSensor, count=lambda own: own["count"] - 1)
+    reference: tuple[Sensor, ...] = _stored(Sensor, number=lambda own: min(own["count"], 1))
+    sensors: tuple[MountedSensor, ...] = _stored(MountedSensor, number=lambda own: own["count"] - 1)
     place: Place = Place()
 
 
@@ -142,7 +142,7 @@ class Frame:
     rig: int = _stored("I", "RIG_ID")
     pose: tuple[float, ...] = _stored("d", _POSE)
     count: int = _stored("I", "NUM_DATA_IDS")
-    data: tuple[SensorImage, ...] = _stored(SensorImage, count=lambda own: own["count"])
+    data: tuple[SensorImage, ...] = _stored(SensorImage, number=lambda own: own["count"])
     place: Place = Place()
 
 

@@ -54,11 +54,11 @@ def _read(source: _Line | _Bytes, kind: type[_Kind]) -> _Kind:
     """Return a record of declared fields."""
     values: dict[str, Any] = {"place": source.place} if hasattr(kind, "place") else {}
     for name, form in layout(kind).items():
-        if form.count is None:
+        if form.number is None:
             found = source.take(str(form.kind), form.names)
             values[name] = found[0] if len(form.names) == 1 else found
             continue
-        number = form.count(values)
+        number = form.number(values)
         if isinstance(form.kind, str):
             names = [f"{form.names[0]} {k + 1} of {number}" for k in range(number)]
             values[name] = source.take(form.kind, names if len(form.names) == 1 else form.names * number)

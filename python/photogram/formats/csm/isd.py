@@ -97,11 +97,6 @@ class Polynomials(NamedTuple):
         return times, self.at(times)
 
 
-def fitted_angles(times: Floats, matrices: Floats, degree: int) -> Polynomials:
-    """Return polynomials fitted to angles of (k, 3, 3) matrices, as in jigsaw."""
-    return fitted(times, to_angles(matrices), degree)
-
-
 def fitted(times: Floats, values: Floats, degree: int) -> Polynomials:
     """Return polynomials fitted to (k, 3) values at (k,) seconds with equal weights.
 

@@ -15,12 +15,9 @@ from photogram.formats.csm.isd import (
     Framelets,
     Isd,
     Pixels,
-    Turns,
     check_choice,
-    fitted_angles,
-    of_angles,
 )
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import LineSensor, Timed
 from photogram.network.projecting import projected
@@ -68,19 +65,6 @@ def trajectory_of(
 def to_camera(isd: Isd, attitudes: Floats) -> Floats:
     """Return (n, 3, 3) matrices inertial to camera of photo attitudes."""
     return np.asarray(np.swapaxes(attitudes * isd.axes, 1, 2))
-
-
-def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
-    """Return support data with pointing as polynomials, as in jigsaw.
-
-    `degree` is CKDEGREE of jigsaw; the number of records must not be less than the number of coefficients.
-    """
-    own = isd.pointing
-    if not 0 <= degree < len(own.times):
-        raise isd.error(phrase("csm.degree", n=len(own.times), degree=degree))
-    fit = fitted_angles(own.times, own.matrices, degree)
-    times, angles = fit.sampled(float(own.times[0]), float(own.times[-1]))
-    return replace(isd, pointing=Turns(times, of_angles(angles), "lagrange"))
 
 
 @dataclass(frozen=True, eq=False)

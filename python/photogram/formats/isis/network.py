@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,6 +53,9 @@ _ABSENT: Mapping[type, np.generic] = {
     np.float64: np.float64(np.nan),
 }
 """Missing values of columns by type."""
+
+
+_other: Callable[..., Any] = field  # Declares a field that is no column
 
 
 def _column(kind: type, *names: str, width: int = 1) -> Any:
@@ -114,7 +117,7 @@ class ControlPoints(_Columns):
     adjusted: Floats = _axes(np.float64, "adjusted_{}")  # (n, 3) coordinates of an adjustment
     adjusted_covariance: Floats = _column(np.float64, width=6)
     # All other message fields as bytes, and the start of each point (n + 1); written unchanged
-    rest: _Rest
+    rest: _Rest = _other()
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -152,7 +155,7 @@ class ControlMeasures(_Columns):
     edit_lock: Bools = _column(np.bool_)  # (m,) the measure must not be edited
     ignore: Bools = _column(np.bool_)
     rejected: Bools = _column(np.bool_)
-    rest: _Rest
+    rest: _Rest = _other()
 
     def __len__(self) -> int:
         return len(self.serial)

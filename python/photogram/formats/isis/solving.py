@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.csm.isd import Isd, Polynomials, Positions, Turns, fitted, fitted_angles, of_angles
+from photogram.formats.csm.isd import Isd, Polynomials, Positions, Turns, fitted, of_angles, to_angles
 from photogram.formats.csm.photos import trajectory_of
 from photogram.formats.isis.settings import Settings
 from photogram.lazy_dataclasses import dataclass, replace
@@ -89,7 +89,7 @@ def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polyn
         sd[:, 2] = 0.0
     if settings.over_existing:
         return Polynomial(degree, reference, scale, sd=sd), isd, np.zeros((3, degree + 1))
-    fit = fitted_angles(own.times, own.matrices, min(settings.ck_degree, len(own.times) - 1))
+    fit = fitted(own.times, to_angles(own.matrices), min(settings.ck_degree, len(own.times) - 1))
     fit = _of_degree(fit, degree)
     value = fit.coefficients.T.copy()
     value[0] = 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.formats.block_contents import correlated_control
+from photogram.formats.block_contents import correlated_control, known_points
 from photogram.formats.images import by_camera, to_tables
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
 from photogram.formats.plain.cameras import knots_table
@@ -291,39 +291,22 @@ def _images(
 
 def control_table(project: Project) -> dict[str, Any]:
     """Return the columns of control and check points."""
-    block = project.block
-    held = np.isfinite(block.point_sd)
-    rows = {int(row): "control" for row in np.flatnonzero(held.any(axis=1))} | dict.fromkeys(
-        project.checks, "check"
-    )
-    full = correlated_control(block)
-    places = {name: row for row, name in enumerate(block.point_ids)}
-    rows |= {places[name]: "control" for name in full}
-    order = sorted(rows)
-    if not order:
+    block, known = project.block, known_points(project)
+    if not known.rows:
         return {}
-    positions, sd = block.point_positions[order].copy(), block.point_sd[order].copy()
-    covariances = np.zeros((len(order), 3, 3))
-    if block.point_check_sd is not None:
-        own = block.point_check_sd[order]
-        sd = np.where(np.isinf(sd) & np.isfinite(own), own, sd)
-    for k, row in enumerate(order):
-        if (each := full.get(block.point_ids[row])) is not None:
-            positions[k], covariances[k] = each.observed, each.precision
-            sd[k] = np.sqrt(np.diag(each.precision))
-    columns: dict[str, Any] = {"point": [block.point_ids[row] for row in order]}
-    columns |= columns_of(AXES, places_written(block, positions))
+    positions, sd, names = known.positions, known.sd, [block.point_ids[row] for row in known.rows]
+    columns: dict[str, Any] = {"point": names} | columns_of(AXES, places_written(block, positions))
     columns |= {
         f"sd_{axis}": np.where(np.isinf(own), np.nan, own) for axis, own in zip(AXES, sd.T, strict=True)
     }
-    columns |= correlations(covariances, AXES)
+    columns |= correlations(known.covariances, AXES)
     # Known but free coordinates of a control point are written with an infinite standard deviation.
     for k, axis in enumerate(AXES):
         unheld = np.isinf(sd[:, k]) & np.isfinite(positions[:, k])
         columns[f"sd_{axis}"] = np.where(unheld, np.inf, columns[f"sd_{axis}"])
-    columns["use"] = [rows[row] for row in order]
+    columns["use"] = ["check" if check else "control" for check in known.checks]
     if vegetated := project.statement.get("vegetated"):
-        there = [block.point_ids[row] in vegetated and rows[row] == "check" for row in order]
+        there = [name in vegetated and check for name, check in zip(names, known.checks, strict=True)]
         columns["cover"] = [COVERS[1] if each else None for each in there]
     return columns
 
