@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project
+from photogram.io.places import Failing
 from photogram.messages import Message
 from photogram.network.attitudes import known_angles
 from photogram.network.directions import image_directions
@@ -67,6 +68,18 @@ def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, me
         frame=frame,
         messages=(*project.messages, message),
     )
+
+
+def chosen_model(
+    place: Failing, names: Sequence[str], wanted: int | None, default: int, messages: list[Message]
+) -> int:
+    """Return the model of a file that the user requests, or a default; a message lists several models."""
+    model = default if wanted is None else wanted
+    if model >= len(names):
+        raise place.error(phrase("format.models", n=len(names), model=model))
+    if len(names) > 1:
+        messages.append(Message(phrase("format.model-chosen", n=len(names), names=list(names), model=model)))
+    return model
 
 
 Count = Callable[[Project], int | np.integer | bool]

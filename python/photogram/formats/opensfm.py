@@ -15,7 +15,7 @@ from photogram.formats.block_contents import known_points, posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format
 from photogram.formats.images import Y_DOWN, lens_with, named_pixels, sizes_of, to_corner
-from photogram.formats.models import complete_positions
+from photogram.formats.models import chosen_model, complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
@@ -87,20 +87,8 @@ def _model(document: Tree, wanted: int | None, messages: list[Message]) -> Tree:
     if not models:
         raise document.error(phrase("format.missing", what="a reconstruction"))
     sizes = [sum(1 for _ in each["shots"].items()) for each in models]
-    if wanted is not None and wanted >= len(models):
-        raise document.error(phrase("format.models", n=len(models), model=wanted))
-    chosen = int(np.argmax(sizes)) if wanted is None else wanted
-    if len(models) > 1:
-        messages.append(
-            Message(
-                phrase(
-                    "format.model-chosen",
-                    n=len(models),
-                    names=[f"{size} photos" for size in sizes],
-                    model=chosen,
-                )
-            )
-        )
+    names = [f"{size} photos" for size in sizes]
+    chosen = chosen_model(document, names, wanted, int(np.argmax(sizes)), messages)
     if not sizes[chosen]:
         raise models[chosen].error(phrase("format.missing", what="shots"))
     return models[chosen]

@@ -14,6 +14,7 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.crs import GEOCENTRIC as EARTH
 from photogram.formats.crs import GEOGRAPHIC
 from photogram.formats.images import Y_DOWN, checked_rotation
+from photogram.formats.models import chosen_model
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
@@ -41,7 +42,9 @@ def read(path: Path, options: ReadOptions) -> Project:
     block = BlockBuilder(path, TITLE)
     block.remarks_on_systems = False  # Metashape defines heights of its systems
     block.lacks.append(Phrase("read.ties"))
-    chunk = _chunk(root, options.model, block.messages)
+    chunks = [*root.all("chunk"), *_members(root, "chunks", "chunk")]
+    names = [each.attributes.get("label", "?") for each in chunks]
+    chunk = chunks[chosen_model(root, names, options.model, 0, block.messages)]
     _sensors(chunk, block)
     shots = _shots(chunk, block)
     markers = _members(chunk, "markers", "marker")
@@ -51,16 +54,6 @@ def read(path: Path, options: ReadOptions) -> Project:
     _markers(block, markers, system, accuracies["control"])
     _locations(chunk, block)
     return block.project()
-
-
-def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Element:
-    chunks, taken = [*root.all("chunk"), *_members(root, "chunks", "chunk")], wanted or 0
-    if taken >= len(chunks):
-        raise root.error(phrase("format.models", n=len(chunks), model=taken))
-    if len(chunks) > 1:
-        names = [each.attributes.get("label", "?") for each in chunks]
-        messages.append(Message(phrase("format.model-chosen", n=len(chunks), names=names, model=taken)))
-    return chunks[taken]
 
 
 def _accuracies(chunk: Element, options: ReadOptions) -> dict[str, Floats]:
@@ -180,13 +173,6 @@ def _similarity(element: Element | None) -> _Similarity | None:
     return _Similarity(checked_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)
 
 
-def _is_geocentric(reference: str, centres: Floats, references: Floats) -> bool:
-    """Return whether a world is geocentric, judged by size and references."""
-    if np.linalg.norm(centres.mean(axis=0)) < GEOCENTRIC or reference.upper().startswith(LOCAL):
-        return False
-    return bool(reference or (np.abs(references[:, :2]) <= (360.0, 90.0)).all())
-
-
 def _with_poses(
     chunk: Element, shots: list[Element], markers: list[Element], block: BlockBuilder
 ) -> str | None:
@@ -197,7 +183,10 @@ def _with_poses(
     centres, matrices = _poses(chunk, shots)
     system = chunk.word("reference")
     given = [own[0] for each in (*shots, *markers) if (own := _reference(each, np.ones(3))) is not None]
-    geocentric = _is_geocentric(system, centres, np.array(given).reshape(-1, 3))
+    # A world is geocentric, judged by its size, its system or the range of its references.
+    degrees = np.abs(np.array(given).reshape(-1, 3)[:, :2]) <= (360.0, 90.0)
+    far = np.linalg.norm(centres.mean(axis=0)) >= GEOCENTRIC and not system.upper().startswith(LOCAL)
+    geocentric = far and bool(system or degrees.all())
     for shot, centre, matrix in zip(shots, centres, matrices, strict=True):
         block.pose(shot.attributes["id"], centre, matrix, shot, crs=EARTH if geocentric else "")
     if geocentric:

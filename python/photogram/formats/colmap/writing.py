@@ -153,7 +153,11 @@ def _rigs(
     mounts = [each for each in project.block.mounts if each.photo in poses and each.frame in poses]
     for mount in mounts if _told_by_cameras(mounts, cameras) else []:
         own = sensors.setdefault(cameras[mount.frame], {})
-        own.setdefault(cameras[mount.photo], _sensor_pose(mount.sensor.position, mount.sensor.attitude))
+        # Sensor from rig: R = F A' F and t = -R (F c)
+        turn = Y_DOWN @ mount.sensor.attitude.T @ Y_DOWN
+        quaternion = Attitudes(turn[np.newaxis]).values("quaternion")[0].tolist()
+        shift = (-turn @ Y_DOWN @ mount.sensor.position).tolist()
+        own.setdefault(cameras[mount.photo], (*quaternion, *shift))
         members[mount.frame].append(mount.photo)
         del members[mount.photo]
     mounted = {number for own in sensors.values() for number in own}
@@ -170,13 +174,6 @@ def _rigs(
         data = tuple(content.SensorImage(content.CAMERA, cameras[each], photos[each]) for each in own)
         frames.append(content.Frame(photos[name], cameras[name], poses[name], len(data), data))
     return rigs, sorted(frames, key=lambda each: each.number)
-
-
-def _sensor_pose(position: Floats, axes: Floats) -> tuple[float, ...]:
-    """Return sensor from rig: R = F A' F and t = -R (F c)."""
-    turn = Y_DOWN @ axes.T @ Y_DOWN
-    quaternion = Attitudes(turn[np.newaxis]).values("quaternion")[0]
-    return *quaternion.tolist(), *(-turn @ Y_DOWN @ position).tolist()
 
 
 def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:

@@ -190,7 +190,10 @@ def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
         one_word(element.child("model") or element, "model", str(model), [str(PLAIN), str(AFFINE)])
     if model == PLAIN and skew:
         raise element.need("skew").error(phrase("dbat.skew", model=PLAIN, skew=skew, other=AFFINE))
-    c = _principal_distance(element, messages)
+    nominal = element.word("cc", "focal") == "focal"
+    if nominal:
+        messages.append(Message(phrase("dbat.focal", camera=element.word("name", "camera")), element.file))
+    c = positive(element, "the principal distance", element.number("focal" if nominal else "cc"))
     px, py = _principal_point(element, size, sides, terms, messages)
     name = element.word("name") or f"camera {number}"
     return sensor_of(name, size, sides, (c, px, py), terms, skew)
@@ -224,16 +227,6 @@ def _terms(element: Element) -> dict[str, float]:
             raise own.error(phrase("format.count", n=len(words), required=f"at most {len(names)}"))
         found |= {name: own.place.number(word) for name, word in zip(names, words, strict=False)}
     return found
-
-
-def _principal_distance(element: Element, messages: list[Message]) -> float:
-    word = element.word("cc", "focal")
-    if word == "focal":
-        messages.append(Message(phrase("dbat.focal", camera=element.word("name", "camera")), element.file))
-        c = element.number("focal")
-    else:
-        c = element.number("cc")
-    return positive(element, "the principal distance", c)
 
 
 def _principal_point(

@@ -93,24 +93,20 @@ def _geopackage(path: Path, layers: Sequence[Layer]) -> dict[Path, bytes]:
         for each in layers:
             options = {"DESCRIPTION": each.description, "GEOMETRY_NAME": "geom"}
             _write(each, made, "GPKG", options, layer=each.title, append=made.exists())
-        _add_styles(made, layers)
+        # QGIS opens layers with the styles of this table.
+        with closing(sqlite3.connect(made)) as base, base:
+            base.execute(_STYLES)
+            base.executemany(
+                "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column,"
+                " styleName, styleQML, styleSLD, useAsDefault, description, owner)"
+                " VALUES ('', '', ?, 'geom', ?, ?, '', 1, ?, '')",
+                [(each.title, each.name, style(each.name), each.description) for each in layers],
+            )
+            base.execute(
+                "INSERT INTO gpkg_contents (table_name, data_type, identifier, description)"
+                " VALUES ('layer_styles', 'attributes', 'layer_styles', 'styles of the layers, for QGIS')"
+            )
         return {path: made.read_bytes()}
-
-
-def _add_styles(path: Path, layers: Sequence[Layer]) -> None:
-    """Add styles to the table that QGIS reads, so that layers open with them."""
-    with closing(sqlite3.connect(path)) as base, base:
-        base.execute(_STYLES)
-        base.executemany(
-            "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column,"
-            " styleName, styleQML, styleSLD, useAsDefault, description, owner)"
-            " VALUES ('', '', ?, 'geom', ?, ?, '', 1, ?, '')",
-            [(each.title, each.name, style(each.name), each.description) for each in layers],
-        )
-        base.execute(
-            "INSERT INTO gpkg_contents (table_name, data_type, identifier, description)"
-            " VALUES ('layer_styles', 'attributes', 'layer_styles', 'styles of the layers, for QGIS')"
-        )
 
 
 def _geojson(path: Path, layers: Sequence[Layer]) -> dict[Path, bytes]:

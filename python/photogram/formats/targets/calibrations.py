@@ -48,13 +48,16 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
     middle = calibration.block()
     cameras = [shifted(each) for each in middle.cameras]
     block, lacks = middle.replace(cameras=cameras, image_xy=middle.image_xy + MIDDLE), []
+    corners, times = calibration.corners, dict[str, float]()
+    if corners.times is not None and calibration.sync != "offset":
+        times = dict(zip(corners.pictures, corners.times.tolist(), strict=True))
     if calibration.sd0 is None:
         lacks.append(Phrase("read.corners", {"number": 1.0, "option": option_sd("images")}))
     return Project(
         block=block,
         path=path or Path("corners"),
         title=TITLE,
-        sizes=tuple(calibration.corners.sizes),
+        sizes=tuple(corners.sizes),
         pixel_mm=(None,) * len(calibration.cameras),
         starts=np.asarray(block.point_positions),
         lacks=tuple(lacks),
@@ -64,17 +67,9 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
         details={
             ASSUMED: calibration.sd0 is None,
             REGULARISED: calibration.regularise,
-            TIMES: _times(calibration),
+            TIMES: times,
         },
     )
-
-
-def _times(calibration: Start) -> dict[str, float]:
-    """Return the times of photos on frames."""
-    corners = calibration.corners
-    if corners.times is None or calibration.sync == "offset":
-        return {}
-    return dict(zip(corners.pictures, corners.times.tolist(), strict=True))
 
 
 def _unused(calibration: Start) -> Unused:
@@ -114,7 +109,9 @@ def calibration_of(project: Project) -> Calibration:
     references, sensors, sd_sensors, stands = _tied(block)
     corners, seen = _corners(project, number, stands, sd0)
     attitudes = Attitudes.of("omega_phi_kappa", block.photo_attitudes[seen])
-    bend, sd_bend = _bend(block)
+    bend, sd_bend = (0.0, 0.0), np.full(2, np.inf)
+    if figures := [each.bend for each in block.passages if isinstance(each, Figure)]:
+        bend, sd_bend = tuple(figures[0].position[:2].tolist()), figures[0].deviations[:2]
     rig = len(np.unique(references)) < len(references)
     clocks = _in_motion(project, seen) if block.timed else None
     if clocks is not None:
@@ -158,15 +155,6 @@ def _in_motion(project: Project, seen: Indices) -> dict[str, Any]:
     if np.isnan(times).any() or any(each is None for each in motion):
         raise InputError(phrase("board-project.motion"), file=project.path)
     return {"times": times, "offsets": offsets, "sd_offsets": sd, "motion": np.array(motion)}
-
-
-def _bend(block: Block) -> tuple[tuple[float, float], Floats]:
-    """Return the initial deflections of the board, and their standard deviations."""
-    found = [each.bend for each in block.passages if isinstance(each, Figure)]
-    if not found:
-        return (0.0, 0.0), np.full(2, np.inf)
-    along_x, along_y = found[0].position[:2].tolist()
-    return (along_x, along_y), found[0].deviations[:2]
 
 
 def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> tuple[Corners, Indices]:
