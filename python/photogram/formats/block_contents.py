@@ -43,9 +43,9 @@ class KnownPoints(NamedTuple):
 def known_points(project: Project) -> KnownPoints:
     """Return control points, also correlated ones, and check points."""
     block, full = project.block, correlated_control(project.block)
-    known: Bools = np.isfinite(block.point_sd).any(axis=1) | np.isfinite(block.point_positions).any(axis=1)
-    known |= np.array([name in full for name in block.point_ids], dtype=bool)
-    rows = np.flatnonzero(known).tolist()
+    correlated = np.array([name in full for name in block.point_ids], dtype=bool)
+    held = np.isfinite(block.point_sd).any(axis=1) | np.isfinite(block.point_positions).any(axis=1)
+    rows = np.flatnonzero(correlated | held).tolist()
     checks = np.isin(rows, project.checks)
     positions, sd = block.point_positions[rows].copy(), block.point_sd[rows].copy()
     if block.point_check_sd is not None:

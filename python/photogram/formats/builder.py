@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -73,7 +73,7 @@ class BlockBuilder:
         self._starts: dict[Hashable, _Located] = {}
         self._control: dict[Hashable, _Located] = {}
         self._checks: dict[Hashable, _Located] = {}
-        self._gnss: dict[str, _Located] = {}
+        self._gnss: dict[Hashable, _Located] = {}
         self._images: tuple[Indices, Indices, Floats, Floats | float | None] | None = None
         self.image_keys: list[tuple[Hashable, Hashable]] = []
         self.image_xy: list[tuple[float, float]] = []
@@ -187,7 +187,7 @@ class BlockBuilder:
         self._checks[key] = self._control.pop(key)
 
     def gnss(
-        self, photo: str, xyz: Floats, sd: ArrayLike, place: Failing | None = None, *, crs: str = ""
+        self, photo: Hashable, xyz: Floats, sd: ArrayLike, place: Failing | None = None, *, crs: str = ""
     ) -> None:
         """Add an observed position of a photo."""
         self._gnss[photo] = _Located(place or self.place, xyz, np.broadcast_to(sd, 3), crs)
@@ -217,6 +217,13 @@ class BlockBuilder:
     def controls(self) -> int:
         """Number of control points that were added one by one."""
         return len(self._control)
+
+    def define_systems(self, system: Callable[[str], str]) -> None:
+        """Replace identifiers of systems, in which positions were added, by their definitions."""
+        self.poses = {key: (centre, own, system(crs)) for key, (centre, own, crs) in self.poses.items()}
+        for located in (self._starts, self._control, self._checks, self._gnss):
+            for key, each in located.items():
+                located[key] = each._replace(crs=system(each.crs))
 
     def frame_amid(self, crs: str) -> None:
         """Set a topocentric frame amid the photos with positions in a system."""
@@ -362,6 +369,7 @@ class BlockBuilder:
     def _add_gnss(self) -> None:
         """Add observed positions of photos; omit positions that cannot be transformed."""
         found, lost = list[tuple[Any, _Located, Floats, Floats]](), list[str]()
+        names = {key: self.photo_ids[row] for key, row in self.photo_rows.items()}
         try:
             found += self._located(self._gnss)
         except InputError:
@@ -369,9 +377,9 @@ class BlockBuilder:
                 try:
                     found += self._located({photo: each})
                 except InputError:
-                    lost.append(photo)
+                    lost.append(names[photo])
         self.observations += [
-            Position(photo, xyz, covariance=(covariance + covariance.T) / 2)
+            Position(names[photo], xyz, covariance=(covariance + covariance.T) / 2)
             for photo, _, xyz, covariance in found
         ]
         if lost:

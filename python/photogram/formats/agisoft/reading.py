@@ -228,7 +228,7 @@ def _gnss(block: BlockBuilder, shots: list[Element], system: str | None, default
             continue
         xyz, sd = reference
         if (sd > 0).all():
-            block.gnss(each.attributes["label"], xyz, sd, each, crs=system)
+            block.gnss(each.attributes["id"], xyz, sd, each, crs=system)
         else:
             lost += 1
     if lost:

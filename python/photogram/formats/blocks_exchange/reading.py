@@ -64,11 +64,8 @@ class _Reader:
         self.block, self.options = BlockBuilder(path, TITLE), options
         self.systems: dict[str, str] = {}
         self.groups: list[_Group] = []
-        self.photos: list[tuple[int, int, str, Element]] = []  # Id, group, path and element
-        self.poses: list[tuple[int, Floats, Floats, str]] = []  # Id, centre, rotation and id of its system
-        self.gnss: list[tuple[int, Floats, str]] = []  # Id, position and id of its system
-        self.points: list[tuple[str, Floats, str, Floats | None, bool, Element]] = []
-        """Name, position, id of its system, standard deviations of control, whether it is a check point."""
+        self.positions = 0  # Number of observed positions
+        self.names: set[str] = set()  # Of points
         self.images: list[tuple[int, int, float, float, bool]] = []
         """Photo id, point, x, y, and whether these are millimetres from the principal point."""
         self.in_millimetres: Element | None = None  # The first observation in millimetres
@@ -87,7 +84,7 @@ def read(path: Path, options: ReadOptions) -> Project:
     block = root.child("Block")
     if len(list(root.all("Block"))) > 1:
         raise root.error(phrase("blocks-exchange.blocks"))
-    if block is None or not found.photos:
+    if block is None or not found.block.photo_ids:
         raise root.error(phrase("format.missing", what="a block with photos"))
     return _checked(_project(found, block.word("SRSId")))
 
@@ -103,6 +100,7 @@ def _group(found: _Reader, element: Element) -> None:
     name = f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
     with at_place(element):
         camera = _camera(element, size, axes, pixel, name)
+    found.block.camera(camera, size, pixel, key=len(found.groups))
     found.groups.append(_Group(camera, size, axes, pixel))
     srs = element.word("SRSId")
     for photo in element.all("Photo"):
@@ -161,21 +159,23 @@ def _terms(element: Element) -> dict[str, float]:
 
 
 def _photo(found: _Reader, element: Element, srs: str) -> None:
-    number, pose = element.whole("Id"), element.child("Pose")
-    if pose is not None:
-        centre, rotation = np.full(3, np.nan), np.full((3, 3), np.nan)
-        if (own := pose.child("Center")) is not None:
-            centre, srs = _position(own), own.word("SRSId") or srs
-        if (turn := pose.child("Rotation")) is not None:
-            rotation = found.groups[-1].axes.T @ _rotation(turn)
-        found.poses.append((number, centre, rotation.T, srs))
-        metadata = pose.child("Metadata")
-        if metadata is not None and metadata.child("Center") is not None:
-            found.gnss.append((number, _position(metadata.need("Center")), metadata.word("SRSId") or srs))
-    path = element.word("ImagePath")
+    number, path, pose = element.whole("Id"), element.word("ImagePath"), element.child("Pose")
     if not path:
         raise element.error(phrase("format.member", name="ImagePath"))
-    found.photos.append((number, len(found.groups) - 1, path, element))
+    found.block.photo(number, len(found.groups) - 1, element, name=path)
+    if pose is None:
+        return
+    centre, rotation = np.full(3, np.nan), np.full((3, 3), np.nan)
+    if (own := pose.child("Center")) is not None:
+        centre, srs = _position(own), own.word("SRSId") or srs
+    if (turn := pose.child("Rotation")) is not None:
+        rotation = found.groups[-1].axes.T @ _rotation(turn)
+    found.block.pose(number, centre, rotation.T, crs=srs)
+    metadata = pose.child("Metadata")
+    if metadata is not None and (own := metadata.child("Center")) is not None:
+        position, found.positions = _position(own), found.positions + 1
+        if (sd := found.options.sd.get("gnss")) is not None:
+            found.block.gnss(number, position, sd, crs=metadata.word("SRSId") or srs)
 
 
 def _position(element: Element) -> Floats:
@@ -197,7 +197,8 @@ def _rotation(element: Element) -> Floats:
 
 
 def _control(found: _Reader, element: Element) -> None:
-    name = element.word("Name") or f"control {len(found.points) + 1}"
+    key = len(found.block.point_ids)
+    name = element.word("Name") or f"control {key + 1}"
     category = element.word("Category", "Full")
     one_word(element, "Category", category, ("Full", "Horizontal", "Vertical"))
     given = element.need("Position")
@@ -212,20 +213,28 @@ def _control(found: _Reader, element: Element) -> None:
     check = element.word("CheckPoint").lower() in ("true", "1")
     if not check and not (sd[~np.isnan(position)] > 0).all():
         raise element.error(phrase("format.sd", name=name, option=option_sd("control")))
-    found.points.append((name, position, element.word("SRSId"), sd, check, element))
+    found.names.add(name)
+    found.block.point(key, element, name=name)
+    add = found.block.check if check else found.block.control
+    add(key, position, sd, element, crs=element.word("SRSId"))
     _measurements(found, element)
 
 
 def _tie(found: _Reader, element: Element) -> None:
-    given = element.child("Position")
+    key, given = len(found.block.point_ids), element.child("Position")
     position = np.full(3, np.nan) if given is None else _position(given)
-    name = element.word("Name") or f"tie {len(found.points) + 1}"
-    found.points.append((name, position, element.word("SRSId"), None, False, element))
+    name = element.word("Name") or f"tie {key + 1}"
+    while name in found.names:  # Control points may have the name of a tie point
+        name += "'"
+    found.names.add(name)
+    found.block.point(key, element, name=name)
+    if np.isfinite(position).all():
+        found.block.start(key, position, element, crs=element.word("SRSId"))
     _measurements(found, element)
 
 
 def _measurements(found: _Reader, element: Element) -> None:
-    point = len(found.points) - 1
+    point = len(found.block.point_ids) - 1
     for each in element.all("Measurement"):
         millimetres = each.child("xmm") is not None
         across, down = ("xmm", "ymm") if millimetres else ("x", "y")
@@ -244,23 +253,20 @@ def _project(found: _Reader, srs: str) -> Project:
         text = found.systems.get(own or srs, "").strip()
         return "" if text.upper().startswith("LOCAL_CS") else text
 
-    for row, group in enumerate(found.groups):
-        block.camera(group.camera, group.size, group.pixel, key=row)
-    names = [path.replace("\\", "/").rsplit("/", 1)[-1] for _, _, path, _ in found.photos]
-    if len(set(names)) < len(names):
-        names = [path for _, _, path, _ in found.photos]
-    for name, (number, camera, _, element) in zip(names, found.photos, strict=True):
-        block.photo(number, camera, element, name=name)
-    for number, centre, matrix, own in found.poses:
-        block.pose(number, centre, matrix, crs=system(own))
-    _set_frame(block, system(srs or (found.poses[0][3] if found.poses else "")))
-    _add_points(found, system)
-    if "gnss" in found.options.sd:
-        for number, xyz, own in found.gnss:
-            name = block.photo_ids[block.photo_rows[number]]
-            block.gnss(name, xyz, found.options.sd["gnss"], crs=system(own))
-    elif found.gnss:
-        block.lacks.append(Phrase("read.gnss", {"number": len(found.gnss), "option": option_sd("gnss")}))
+    names = [path.replace("\\", "/").rsplit("/", 1)[-1] for path in block.photo_ids]
+    if all(names) and len(set(names)) == len(names):
+        block.photo_ids = names
+    first = next((crs for _, _, crs in block.poses.values()), "")
+    block.define_systems(system)
+    if main := system(srs or first):
+        from photogram.formats.crs import enu_origin
+
+        if (origin := enu_origin(main)) is None:
+            block.frame_amid(main)
+        else:
+            block.frame, block.crs = Frame("topocentric", "EPSG:4979", origin), main
+    if found.positions and "gnss" not in found.options.sd:
+        block.lacks.append(Phrase("read.gnss", {"number": found.positions, "option": option_sd("gnss")}))
     images = [each for each in found.images if each[0] in block.photo_rows]
     if lost := len(found.images) - len(images):
         block.messages.append(Message(phrase("format.unknown-images", n=lost)))
@@ -268,33 +274,6 @@ def _project(found: _Reader, srs: str) -> Project:
     points = np.array([each[1] for each in images], dtype=np.int64)
     block.images(photos, points, _corner(found, images, np.array(block.photo_cameras)[photos]))
     return block.project()
-
-
-def _set_frame(block: BlockBuilder, system: str) -> None:
-    """Set the frame of the main system."""
-    if system:
-        from photogram.formats.crs import enu_origin
-
-        if (origin := enu_origin(system)) is None:
-            block.frame_amid(system)
-        else:
-            block.frame, block.crs = Frame("topocentric", "EPSG:4979", origin), system
-
-
-def _add_points(found: _Reader, system: Callable[[str], str]) -> None:
-    """Add tie points and control; tie points with the name of another point are renamed."""
-    block, names = found.block, set[str]()
-    for key, (name, xyz, srs, sd, check, element) in enumerate(found.points):
-        while sd is None and name in names:
-            name += "'"
-        names.add(name)
-        block.point(key, element, name=name)
-        if sd is not None and check:
-            block.check(key, xyz, sd, element, crs=system(srs))
-        elif sd is not None:
-            block.control(key, xyz, sd, element, crs=system(srs))
-        elif np.isfinite(xyz).all():
-            block.start(key, xyz, element, crs=system(srs))
 
 
 def _corner(found: _Reader, images: list[tuple[int, int, float, float, bool]], groups: Any) -> Floats:

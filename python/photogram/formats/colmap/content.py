@@ -6,10 +6,10 @@ the same declarations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -67,9 +67,9 @@ def _stored(kind: str | type, names: str = "", number: Callable[[dict[str, Any]]
 
 
 @cache
-def layout(kind: type) -> dict[str, Form]:
+def layout(kind: Hashable) -> dict[str, Form]:
     """Return the stored fields of a record with their forms."""
-    return {each.name: each.metadata["form"] for each in fields(kind) if each.metadata}
+    return {each.name: each.metadata["form"] for each in fields(cast("Any", kind)) if each.metadata}
 
 
 _POSE = "QW QX QY QZ TX TY TZ"

@@ -198,15 +198,15 @@ def read_model(folder: Path) -> Model:
             fields = {"camera": camera.number, "model": camera.model, "names": list(MODELS)}
             raise camera.place.error(phrase("colmap.model", **fields))
         cameras.append(camera)
-    rigs, frames = (
-        [_read(record, kind) for record in _sources(folder, name, binary)]
-        if (folder / f"{name}{'.bin' if binary else '.txt'}").is_file()
-        else []
-        for name, kind in (("rigs", Rig), ("frames", Frame))
-    )
+
+    def further(name: str, kind: type[_Kind]) -> list[_Kind]:
+        if not (folder / f"{name}{'.bin' if binary else '.txt'}").is_file():
+            return []
+        return [_read(record, kind) for record in _sources(folder, name, binary)]
+
     images = _images(_read(record, Image) for record in _sources(folder, "images", binary))
     points = _binary_points(folder / "points3D.bin") if binary else _text_points(folder)
-    return Model(folder, cameras, images, points, rigs, frames)
+    return Model(folder, cameras, images, points, further("rigs", Rig), further("frames", Frame))
 
 
 def _images(images: Iterable[Image]) -> Images:

@@ -170,8 +170,8 @@ def _rigs(
         )
         rigs.append(content.Rig(number, 1 + len(others), (reference,), others))
     frames = []
-    for name, own in members.items():
-        data = tuple(content.SensorImage(content.CAMERA, cameras[each], photos[each]) for each in own)
+    for name, names in members.items():
+        data = tuple(content.SensorImage(content.CAMERA, cameras[each], photos[each]) for each in names)
         frames.append(content.Frame(photos[name], cameras[name], poses[name], len(data), data))
     return rigs, sorted(frames, key=lambda each: each.number)
 
