@@ -51,8 +51,8 @@ def correct_table(
             # Rounding may make a zero variance negative.
             values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
     if not np.isfinite(values).all():
-        row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
-        raise table.records.error(row, phrase("comparators.infinite"))
+        worst = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+        raise table.records.error(worst, phrase("comparators.infinite"))
     reach = correction.reach(readings)
     remarks = _outside(correction, table, readings, reach, extrapolate=extrapolate)
     in_range = ["" if np.isnan(far) else "yes" if far <= 1 + ROUNDING else "no" for far in reach.tolist()]

@@ -64,7 +64,7 @@ class TableRow(NamedTuple):
     def text(self, column: str) -> str:
         """Return a cell; empty if the column is missing."""
         cells = self.table.cells.get(column)
-        return "" if cells is None else cells[self.row]  # type: ignore[index, return-value]
+        return "" if cells is None else cells[self.row]  # type: ignore[index]
 
     def number(self, column: str) -> float | None:
         """Return a finite number; None if the cell is blank or the column is missing."""

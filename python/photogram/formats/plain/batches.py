@@ -102,7 +102,8 @@ class Streamed:
         def are_known(table: ColumnTable) -> Bools:
             known = [name in control for name in table.texts("point")]
             sd = tables.deviations(table, "points", SD_AXES, np.inf)
-            return are_tied(table) | np.array(known, dtype=bool) | np.isfinite(sd).any(axis=1)
+            held: Bools = np.isfinite(sd).any(axis=1) | np.array(known, dtype=bool)
+            return held | are_tied(table)
 
         images = islice(tables.batches("images", size), None if tied else 1)
         tables.parsed["images"] = _selected(images, are_tied)
@@ -126,7 +127,7 @@ class Streamed:
             raise InputError(phrase("plain.parts-moving", photo=block.timed[0].photo), file=path)
         refuse_passages(block, "blocks in parts", but=Scan)
         for each in self.project.messages:
-            if each.phrase.code == "plain.side-unknown":
+            if each.phrase is not None and each.code == "plain.side-unknown":
                 raise InputError(phrase("plain.parts-film", **each.phrase.fields), file=path)
         known = (block.point_sd, block.photo_position_sd)
         outer = (each for each in block.observations if not isinstance(each, _INNER))

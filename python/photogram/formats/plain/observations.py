@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 
-from photogram.errors import InputError
 from photogram.formats.plain.rigs import read_bases
 from photogram.formats.plain.schema import (
     ANGULAR,
@@ -30,6 +28,7 @@ from photogram.formats.plain.tables import (
     different,
     indices_of,
     made,
+    made_of_rows,
 )
 from photogram.formats.plain.trajectories import read_smoothness
 from photogram.formats.plain.unknowns import (
@@ -139,7 +138,7 @@ def _read(
         positions, covariances = transform.positions(name, fields[place], fields["covariance"], table)
         fields |= {place: positions, "covariance": covariances}
     times = table.numbers("time").tolist() if make is Position else []
-    rows, arguments = list[int](), list[dict[str, Any]]()
+    arguments = dict[int, dict[str, Any]]()
     for row, (subject, group, *values) in enumerate(zip(of, members, *fields.values(), strict=True)):
         if subject is None:
             continue
@@ -153,28 +152,8 @@ def _read(
             if math.isnan(time) and given.get("drift") is not None:
                 raise table.error(row, phrase("plain.drift-without-time"))
             given["time"] = 0.0 if math.isnan(time) else time
-        rows.append(row)
-        arguments.append(given)
-    yield from _made(table, make, rows, arguments)
-
-
-def _made(
-    table: ColumnTable, make: type[Observation], rows: Sequence[int], arguments: Sequence[dict[str, Any]]
-) -> Iterator[Observation | Observations[Any]]:
-    """Yield observations of rows from their arguments; rows with the same types of arguments together."""
-
-    def types(given: dict[str, Any]) -> list[tuple[str, bool]]:
-        return [(name, isinstance(value, Unknown)) for name, value in given.items()]
-
-    pairs = zip(rows, arguments, strict=True)
-    for _, group in groupby(pairs, lambda pair: types(pair[1])):
-        same = list(group)
-        columns = {name: [given[name] for _, given in same] for name in same[0][1]}
-        try:
-            yield make.from_arrays(**columns)
-        except InputError:
-            # The first invalid row raises an error with its location.
-            yield from (made(table, row, make, **given) for row, given in same)
+        arguments[row] = given
+    yield from made_of_rows(table, make, arguments)
 
 
 def _subjects(tables: Tables, table: ColumnTable, known: Known) -> list[dict[str, Any] | None]:

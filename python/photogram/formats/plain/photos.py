@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from photogram.formats.images import from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, SD_AXES, deviation_columns
 from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.tables import Tables, Transform, indices_of, made
+from photogram.formats.plain.tables import Tables, Transform, indices_of, made_of_rows
 from photogram.io.column_table import ColumnTable
 from photogram.io.numbers import scaled
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.network.observations import Attitude, Observation
+from photogram.network.observations import Attitude, Observation, Observations
 from photogram.words import phrase
 
 _OF_IMAGES = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
@@ -42,7 +43,7 @@ class Photos:
     groups: list[str]
     times: Floats
     unused: frozenset[str]
-    observed: list[Observation]
+    observed: list[Observation | Observations[Any]]
 
 
 def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
@@ -64,9 +65,8 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     centres, _ = transform.positions("photos", centres, None, table)
     matrices = tables.matrices(table)
     attitude_sd, observed = _attitude_weights(tables, table, matrices)
-    turned = {each.photos[0] for each in observed}
     for row in np.flatnonzero(flown).tolist():
-        if np.isfinite([*sd[row], *attitude_sd[row]]).any() or texts[row] in turned:
+        if np.isfinite([*sd[row], *attitude_sd[row]]).any() or row in observed:
             raise table.error(row, phrase("plain.sd-on-trajectory"))
     kept = np.flatnonzero(use)
     if len(kept) < table.count:
@@ -87,7 +87,7 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
         [groups[row] for row in kept],
         table.numbers("time")[kept],
         unused,
-        [each for each in observed if each.photos[0] not in unused],
+        list(made_of_rows(table, Attitude, {row: own for row, own in observed.items() if use[row]})),
     )
 
 
@@ -105,15 +105,15 @@ def cameras_of(table: ColumnTable, names: Sequence[str]) -> list[int]:
 
 def _attitude_weights(
     tables: Tables, table: ColumnTable, matrices: Floats
-) -> tuple[Floats, list[Observation]]:
-    """Return attitude standard deviations, and other attitude observations."""
+) -> tuple[Floats, dict[int, dict[str, Any]]]:
+    """Return attitude standard deviations, and arguments of other attitude observations by row."""
     settings = tables.settings
     own = f"sd_{ANGLES[settings.attitude][0]}", *(f"sd_{name}" for name in ANGLES[settings.attitude][1:])
     steps = deviation_columns(ROTATIONS)
     free = np.full((table.count, 3), np.inf)
     columns = steps if any(each in table for each in steps) else own
     if not any(each in table for each in columns):
-        return free, []
+        return free, {}
     sd = tables.angles(table, columns, math.inf, infinite=True)
     if (sd < 0).any():
         row = int(np.argwhere(sd < 0)[0][0])
@@ -123,15 +123,15 @@ def _attitude_weights(
         raise table.error(int(np.flatnonzero(unknown)[0]), phrase("plain.no-angles"))
     plain = settings.attitude == "omega_phi_kappa" and settings.photo == "y_up"
     if plain and columns is own:
-        return sd, []
-    observed: list[Observation] = []
+        return sd, {}
+    observed: dict[int, dict[str, Any]] = {}
     fixed = free.copy()
     names = table.texts("photo")
     for row in np.flatnonzero(np.isfinite(sd).any(axis=1)).tolist():
         if not sd[row].any():
             fixed[row] = 0.0
         elif columns is steps and np.isfinite(sd[row]).all():
-            observed.append(made(table, row, Attitude, names[row], matrices[row], sd=sd[row]))
+            observed[row] = {"photo": names[row], "attitude": matrices[row], "sd": sd[row]}
         else:
             fields = {"attitude": settings.attitude, "columns": list(steps)}
             raise table.error(row, phrase("plain.attitude-sd", **fields))

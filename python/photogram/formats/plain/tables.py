@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -34,6 +35,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, Representation, angles_form, known_angles
 from photogram.network.block import Block
+from photogram.network.observations import Observation, Observations
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
@@ -48,6 +50,24 @@ def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any,
     except InputError:
         with at_place(table.place(row)):
             raise
+
+
+def made_of_rows(
+    table: ColumnTable, make: type[Observation], arguments: Mapping[int, Mapping[str, Any]]
+) -> Iterator[Observation | Observations[Any]]:
+    """Yield observations of rows from their arguments; rows with the same types of arguments together."""
+
+    def types(row: int) -> list[tuple[str, bool]]:
+        return [(name, isinstance(value, Unknown)) for name, value in arguments[row].items()]
+
+    for _, group in groupby(arguments, types):
+        rows = list(group)
+        columns = {name: [arguments[row][name] for row in rows] for name in arguments[rows[0]]}
+        try:
+            yield make.from_arrays(**columns)
+        except InputError:
+            # The first invalid row raises an error with its location.
+            yield from (made(table, row, make, **arguments[row]) for row in rows)
 
 
 def called(cell: str, title: str) -> str:
