@@ -15,6 +15,7 @@ from test_plain_project import change, written
 import test_moving
 from message_codes import rejected
 from photogram import Attitudes, InputError, adjust, formats
+from photogram.distributed.cut import vertices_of
 from photogram.formats import ReadOptions
 from photogram.formats.description import described
 from photogram.formats.plain.batches import Streamed, streamable
@@ -456,19 +457,22 @@ def test_adjust_and_info_on_the_command_line(run, moving_projects, tmp_path):
         same(result.restarted(), formats.read(tmp_path / name / "adjusted").block)
 
 
-def test_photos_that_move_are_not_adjusted_in_parts(moving_projects):
+@pytest.mark.parametrize("name", ["drone", "lines"])
+def test_photos_that_move_are_read_in_batches(moving_projects, name):
     pytest.importorskip("pyarrow", reason="pyarrow is not installed")
-    drone = moving_projects / "drone"
-    (drone / "velocities.csv").unlink()
-    table = pd.read_csv(drone / "images.csv")
-    table.to_parquet(drone / "images.parquet")
-    (drone / "images.csv").unlink()
-    assert streamable(drone)
-    with pytest.raises(
-        InputError,
-        match="must not contain rolling shutters or trajectories, unlike photo DJI_0",
-    ):
-        Streamed(drone, ReadOptions(), moving_projects / "run")
+    place = moving_projects / name
+    table = pd.read_csv(place / "images.csv")
+    table.to_parquet(place / "images.parquet")
+    (place / "images.csv").unlink()
+    assert streamable(place)
+    if name == "lines":
+        with rejected("plain.parts-moving L2"):
+            Streamed(place, ReadOptions(), moving_projects / "run")
+        edited(place / "photos.csv", lambda table: table.assign(time="205.0"))
+    own = Streamed(place, ReadOptions(), moving_projects / "run")
+    block = formats.read(place).block
+    images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
+    np.testing.assert_array_equal(own.images, images)
 
 
 def test_a_drone_that_is_taken_to_stand_still_does_not_fit(tmp_path):

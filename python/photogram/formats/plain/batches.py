@@ -123,8 +123,10 @@ class Streamed:
         block, path = self.project.block, self.project.path
         if self.project.options.datum in ("inner", "minimum"):
             raise InputError(phrase("plain.parts-datum"), file=path)
-        if block.timed:
-            raise InputError(phrase("plain.parts-moving", photo=block.timed[0].photo), file=path)
+        for each in block.timed:
+            # Its time is the mean of the times of its images.
+            if each.lines is not None and each.time is None:
+                raise InputError(phrase("plain.parts-moving", photo=each.photo), file=path)
         refuse_passages(block, "blocks in parts", but=Scan)
         for each in self.project.messages:
             if each.phrase is not None and each.code == "plain.side-unknown":
