@@ -13,7 +13,7 @@ the whole tree.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -396,18 +396,30 @@ def photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:
 
 
 def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
-    """Return the incidence of points and observations, and the edge of each of them.
+    """Return the incidence of points and observations, and the edge of each of them."""
+    images = block.image_photos, block.image_points
+    return incidence_of_points(block, block.point_ids, images, block.observations)
 
-    Points that are observed together are one edge, and remain in one node.
+
+def incidence_of_points(
+    block: Block,
+    names: Sequence[str],
+    images: tuple[Indices, Indices],
+    observations: Sequence[Observation],
+) -> tuple[Incidence, Indices, Indices]:
+    """Return the incidence as :func:`incidence_of`, with other points, images and observations.
+
+    `images` are the rows of photos of the block and of points. Points that are observed together are one
+    edge, and remain in one node.
     """
     vertices = vertices_of(block)
-    points = {name: row for row, name in enumerate(block.point_ids)} if block.observations else {}
-    photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
-    tied = [tuple(points[name] for name in each.points) for each in block.observations]
-    edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
+    points = {name: row for row, name in enumerate(names)} if observations else {}
+    photos = {name: row for row, name in enumerate(block.photo_ids)} if observations else {}
+    tied = [tuple(points[name] for name in each.points) for each in observations]
+    edges = joined(len(names), (each for each in tied if len(each) > 1))
     own_edges, others, of_observations, alone = [], [], [], alone_of(block)
-    count = len(block.point_ids)
-    for each, members in zip(block.observations, tied, strict=True):
+    count = len(names)
+    for each, members in zip(observations, tied, strict=True):
         edge = int(edges[members[0]]) if members else count
         count += not members
         of_observations.append(edge)
@@ -415,8 +427,8 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
             own_edges.append(edge)
             others.append(int(vertices[photos[name]]))
     incidence = Incidence(
-        np.concatenate([vertices[block.image_photos], np.array(others, dtype=np.int64)]),
-        np.concatenate([edges[block.image_points], np.array(own_edges, dtype=np.int64)]),
+        np.concatenate([vertices[images[0]], np.array(others, dtype=np.int64)]),
+        np.concatenate([edges[images[1]], np.array(own_edges, dtype=np.int64)]),
         count,
     )
     return incidence, edges, np.array(of_observations, dtype=np.int64)

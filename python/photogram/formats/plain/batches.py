@@ -24,12 +24,10 @@ from photogram.distributed.cut import (
     Counts,
     Incidence,
     Tree,
-    alone_of,
     counted_work,
     cut,
     homes,
-    joined,
-    photos_of,
+    incidence_of_points,
     vertices_of,
 )
 from photogram.distributed.files import read_arrays, write_arrays
@@ -161,10 +159,8 @@ class Streamed:
         """Write a number of parts into the folder of a run, and remove the buckets."""
         found = cut(places_of(self.block), self.images, self._incidences, parts)
         root, observed, seen = found.tree.root, np.zeros(0, dtype=np.int64), set[str]()
-        for number, incidence in enumerate(self._incidences()):
+        for number, (bucket, incidence, of_points, of_observations) in enumerate(self._buckets()):
             home = homes(found.owners, incidence, root)
-            bucket = read_arrays(self._folder / f"{number}.npz")
-            of_points, of_observations = self._edges(number, len(bucket["names"]))
             if not number:
                 observed = home[of_observations]
             seen |= set(bucket["names"].tolist()) & self._given.keys()
@@ -255,32 +251,16 @@ class Streamed:
         }
         return found | {"names": np.array(list(rows), dtype=np.str_)}
 
-    def _edges(self, number: int, points: int) -> tuple[Indices, Indices]:
-        """Return the edge of each point and, in the first bucket, observation."""
-        if number:
-            return np.arange(points), np.zeros(0, dtype=np.int64)
-        tied = [tuple(self._tied[name] for name in each.points) for each in self.block.observations]
-        edges = joined(points, (each for each in tied if len(each) > 1))
-        alone = iter(range(points, points + len(tied)))
-        return edges, np.array([edges[each[0]] if each else next(alone) for each in tied], dtype=np.int64)
-
-    def _incidences(self) -> Iterator[Incidence]:
-        rows = {name: row for row, name in enumerate(self.block.photo_ids)}
-        alone = alone_of(self.block)
+    def _buckets(self) -> Iterator[tuple[_Arrays, Incidence, Indices, Indices]]:
+        """Yield buckets with their incidence, and the edges of points and, in the first one, observations."""
         for number in range(self._spread_out[0]):
             bucket = read_arrays(self._folder / f"{number}.npz")
-            edges, of_observations = self._edges(number, len(bucket["names"]))
-            others = [
-                (self._vertices[rows[name]], edge)
-                for each, edge in zip(self.block.observations, of_observations.tolist(), strict=not number)
-                for name in photos_of(each, alone)
-            ]
-            photos, own = np.array(others, dtype=np.int64).reshape(-1, 2).T
-            yield Incidence(
-                np.concatenate([self._vertices[bucket["photos"]], photos]),
-                np.concatenate([edges[bucket["points"]], own]),
-                len(edges) + len(of_observations),
-            )
+            images = bucket["photos"], bucket["points"]
+            observations = () if number else self.block.observations
+            yield bucket, *incidence_of_points(self.block, bucket["names"].tolist(), images, observations)
+
+    def _incidences(self) -> Iterator[Incidence]:
+        return (incidence for _, incidence, *_ in self._buckets())
 
     def _at_home(self, node: int, unseen: list[str], observations: Indices) -> AtHome:
         """Return the observations of a node from the pieces of all buckets."""
