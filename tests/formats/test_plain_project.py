@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -25,11 +26,25 @@ from photogram import (
     formats,
     simulate,
 )
+from photogram.formats.plain.schema import TABLES
 from photogram.formats.supplements import self_calibrated
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
 from photogram.io.numbers import scaled
-from photogram.network import Attitude, Boresight, Control, Difference, Drift, Mount, Sensor, Shift
+from photogram.network import (
+    Attitude,
+    Boresight,
+    Control,
+    Difference,
+    Drift,
+    Mount,
+    Sensor,
+    Shift,
+    cameras,
+    moving_photos,
+    trajectories,
+)
+from photogram.targets import board, choices
 from photogram.words import option_sd
 
 ANGLES = ("omega", "phi", "kappa")
@@ -615,3 +630,21 @@ def test_a_written_project_keeps_the_comments_of_its_settings(example, tmp_path)
     assert text.startswith(head)
     assert re.search(r"format = 1 +# version of the schema", text)
     assert again.frame == project.frame
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "words"),
+    [
+        ("cameras", "weights", cameras.Weights),
+        ("cameras", "readout_direction", moving_photos.Direction),
+        ("trajectories", "interpolation", trajectories.Interpolation),
+        ("trajectories", "position_axes", trajectories.PositionAxes),
+        ("trajectories", "angles", trajectories.Angles),
+        ("boards", "kind", board.BoardKind),
+        ("boards", "shape", choices.Shape),
+        ("boards", "regularise", choices.Regularisation),
+    ],
+)
+def test_declared_words_are_those_of_the_classes(table, column, words):
+    declared = TABLES[table].words[column]
+    assert set(declared) == set(get_args(words))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from photogram.formats.plain.tables import Tables, columns_of, columns_of_record
 from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
-from photogram.targets.board import Board, BoardKind
-from photogram.targets.choices import Regularisation, Shape
+from photogram.targets.board import Board
 from photogram.words import phrase
 
 ASSUMED = "sd of corners assumed"
@@ -32,15 +31,13 @@ def read_boards(tables: Tables) -> dict[str, Board]:
 
 
 def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
-    given: dict[str, Any] = {"unit": tables.settings.length}
-    for name, words in (("kind", get_args(BoardKind)), ("shape", get_args(Shape))):
-        if word := table.words(name, words, "", optional=True)[row]:
-            given[name] = word
+    cells = tables.records("boards")[row]
+    given: dict[str, Any] = {name: cells[name] for name in ("kind", "shape") if name in cells}
+    given["unit"] = tables.settings.length
     if given.get("kind") == "points":
         # Their positions are control points, which are read later.
         given["points"] = np.zeros((0, 3))
         return Board(**given)
-    cells = tables.records("boards")[row]
     given |= {name: int(cells.get(name, 0)) for name in ("columns", "rows")}
     given |= {name: cells[name] for name in PITCHES[2:] if name in cells}
     if "tag_size" not in given:
@@ -50,10 +47,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
 
 def read_regularised(tables: Tables) -> str | None:
     """Return the source of weak camera priors; None without."""
-    table = tables.rows("boards")
-    if not table.count:
-        return None
-    return table.words(REGULARISED, get_args(Regularisation), "", optional=True)[0] or None
+    return next((cells.get(REGULARISED) for cells in tables.records("boards")), None)
 
 
 def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:

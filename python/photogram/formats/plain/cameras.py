@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from photogram.film import Certificate
 
 _MODELS = dict(_photocore.camera_models())
-_EACH = ("all", "photo", "group")
 OTHER_LENS = 5.0  # Difference of principal distances (mm) that indicates another lens than the certificate
 _SD = ("sd_radial", "sd_tangential")
 _DISTANCES = ("c", "f", "fx", "fy")
@@ -160,8 +159,6 @@ def _row(table: ColumnTable, row: int, name: str, cells: Mapping[str, Any], *, b
         if unknown := [column for column in OF_LINES if sd.get(column)]:
             raise table.cell_error(row, f"sd_{unknown[0]}", "plain.line-sd")
         values = {column: value for column, value in values.items() if column not in OF_LINES}
-    if each not in _EACH:
-        raise table.cell_error(row, "for_each", "error.choice", names=list(_EACH), value=each)
     return _Row(name, each, model, weights, cells.get("calibration", ""), cells.get("pixel_mm"), values, sd)
 
 
@@ -217,9 +214,6 @@ def _camera(
             values = {own["cx"]: size[0] / 2, own["cy"]: size[1] / 2} | values
     elif "cx" in own and image != "px":
         values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
-    if given.weights not in get_args(Weights):
-        names = list(get_args(Weights))
-        raise table.cell_error(row, "weights", "error.choice", names=names, value=given.weights)
     constants = [*powers][len(powers) - _MODELS[model][2] :]
     camera = Camera(
         model,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, cast, get_args
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def shutters(
     tables: Tables, table: ColumnTable, cameras: Sequence[Camera], sizes: Sequence[Size | None]
 ) -> list[Shutter | None]:
     """Return the rolling shutter of each row of a camera table; None without."""
-    directions = cast("list[Direction]", table.words("readout_direction", get_args(Direction)))
+    directions = tables.words("cameras", "readout_direction")
     edges = _edges(tables, table, cameras, sizes, directions)
     values, deviations = table.numbers("readout"), table.numbers("sd_readout", 0.0, infinite=True)
     found: list[Shutter | None] = []

@@ -36,7 +36,7 @@ from photogram.formats.plain.photos import (
     read_photos,
 )
 from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
-from photogram.formats.plain.schema import AXES, SD_AXES
+from photogram.formats.plain.schema import AXES, SD_AXES, TABLES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
@@ -55,7 +55,6 @@ from photogram.results.features import named_points
 from photogram.words import Phrase, option_sd, phrase
 
 DIFFER = 1e-6  # Largest difference of the positions of a point in two tables
-_USES = ("control", "check", "off")
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -230,7 +229,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     """Read a table of control and check points."""
     names = table.names_once("point")
     values = table.vectors(AXES)
-    uses = table.words("use", _USES)
+    uses = table.words("use", TABLES["control"].words["use"])
     sd = table.vectors(SD_AXES, infinite=True)
     stray = ~np.isnan(sd) & np.isnan(values)
     if stray.any():

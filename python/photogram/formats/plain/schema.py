@@ -6,16 +6,18 @@ objects that the column names, and their content for docs/formats/plain-tables.m
 `unknown` declare a shared unknown: its class, field and rule (see :class:`Parameter`). A row without columns
 declares the table: its observations, whether it may have a coordinate system, and the lengths of its `[sd]`.
 
-Kinds of text are `text`, `point`, `photo`, `shared` (an unknown), `group` (of unknowns) and `subject` (a
-photo, or a trajectory at a time). Kinds of numbers are `number`, `place` (a position in the frame of the
-project), `body` (a vector in the axes of a photo), `attitude`, `turn` (an attitude relative to a photo),
-`mounting` (the inverse of a `turn`), `sd`, and `matrix` or `body matrix` (with covariances).
+Kinds of text are `text`, `word` (one of the words in backticks of the content), `point`, `photo`, `shared`
+(an unknown), `group` (of unknowns) and `subject` (a photo, or a trajectory at a time). Kinds of numbers are
+`number`, `place` (a position in the frame of the project), `body` (a vector in the axes of a photo),
+`attitude`, `turn` (an attitude relative to a photo), `mounting` (the inverse of a `turn`), `sd`, and `matrix`
+or `body matrix` (with covariances).
 """
 
 from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
@@ -74,7 +76,7 @@ BENDS = ("bend_x", "bend_y")  # Deflections of a board
 PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a board
 
 REQUIRED, SETTINGS = "required", "[sd]"  # Defaults of cells that may not be empty, or that the settings fill
-_TEXTS = frozenset(("text", "point", "photo", "shared", "group", "subject"))
+_TEXTS = frozenset(("text", "word", "point", "photo", "shared", "group", "subject"))
 _GROUPS = {
     "@parameters": sorted(
         {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
@@ -110,6 +112,13 @@ class Column(NamedTuple):
             return names
         single = () if names and names[-1] == "rotation_z" else ("sd",)
         return (*single, *deviation_columns(names), *covariance_columns(names))
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Allowed words, with the default first; empty for other kinds."""
+        default = self.default.strip("`")
+        found = re.findall(r"`(\w+)`", self.content) if self.kind == "word" else []
+        return tuple(sorted(found, key=lambda word: word != default))
 
     @property
     def number(self) -> float:
@@ -228,6 +237,12 @@ class Schema:
         """Numbers of empty cells by column, if they are declared."""
         columns = (column for column in self.all_columns if not math.isnan(column.number))
         return {name: column.number for column in columns for name in column.names}
+
+    @cached_property
+    def words(self) -> dict[str, tuple[str, ...]]:
+        """Allowed words of columns, with the default first."""
+        columns = (column for column in self.all_columns if column.words)
+        return {name: column.words for column in columns for name in column.names}
 
     @property
     def columns(self) -> tuple[str, ...]:

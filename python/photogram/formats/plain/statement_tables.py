@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from photogram.errors import InputError, message_of
-from photogram.formats.plain.schema import ENDS
+from photogram.formats.plain.schema import ENDS, TABLES
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.toml import TomlFile
@@ -15,7 +15,7 @@ from photogram.messages import counted, unknown_name
 from photogram.results.statement.request import Asked
 from photogram.words import phrase
 
-COVERS = ("open", "vegetated")
+COVERS = TABLES["control"].words["cover"]
 """Cover of check points; the first is the default (ASPRS, Edition 2: NVA and VVA)."""
 
 

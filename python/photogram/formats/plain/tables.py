@@ -193,7 +193,11 @@ class Tables:
         """Return texts and numbers of the filled cells of each row by column; deviations may be infinite."""
         table, schema = self.rows(name), TABLES[name]
         columns: dict[str, Sequence[Any]] = {
-            each: table.texts(each) for each in schema.texts if each in table
+            each: table.words(each, schema.words[each], "", optional=True)
+            if each in schema.words
+            else table.texts(each)
+            for each in schema.texts
+            if each in table
         }
         for each in schema.numbers:
             if each in table:
@@ -202,6 +206,10 @@ class Tables:
             {each: own[row] for each, own in columns.items() if own[row] != "" and own[row] == own[row]}
             for row in range(table.count)
         ]
+
+    def words(self, name: str, column: str) -> list[Any]:
+        """Return a column of declared words in a table; empty cells have the default."""
+        return self.rows(name).words(column, TABLES[name].words[column])
 
     def remark(self, code: str, path: Path | None = None, /, **fields: Any) -> None:
         """Add a remark, optionally on a file."""

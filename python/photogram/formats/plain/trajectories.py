@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, cast, get_args
+from typing import Any
 
 import numpy as np
 
@@ -29,11 +29,8 @@ from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness, all_trajectories
 from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import (
-    Angles,
     Basis,
-    Interpolation,
     Polynomial,
-    PositionAxes,
     Spline,
     Table,
     Trajectory,
@@ -61,8 +58,8 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
     records = _records(tables, table, places)
     bases = [_Bases(tables, table, of, places) for of in BASES]
     bodies = _turned(tables, "body_rotations", places, tables.flip)
-    along = cast("list[PositionAxes]", table.words("position_axes", get_args(PositionAxes)))
-    angles = cast("list[Angles]", table.words("angles", get_args(Angles)))
+    along = tables.words("trajectories", "position_axes")
+    angles = tables.words("trajectories", "angles")
     found: dict[str, Trajectory] = {}
     for row, name in enumerate(names):
         own = records[row]
@@ -120,8 +117,7 @@ def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> l
     check_complete(own, VELOCITY, values[:, 3:])
     positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
     attitudes = _turned(tables, "trajectory_attitudes", places)
-    joined = [table.words(f"{of}interpolation", get_args(Interpolation)) for of in ("", "attitude_")]
-    kinds = cast("list[list[Interpolation]]", joined)
+    kinds = [tables.words("trajectories", f"{of}interpolation") for of in ("", "attitude_")]
     found = []
     for name, row in places.items():
         for what, known in (("positions", positions), ("attitudes", attitudes)):
@@ -164,10 +160,10 @@ class _Bases:
         self.knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
         self.coefficients = tables.rows("trajectory_coefficients")
         self.rows = _rows_of(self.coefficients, places, bases=True)
-        self.words = [each.lower() for each in table.texts(kind, "none")]
+        self.words = tables.words("trajectories", kind)
         self.signs = np.ones((table.count, 3))  # Direction of the axes of coefficients
         if kind == "rotation":
-            about_photo = [each != "zxz" for each in table.words("angles", get_args(Angles))]
+            about_photo = [each != "zxz" for each in tables.words("trajectories", "angles")]
             self.signs[about_photo] = np.diag(tables.flip)
 
     def of(self, row: int, name: str, known: Table) -> Basis | None:
@@ -186,10 +182,8 @@ class _Bases:
         return replace(basis, value=values, sd=deviations)
 
     def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
-        """Reject unknown bases and columns of other bases."""
+        """Reject columns of other bases."""
         kind = self.kind
-        if word not in _COLUMNS:
-            raise self.table.cell_error(row, kind, "error.choice", names=list(_COLUMNS), value=word)
         there = [f"{kind}_{each}" for each in _ALL if self._number(row, each) is not None]
         others = [each for each in there if each.removeprefix(f"{kind}_") not in _COLUMNS[word]]
         others += ["trajectory_knots"] if name in self.knots and word != "spline" else []
