@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from photogram import diagnose, simulate
-from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.control_sets import doubtful, explain
+from photogram.diagnosis.mistakes import Adjuster
+from photogram.diagnosis.control_sets import doubtful, wrong_control
 
 BLOCK = simulate(
     strips=3, photos_per_strip=6, points_per_photo=40, control_spacing=2, control_sd=0.05, seed=11
@@ -29,10 +29,10 @@ def changed(factors):
 def test_a_mistake_in_all_control_is_explained(factors, kind):
     block = changed(factors)
     assert doubtful(ADJUSTER.tried(block), "control")
-    found = explain(block, ADJUSTER)
-    assert (found.kind, found.judged.accepted) == (kind, True)
+    found = wrong_control(block, ADJUSTER)
+    assert (found.best[0].name, found.is_certain) == (kind, True)
     np.testing.assert_allclose(
-        found.change(block).point_positions[np.isfinite(block.point_sd).all(axis=1)],
+        found.best[0].change(block).point_positions[np.isfinite(block.point_sd).all(axis=1)],
         BLOCK.point_positions[np.isfinite(block.point_sd).all(axis=1)],
     )
 
@@ -55,7 +55,7 @@ def test_heights_in_feet_with_a_gross_error_beside(axis, size):
 
 def test_good_control_is_neither_doubted_nor_explained():
     assert not doubtful(ADJUSTER.tried(BLOCK), "control")
-    assert explain(BLOCK, ADJUSTER) is None
+    assert wrong_control(BLOCK, ADJUSTER) is None
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -63,15 +63,17 @@ def test_single_wrong_points_are_no_mistake_of_all(axis):
     positions = BLOCK.point_positions.copy()
     point = int(np.flatnonzero(np.isfinite(BLOCK.point_sd).all(axis=1))[3])
     positions[point, axis] += 300.0
-    assert explain(BLOCK.replace(point_positions=positions), ADJUSTER) is None
+    assert wrong_control(BLOCK.replace(point_positions=positions), ADJUSTER) is None
 
 
-def test_two_exchanged_points_are_no_mirror_image():
+def test_two_exchanged_points_are_exchanged_back():
     full = np.flatnonzero(np.isfinite(BLOCK.point_sd).all(axis=1))
     for one, other in ((0, -1), (1, 2)):
         positions = BLOCK.point_positions.copy()
         positions[full[[one, other]]] = positions[full[[other, one]]]
-        assert explain(BLOCK.replace(point_positions=positions), ADJUSTER) is None
+        found = wrong_control(BLOCK.replace(point_positions=positions), ADJUSTER)
+        assert found.is_certain
+        assert {*found.best[0].points} == {BLOCK.point_ids[point] for point in full[[one, other]]}
 
 
 def test_a_blunder_beside_the_mistake_is_named_too():

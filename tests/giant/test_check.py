@@ -12,10 +12,9 @@ from typer.testing import CliRunner
 from message_codes import nested_codes
 from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
-from photogram.diagnosis.exchanges import exchange
+from photogram.diagnosis.control_sets import exchange
 from photogram.diagnosis.orientation import MIRRORS
 from photogram.diagnosis.robust import critical, fit, mad_sd
-from photogram.diagnosis.stations import neighbours
 from photogram.diagnosis.structure import parts_of
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check
@@ -339,7 +338,7 @@ def test_section_13_exchanged_control_hides_no_blunder(seed, photos):
     block = simulate(strips=2, photos_per_strip=photos, points_per_photo=40, seed=seed).block
     rng = np.random.default_rng(seed)
     points = rng.permutation(np.flatnonzero(np.isfinite(block.point_sd).all(axis=1)))[:2]
-    exchanged = exchange(block, *points.tolist())
+    exchanged = exchange(block, tuple(points.tolist()))
     row = image(block, "0103", least_rays=3)
     outcome = checked(changed(exchanged, "image_xy", row, 0, 1.0))
     control, other = sorted(outcome.grave, key=lambda finding: finding.kind != "exchanged-control")
@@ -553,17 +552,6 @@ def test_rays_meet_where_the_points_are():
         np.testing.assert_allclose(met.positions, rays.axes.positions(truth.point_positions), atol=1e-4)
         back = rays.axes.from_local(met.positions) - truth.point_positions
         assert np.abs(back).max() < 1e-4
-
-
-def test_neighbours_are_the_nearest():
-    rng = np.random.default_rng(3)
-    for plan in (rng.random((300, 2)), rng.random((300, 2)) ** 6, rng.random((50, 2)) * [1, 0]):
-        rows = np.arange(0, len(plan), 7)
-        near = neighbours(plan, rows, 8)
-        distances = np.linalg.norm(plan[rows][:, None] - plan, axis=2)
-        distances[np.arange(len(rows)), rows] = np.inf
-        expected = np.sort(distances, axis=1)[:, :8]
-        np.testing.assert_allclose(np.take_along_axis(distances, near, axis=1), expected)
 
 
 def test_strips_are_cut_where_the_flight_turns():

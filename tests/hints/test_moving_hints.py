@@ -20,7 +20,7 @@ from moving_blocks import (
     scanned,
 )
 from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
-from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
 from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.shutters import rolling_hints

@@ -33,11 +33,11 @@ def errors_explained(block: Block | FirstValues) -> Iterator[None]:
     except OutOfMemoryError:
         raise
     except AdjustmentError as error:
-        from photogram.diagnosis.adjusting import Adjuster
-        from photogram.diagnosis.shutters import shutter_hints
+        from photogram.diagnosis.mistakes import Adjuster
+        from photogram.diagnosis.shutters import readout_hints
 
         block = block if isinstance(block, Block) else block.usable()
-        found = _of_block(block) or shutter_hints(block, None, Adjuster({}))
+        found = _of_block(block) or readout_hints(block, Adjuster({}, (block, error)))
         error.args = ("\n".join([str(error), *(f"  hint: {hint}" for hint in found)]), *error.args[1:])
         raise
 
@@ -57,10 +57,10 @@ def explained(result: Result) -> list[Message]:
         return []
     found = _of_block(result.block) if _bad(result) else []
     if result.WHOLE and not found and (not result.converged or is_suspected(result)):
-        from photogram.diagnosis.adjusting import Adjuster
-        from photogram.diagnosis.shutters import rolling_hints, shutter_hints
+        from photogram.diagnosis.mistakes import Adjuster
+        from photogram.diagnosis.shutters import readout_hints, rolling_hints
 
-        found = shutter_hints(result.block, result, Adjuster({})) or rolling_hints(result)
+        found = readout_hints(result.block, Adjuster({}, (result.block, result))) or rolling_hints(result)
     return found
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.findings import Finding, finding
+from photogram.diagnosis.mistakes import Adjuster
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.moving_photos import Timed

@@ -26,8 +26,6 @@ def control(edited: Edited, words: Words) -> Section:
     if common:
         message = phrase("check.control-system", n=len(edited.control))
         note(section, "grave", message, [], list(edited.control))
-    for pair in edited.exchanged:
-        note(section, "grave", phrase("check.exchanged-control", points=list(pair)), [], pair)
     spoilt = {point for blunder in edited.section.findings for point in blunder.points}
     for name, findings in edited.control.items():
         section.findings.append(_misfit(result, name, findings, name in spoilt, common, words))

@@ -1,32 +1,31 @@
-"""Control points as a set: feet, and exchanged axes.
+"""Control points as a set: feet, exchanged axes, and two points with exchanged coordinates.
 
-The block is adjusted with the intended coordinates of each hypothesis. Its weighted sum of squares is
-compared with that of the given coordinates, of single wrong points, and of two exchanged points.
+Each proposal is compared with the given coordinates and with single wrong points.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
-from photogram.arguments.types import Floats
-from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.blunders import without_outlying_control
-from photogram.diagnosis.exchanges import exchange, likely_pairs
-from photogram.diagnosis.findings import Explained, likely
+from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.hypotheses import FOOT
+from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain, omega
 from photogram.diagnosis.robust import mad_sd
-from photogram.diagnosis.tested_values import outliers
+from photogram.diagnosis.tested_values import outliers, sizes_of_tests, spread_of
+from photogram.diagnosis.views import View
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
-from photogram.network.rays import local_axes
+from photogram.network.rays import Rays, local_axes
 from photogram.results.result import Result
-from photogram.statistics.likelihood import judged
 from photogram.words import phrase
 
 FEWEST = 3  # Control points with three components that distinguish a set from single points
-CLEARLY = 2 * math.log(20)  # Additional cost of an explanation by single points (likelihood ratio of 20)
+FEWEST_OF_PAIRS = 3  # Control points needed to identify an exchanged pair
+PAIRS = 3  # Largest number of pairs that are adjusted
 MANY = 2  # Number of control points that do not fit above which the whole set is doubted
 
 FACTORS = {
@@ -53,6 +52,29 @@ def doubtful(first: Result | None, *kinds: str) -> bool:
     return beyond >= MANY or (fixed and size > MANY)
 
 
+def wrong_control(block: Block, adjusted: Adjuster) -> Explained | None:
+    """Return the mistake in the control as a set, or in two points, that explains the misfit, if any."""
+    if not np.isfinite(block.point_sd).any() or not doubtful(adjusted.tried(block), "control"):
+        return None
+    proposals = [*_of_sets(block), *_of_pairs(block)]
+    found = explain(block, proposals, adjusted, partial(_some_wrong, adjusted=adjusted))
+    if found is None or found.best[0].points:
+        return found if found is not None and found.is_certain else None
+    if {each.name for each in found.best} == SAME_BUT_SCALE:
+        # The hypotheses differ only in scale, which the stations determine.
+        scales = [abs(math.log(_scale(each, block))) for each in found.results]
+        found = replace(found, best=[found.best[int(np.argmin(scales))]])
+    if np.isfinite(block.point_sd).all(axis=1).sum() < FEWEST:
+        # A mistake in the set cannot be distinguished from one in some points.
+        found = replace(found, judged=replace(found.judged, explained=False))
+    return found
+
+
+def _of_sets(block: Block) -> Iterator[Proposal]:
+    for kind in [*FACTORS, EXCHANGED] if block.spheroid is None else [*OF_HEIGHTS, EXCHANGED]:
+        yield Proposal(kind, phrase(f"mistake.control.{kind}"), partial(intended, kind=kind))
+
+
 def intended(block: Block, kind: str) -> Block:
     """Return the block with the intended control."""
     order, factors = ([1, 0, 2], (1, 1, 1)) if kind == EXCHANGED else ([0, 1, 2], FACTORS[kind])
@@ -61,45 +83,39 @@ def intended(block: Block, kind: str) -> Block:
     return block.replace(point_positions=positions, point_sd=block.point_sd[:, order])
 
 
-def explain(block: Block, adjusted: Adjuster) -> Explained | None:
-    """Return the mistake in the control as a set that explains the misfit, if any."""
-    full = np.isfinite(block.point_sd).all(axis=1)
-    kinds = [*FACTORS, EXCHANGED] if block.spheroid is None else [*OF_HEIGHTS, EXCHANGED]
-    blocks = [intended(block, kind) for kind in kinds]
-    results = [adjusted.converged(each) for each in blocks]
-    changed, given = [*map(_omega, results)], _omega(adjusted.converged(block))
-    freedom = next((each.degrees_of_freedom for each in results if each is not None), 0)
-    if freedom < 1:
-        return None
-    pairs = [exchange(block, *pair) for pair in likely_pairs(block, None)]
-    single = min([_some_wrong(block, adjusted), *(_omega(adjusted.converged(each)) for each in pairs)])
-    verdict = judged(_finite(given, changed), changed, freedom, known_weight=True)
-    if verdict is None or min(changed) + CLEARLY > single:
-        # Other wrong points hide a mistake in the set: both are compared with the cost of wrong points.
-        changed = [min(own, _some_wrong(each, adjusted)) for own, each in zip(changed, blocks, strict=True)]
-        verdict = judged(_finite(min(single, given), changed), changed, freedom, known_weight=True)
-        if verdict is None:
-            return None
-    best = [kinds[place] for place in verdict.best]
-    if {*best} == SAME_BUT_SCALE:
-        # The hypotheses differ only in scale, which the stations determine.
-        best = [min(best, key=lambda each: abs(math.log(_scale(results[kinds.index(each)], block))))]
-        verdict = replace(verdict, best=verdict.best[:1])
-    if full.sum() < FEWEST:
-        # A mistake in the set cannot be distinguished from one in some points.
-        verdict = replace(verdict, explained=False)
-    causes = [phrase(f"mistake.control.{each}") for each in best]
-    effect = phrase("mistake.control-misfit", times=verdict.fall)
-    return Explained(best[0], likely(causes, effect), verdict, lambda own: intended(own, best[0]))
+def _of_pairs(block: Block) -> Iterator[Proposal]:
+    """Yield the exchanges of two control points that reduce their misfit to the rays most.
+
+    Rays predict the points, except for a shift that coarse stations cause.
+    """
+    rays = Rays.of(View.of(block).seen)
+    met = rays.intersect().positions
+    plan = np.isfinite(block.point_sd[:, :2]).all(axis=1) & np.isfinite(met).all(axis=1)
+    points = np.flatnonzero(plan)
+    if len(points) < FEWEST_OF_PAIRS:
+        return
+    heights = rays.axes.from_local(met[points])[:, 2]
+    given = block.point_positions[points].copy()
+    given[:, 2] = np.where(np.isfinite(block.point_sd[points, 2]), given[:, 2], heights)
+    # Squared misfit of each intersection (row) with the coordinates of each point (column).
+    left = met[points, np.newaxis, :2] - rays.axes.positions(given)[np.newaxis, :, :2]
+    squares = ((left - np.median(np.diagonal(left).T, axis=0)) ** 2).sum(axis=2)
+    own = np.diag(squares)
+    ones, others = np.triu_indices(len(points), 1)
+    gains = own[ones] + own[others] - squares[ones, others] - squares[others, ones]
+    for k in np.argsort(-gains, kind="stable")[:PAIRS].tolist():
+        if gains[k] > 0:
+            pair = int(points[ones[k]]), int(points[others[k]])
+            names = [block.point_ids[point] for point in pair]
+            message = phrase("check.exchanged-control", points=names)
+            yield Proposal("exchanged", message, partial(exchange, pair=pair), points=names)
 
 
-def _finite(given: float, changed: list[float]) -> float:
-    """Return Omega of the given data, worse than all others if there is no adjustment."""
-    return min(given, 1e6 * max((each for each in changed if math.isfinite(each)), default=1.0))
-
-
-def _omega(result: Result | None) -> float:
-    return math.inf if result is None else result.sums_of_squares.total
+def exchange(block: Block, pair: tuple[int, int]) -> Block:
+    """Return a block with exchanged coordinates and standard deviations of two points."""
+    order = np.arange(len(block.point_ids))
+    order[[*pair]] = pair[::-1]
+    return block.replace(point_positions=block.point_positions[order], point_sd=block.point_sd[order])
 
 
 def _some_wrong(block: Block, adjusted: Adjuster) -> float:
@@ -108,13 +124,36 @@ def _some_wrong(block: Block, adjusted: Adjuster) -> float:
     The cost is Omega of the other observations plus two terms. Each wrong point adds 2 ln(3 k), because it is
     one of k. Each of its errors adds 2 ln(error / standard deviation).
     """
-    found = without_outlying_control(block, adjusted)
+    found = without_outliers(block, adjusted)
     if found is None:
         return math.inf
-    result, tests = found
+    result, _, tests = found
     count = int(np.isfinite(block.point_sd).any(axis=1).sum())
     sizes = np.log(np.maximum(np.nan_to_num(tests), 1.0)).sum()
-    return _omega(result) + 2 * (len(tests) * math.log(3 * count) + float(sizes))
+    return omega(result) + 2 * (len(tests) * math.log(3 * count) + float(sizes))
+
+
+def without_outliers(block: Block, adjusted: Adjuster) -> tuple[Result, Indices, Floats] | None:
+    """Adjust without the control point with the largest test value, until all others fit.
+
+    Returns the adjustment, the excluded points, and (k, 3) test values of these against their predictions;
+    None if more than a third fails.
+    """
+    points: Indices = np.empty(0, dtype=np.int64)
+    count = int(np.isfinite(block.point_sd).any(axis=1).sum())
+    for _ in range(1 + max(count // 3, 1)):
+        point_sd = block.point_sd.copy()
+        point_sd[points] = np.inf
+        result = adjusted.converged(block.replace(point_sd=point_sd) if len(points) else block)
+        if result is None:
+            return None
+        if not outliers(result)["control"].any():
+            errors = np.abs(block.point_positions[points] - result.point_positions[points])
+            cofactors = np.diagonal(result.point_cofactors[points], axis1=1, axis2=2)
+            deviations = spread_of(result) * np.sqrt(block.point_sd[points] ** 2 + cofactors)
+            return result, points, np.where(np.isfinite(block.point_sd[points]), errors / deviations, np.nan)
+        points = np.append(points, np.argmax(sizes_of_tests(result)["control"].max(axis=1)))
+    return None
 
 
 def _scale(result: Result | None, block: Block) -> float:

@@ -17,12 +17,8 @@ import numpy as np
 
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.hypotheses import (
-    Hypothesis,
-    attitude_readings,
-    hypotheses,
-    turns,
-)
+from photogram.diagnosis.hypotheses import attitude_readings, hypotheses, turns
+from photogram.diagnosis.mistakes import Proposal
 from photogram.diagnosis.regression import (
     LEAST,
     MOST,
@@ -67,7 +63,7 @@ class Verdict:
 
     def __init__(
         self,
-        found: list[tuple[float, Hypothesis]],
+        found: list[tuple[float, Proposal]],
         given: float,
         photos: Sequence[str] = (),
         what: str = "images",
@@ -143,14 +139,14 @@ def _of_groups(block: Block, photos: Indices) -> list[Verdict]:
 
 
 def passing(
-    tried: Iterable[Hypothesis], looked: Block, given: Floats, misfits_of: Callable[[Block], Floats]
-) -> list[tuple[float, Hypothesis]]:
+    tried: Iterable[Proposal], looked: Block, given: Floats, misfits_of: Callable[[Block], Floats]
+) -> list[tuple[float, Proposal]]:
     """Return the hypotheses under which photos fit, with their remaining misfit.
 
     `given` are (k,) misfits of the photos in the block `looked`. `misfits_of` returns the misfits of a
     changed block.
     """
-    found: dict[str, tuple[float, Hypothesis]] = {}
+    found: dict[str, tuple[float, Proposal]] = {}
     for hypothesis in tried:
         left = misfits_of(hypothesis.change(looked))
         ratio, median = left / given, float(np.median(left))
@@ -181,7 +177,7 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
 
 def _single(block: Block, photos: Indices) -> list[Verdict]:
     """Try photos one by one, with the other photos unchanged."""
-    by_names: dict[tuple[str, ...], tuple[list[tuple[float, Hypothesis]], float, list[str]]] = {}
+    by_names: dict[tuple[str, ...], tuple[list[tuple[float, Proposal]], float, list[str]]] = {}
     for photo in photos.tolist():
         own = np.array([photo])
         looked = view(block, own)
@@ -258,7 +254,7 @@ def _apart(given: Floats, found: Floats) -> float:
     return float(np.sqrt((np.arccos(np.clip((trace - 1) / 2, -1, 1)) ** 2).mean()))
 
 
-def distances_in_millimetres(block: Block) -> Hypothesis | None:
+def distances_in_millimetres(block: Block) -> Proposal | None:
     """Compare observed distances with coordinates, to find millimetres."""
     bars = block.observations.of_type(Distance)
     if not bars:
@@ -278,7 +274,7 @@ def distances_in_millimetres(block: Block) -> Hypothesis | None:
         if abs(np.median(relative) - 1) < BAR_WITHIN and (np.abs(np.log(relative)) < BAR_EACH).all():
             fields = {"distances": [each.name for each in bars], "times": factor}
             message = phrase(f"convention.distances.{unit}", **fields)
-            return Hypothesis("distances", message, partial(_shorter, factor=factor))
+            return Proposal("distances", message, partial(_shorter, factor=factor))
     return None
 
 

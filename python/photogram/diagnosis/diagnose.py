@@ -16,16 +16,16 @@ from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import argument_error
 from photogram.arguments.objects import kind_error
-from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosis_of
 from photogram.diagnosis.blunders import Edited, blunder_section, edit
 from photogram.diagnosis.control import control
-from photogram.diagnosis.control_sets import doubtful, explain
+from photogram.diagnosis.control_sets import wrong_control
 from photogram.diagnosis.diagnosis import Diagnosis
-from photogram.diagnosis.findings import Explained, Finding, Level, Section, Words, finding, note
+from photogram.diagnosis.findings import Finding, Section, Words, finding, note
 from photogram.diagnosis.gross import Suspects, gross
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
-from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
+from photogram.diagnosis.lenses import half_pixel, lenses_estimated, wrong_terms
+from photogram.diagnosis.mistakes import Adjuster, Mistake
 from photogram.diagnosis.orientation import orientation, spare_explained
 from photogram.diagnosis.positions import wrong_positions
 from photogram.diagnosis.residuals import residuals
@@ -38,7 +38,6 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import as_seen
-from photogram.network.observations import Position
 from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
@@ -49,7 +48,14 @@ __all__ = ["Manner", "check_block", "diagnose"]
 
 FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
 HARDLY = 10.0  # Multiple of the usual residual that coarse stations can cause before the adjustment
-MOST_SETS = 5  # Maximum number of successive corrections of control as a set
+MOST_SETS = 5  # Maximum number of successive corrections of sets
+
+LENS = Mistake("lens", wrong_terms)
+SETS = (
+    Mistake("control-set", wrong_control, "control-misfit"),
+    Mistake("observed-positions", wrong_positions),
+)
+"""Mistakes of sets that adjustments decide: lenses before predictions, control and positions after them."""
 
 
 @dataclass(frozen=True)
@@ -162,8 +168,11 @@ def _started(block: Block) -> tuple[Block | None, Section]:
 def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     words, adjusted = manner.words, Adjuster(manner.options)
     lens: list[Finding] = []
-    upright_lenses = lenses_put_right(block, lens, adjusted)
-    view = View.of(lenses_estimated(upright_lenses, lens, adjusted))
+    given = block
+    if (terms := LENS.search(block, adjusted)) is not None:
+        lens.append(terms.finding(LENS.kind))
+        given = terms.best[0].change(block)
+    view = View.of(lenses_estimated(given, lens, adjusted))
     sets, upright, oriented, exact = orientation(view, words)
     sets.findings[:0] = lens
     errors, suspects = gross(oriented.seen, oriented.unit)
@@ -204,10 +213,9 @@ def _judged(findings: list[Finding], suspects: Suspects, edited: Edited) -> list
     if edited.last is None or not edited.is_settled:
         return [*findings, *(edited.gross or suspects.findings)]
     known, fitting = {*edited.control}, {*edited.last.block.photo_ids}
-    exchanged = {name for pair in edited.exchanged for name in pair}
     found = []
     for each in findings:
-        if each.kind == "control-difference" and (exchanged & {*each.points} or not known & {*each.points}):
+        if each.kind == "control-difference" and not known & {*each.points}:
             continue
         # Photos that fit after the adjustment had wrong initial values.
         is_small = each.values.get("times_usual", math.inf) < HARDLY
@@ -222,37 +230,18 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
 
     Returns the view, and whether it has changed.
     """
-    changed = False
+    start = view
     for _ in range(MOST_SETS):
-        block = view.block
-        good = of_photos(kept_images(block, ~view.images(suspects.images)), ~suspects.photos)
-        kind, found = _set_of(good, adjusted)
-        if found is None:
+        good = of_photos(kept_images(view.block, ~view.images(suspects.images)), ~suspects.photos)
+        mistakes = ((each, each.search(good, adjusted)) for each in SETS)
+        mistake, found = next((pair for pair in mistakes if pair[1] is not None), (None, None))
+        if mistake is None or found is None:
             break
-        values = {"likelihood_ratio": found.judged.likelihood, "times_smaller": found.judged.fall}
-        level: Level = "grave" if found.judged.explained else "look"
-        section.findings.append(finding(level, found.message, kind=kind, values=values))
-        if level == "look":
+        section.findings.append(found.finding(mistake.kind, mistake.of))
+        if not found.judged.explained:
             break
-        view, changed = view.changed(found.change), True
-    return view, changed
-
-
-def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
-    """Return the type of finding and the mistake of a whole set, if any."""
-    control = np.isfinite(block.point_sd).any()
-    if control and doubtful(adjusted.tried(block), "control"):
-        explained = explain(block, adjusted)
-        if explained is not None:
-            return "control-set", explained
-    kinds = ("control", "station", Position.KIND)
-    weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
-    observed = weighted or bool(block.observations.of_type(Position))
-    if observed and doubtful(adjusted.tried(block), *kinds):
-        wrong = wrong_positions(block, adjusted)
-        if wrong is not None:
-            return "observed-positions", wrong
-    return "", None
+        view = view.changed(found.best[0].change)
+    return view, view is not start
 
 
 def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) -> Edited:

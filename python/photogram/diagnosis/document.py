@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from photogram.diagnosis.findings import Finding, Section
 from photogram.lazy_dataclasses import asdict
 from photogram.messages import counted, listed
 from photogram.results.network_document import drawings
 from photogram.results.result import Result
-from photogram.show import page
-from photogram.show.forms import part_lines
+from photogram.show import page, quantity
 from photogram.show.judgement import judged, verdict_table
-from photogram.show.page import Column, Document, Fact, Table, Text, Tone
+from photogram.show.page import Document, Fact, Facts, Text
+from photogram.show.quantity import Quantity, records
 from photogram.statistics.verdict import Verdict
 
-LEVELS: dict[str, tuple[str, Tone]] = {"grave": ("grave", "bad"), "look": ("to look at", "look")}
+LEVELS = {"grave": "grave", "look": "to look at"}
 MAX_NAMES = 6  # photos and points that a row names
 MAX_FINDINGS = 200  # rows of the table of findings
 
@@ -59,10 +61,16 @@ def check_document(title: str, verdict: Verdict, parts: Sequence[Section], resul
 
 
 def _members(section: Section) -> dict[str, object]:
+    parts = section.parts
     return {
         "title": section.title,
         "why": section.why,
-        "lines": [line for part in section.parts for line in part_lines(part)],
+        "facts": [asdict(fact) for part in parts if isinstance(part, Facts) for fact in part.facts],
+        "tables": [
+            {"title": part.title, "rows": records(part.columns)}
+            for part in parts
+            if isinstance(part, quantity.Table)
+        ],
         "findings": [_finding_members(finding) for finding in section.findings],
     }
 
@@ -81,17 +89,17 @@ def _section(number: int, section: Section) -> page.Section:
     return page.Section(f"part-{number}", section.title, parts, section.why)
 
 
-def _findings_table(findings: Sequence[tuple[Finding, str]]) -> Table:
+def _findings_table(findings: Sequence[tuple[Finding, str]]) -> quantity.Table:
     """Return the table of findings with section titles, grave findings first."""
     ordered = sorted(findings, key=lambda row: row[0].level != "grave")
-    shown, titles = zip(*ordered[:MAX_FINDINGS], strict=True)
-    levels, tones = zip(*(LEVELS[finding.level] for finding in shown), strict=True)
-    names = [listed([*finding.photos, *finding.points], MAX_NAMES) for finding in shown]
-    columns = [
-        Column("Level", levels, text=True, tones=tones),
-        Column("Finding", [finding.text for finding in shown], text=True),
-        Column("Photos and points", names, text=True),
-        Column("Part", titles, text=True),
-    ]
+    shown = [finding for finding, _ in ordered[:MAX_FINDINGS]]
+    texts = {
+        "Level": [LEVELS[each.level] for each in shown],
+        "Finding": [each.text for each in shown],
+        "Photos and points": [listed([*each.photos, *each.points], MAX_NAMES) for each in shown],
+        "Part": [title for _, title in ordered[:MAX_FINDINGS]],
+    }
+    columns = [Quantity(values, kind="name", head=head) for head, values in texts.items()]
+    columns[0] = replace(columns[0], marked=np.array([each.level == "grave" for each in shown]))
     rest = len(ordered) - len(shown)
-    return Table("Findings", columns, f"The JSON document has {rest} more." if rest else "")
+    return quantity.Table("", "Findings", columns, f"The JSON document has {rest} more." if rest else "")

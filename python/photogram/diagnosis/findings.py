@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Sequence
+from typing import Literal
 
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field
@@ -12,12 +12,7 @@ from photogram.show.page import Fact, Facts, Part, Text
 from photogram.statistics.verdict import Verdict
 from photogram.words import Phrase, phrase
 
-if TYPE_CHECKING:
-    from photogram.network.block import Block
-    from photogram.statistics.likelihood import Judged
-
 __all__ = [
-    "Explained",
     "Finding",
     "Level",
     "Section",
@@ -56,16 +51,6 @@ class Words:
         """Return additional values of such a finding."""
         del kept
         return {}
-
-
-@dataclass(frozen=True)
-class Explained:
-    """A mistake in all control points, or in all observed positions."""
-
-    kind: str
-    message: Phrase
-    judged: Judged  # Its probability
-    change: Callable[[Block], Block]  # Corrects a block
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.diagnosis.mistakes import Proposal
 from photogram.diagnosis.regression import Regression, given_points
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes, Representation, angles_form
 from photogram.network.block import Block
 from photogram.words import Phrase, phrase
@@ -43,9 +43,6 @@ _SCALES = 60  # number of steps in between
 _EXPLAINED = 0.2  # e, largest remainder of a regression
 
 
-Change = Callable[[Block], Block]  # Converts a given block to the intended one
-
-
 def turn_of(name: str) -> Floats:
     """(2, 2) matrix V of a reflection or rotation."""
     return np.array(TURNS[name], dtype=np.float64)
@@ -57,17 +54,7 @@ def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
     return block.replace(image_xy=np.where(own, block.image_xy @ turn, block.image_xy))
 
 
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """A possible mistake."""
-
-    name: str
-    message: Phrase
-    change: Change  # Corrects a block, or a part of its photos
-    exact: bool = True  # False if the corrected values, such as the pixel size, are approximate
-
-
-def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
+def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Proposal]:
     """Yield possible mistakes of a block; `seen` compares it with predictions."""
     yield from turns(np.ones(len(block.photo_ids), dtype=bool))
     composed = None if seen is None else image_hypothesis(block, seen)
@@ -76,15 +63,15 @@ def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothe
     else:
         yield from _of_format(block)
     for name, (message, _) in attitude_readings(block).items():
-        yield Hypothesis(name, message, partial(read_as, name=name))
+        yield Proposal(name, message, partial(read_as, name=name))
     yield from _positions(block)
 
 
-def turns(photos: Bools) -> Iterator[Hypothesis]:
+def turns(photos: Bools) -> Iterator[Proposal]:
     """Yield reflections and rotations of the images of (P,) photos."""
     for name in TURNS:
         change = partial(images_turned, photos=photos, turn=turn_of(name))
-        yield Hypothesis(name, phrase(f"mistake.{name}"), change)
+        yield Proposal(name, phrase(f"mistake.{name}"), change)
 
 
 def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:
@@ -92,7 +79,7 @@ def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:
     return block.replace(image_xy=(block.image_xy - shift) @ linear)
 
 
-def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
+def image_hypothesis(block: Block, seen: Regression) -> Proposal | None:
     """Return another common unit, origin or sense of image coordinates, or None."""
     half = np.ptp(block.image_xy, axis=0).max() / 2
     scale, shift = float(np.median(seen.scale)), np.median(seen.shift, axis=0)
@@ -124,10 +111,10 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
             names.append(name)
             parts.append(phrase(f"mistake.{name}"))
     change = partial(_of_images, shift=back, linear=linear)
-    return Hypothesis(", ".join(names), phrase("mistake.images", parts=parts), change, exact=False)
+    return Proposal(", ".join(names), phrase("mistake.images", parts=parts), change, exact=False)
 
 
-def _of_format(block: Block) -> Iterator[Hypothesis]:
+def _of_format(block: Block) -> Iterator[Proposal]:
     """Yield a corner as origin, and pixels as unit, from the observed extent."""
     lowest, highest = block.image_xy.min(axis=0), block.image_xy.max(axis=0)
     middle, half = (lowest + highest) / 2, float((highest - lowest).max() / 2)
@@ -145,7 +132,7 @@ def _of_format(block: Block) -> Iterator[Hypothesis]:
             parts = [phrase(f"mistake.format.{name}", pitch=1 / scale) for name in names]
             linear = np.diag([1.0, -1.0 if down else 1.0]) / scale
             change = partial(_of_images, shift=shift, linear=linear)
-            yield Hypothesis(", ".join(names), phrase("mistake.images", parts=parts), change, exact=False)
+            yield Proposal(", ".join(names), phrase("mistake.images", parts=parts), change, exact=False)
 
 
 def attitude_readings(block: Block) -> dict[str, tuple[Phrase, Floats]]:
@@ -226,7 +213,7 @@ def _centres(block: Block, axes: Floats) -> Block:
     return block.replace(photo_positions=-np.einsum("pji,pj->pi", to_photo, turned))
 
 
-def _positions(block: Block) -> Iterator[Hypothesis]:
+def _positions(block: Block) -> Iterator[Proposal]:
     known = bool(given_points(block).any())
     geographic = block.spheroid is not None
     for what in ("photos", "points") if known else ("photos",):
@@ -236,7 +223,7 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
                 factors: Floats = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
                 message = phrase(f"mistake.feet.{what}", part=part, unit=block.linear_unit)
                 change = partial(_scaled, factors=factors, points=what == "points")
-                yield Hypothesis(f"feet in {part} of {what}", message, change)
+                yield Proposal(f"feet in {part} of {what}", message, change)
     if geographic:
         for what, positions in (("photos", block.photo_positions), ("points", block.point_positions)):
             if not (np.abs(positions[:, 0]) > _HALF_TURN).any():
@@ -249,10 +236,10 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
         ("x right, y up, z back", np.eye(3)),
     ):
         message = phrase("mistake.translations", axes=axes_of_t)
-        yield Hypothesis("t for C", message, partial(_centres, axes=matrix))
+        yield Proposal("t for C", message, partial(_centres, axes=matrix))
     if known:
         yield _exchange("X and Y of points", points=True)
 
 
-def _exchange(name: str, *, points: bool) -> Hypothesis:
-    return Hypothesis(name, phrase("mistake.exchanged-axes", axes=name), partial(_exchanged, points=points))
+def _exchange(name: str, *, points: bool) -> Proposal:
+    return Proposal(name, phrase("mistake.exchanged-axes", axes=name), partial(_exchanged, points=points))

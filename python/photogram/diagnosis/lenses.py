@@ -6,44 +6,39 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from photogram.diagnosis.adjusting import Adjuster, Proposal, best_of, residuals_explained
 from photogram.diagnosis.findings import Finding, finding
+from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.wider_models import calibrated, calibration_words, freed
 from photogram.results.result import Result
 from photogram.statistics.evidence import Evidence
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[Kk]([1-6])")
 SIGNIFICANT = 5.0
 PITCH = (1e-3, 3e-2)  # Range of pixel sizes of cameras, millimetres
 HALF, NEARLY = 0.5, 0.1  # Pixels
+TINY = 1e-300
 
 
-def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
-    """Return a block with corrected radial terms, if the given terms do not fit.
+def wrong_terms(block: Block, adjusted: Adjuster) -> Explained | None:
+    """Return the mistake in given radial terms that explains the residuals, if any.
 
-    Hypotheses are the opposite sign, and terms for image coordinates in another unit: divided by the
-    principal distance, or pixels. The estimated K1 defines the pixel size. An accepted hypothesis is added to
-    the findings.
+    Proposals are the opposite sign, and terms for image coordinates in another unit: divided by the principal
+    distance, or pixels. The estimated K1 defines the pixel size.
     """
     if not any(_given_terms(camera) for camera in block.cameras):
-        return block
-    first = adjusted.tried(block)
-    test = None if first is None or not first.converged else first.global_test
-    if test is not None and not test.rejected_high:
-        return block
-    found = best_of(first, _proposals(block, adjusted), adjusted)
-    if found is None:
-        return block
-    best, verdict = found
-    values = {"likelihood_ratio": verdict.likelihood, "times_smaller": verdict.fall}
-    findings.append(finding("grave", residuals_explained(best, verdict), kind="lens", values=values))
-    return best.block
+        return None
+    first = adjusted.converged(block)
+    if first is not None and not (first.global_test and first.global_test.rejected_high):
+        return None
+    found = explain(block, _proposals(block, adjusted), adjusted)
+    return found if found is not None and found.is_certain else None
 
 
 def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
@@ -80,16 +75,18 @@ def _given_terms(camera: Camera) -> dict[str, int]:
 
 def _proposals(block: Block, adjusted: Adjuster) -> Iterator[Proposal]:
     scales = [camera.scale for camera in block.cameras]
-    yield Proposal(phrase("mistake.lens.sign"), _scaled(block, [-1.0] * len(scales), 0))
-    yield Proposal(phrase("mistake.lens.divided"), _scaled(block, [1 / scale for scale in scales], 2))
-    yield Proposal(phrase("mistake.lens.measured", unit=block.image_unit), _scaled(block, scales, 2))
-    ratio = _free_ratio(block, adjusted)
-    if ratio > 0:
-        factor = math.sqrt(ratio)
-        pitch = factor if block.image_unit == "px" else 1 / factor
-        if PITCH[0] < pitch < PITCH[1]:
-            code = "mistake.lens.mm" if block.image_unit == "px" else "mistake.lens.px"
-            yield Proposal(phrase(code, pitch=pitch), _scaled(block, [factor] * len(scales), 2))
+    causes: list[tuple[Phrase, list[float], int]] = [
+        (phrase("mistake.lens.sign"), [-1.0] * len(scales), 0),
+        (phrase("mistake.lens.divided"), [1 / scale for scale in scales], 2),
+        (phrase("mistake.lens.measured", unit=block.image_unit), scales, 2),
+    ]
+    factor = math.sqrt(max(_free_ratio(block, adjusted), 0.0))
+    pitch = factor if block.image_unit == "px" else 1 / max(factor, TINY)
+    if PITCH[0] < pitch < PITCH[1]:
+        code = "mistake.lens.mm" if block.image_unit == "px" else "mistake.lens.px"
+        causes.append((phrase(code, pitch=pitch), [factor] * len(scales), 2))
+    for message, factors, power in causes:
+        yield Proposal(message.code, message, partial(_scaled, factors=factors, power=power))
 
 
 def _scaled(block: Block, factors: list[float], power: int) -> Block:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,13 +14,12 @@ from photogram.diagnosis.robust import critical
 from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, spread_of
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
-from photogram.network.observations import Observation
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, BlockSuspects
 from photogram.results.result import Result
 from photogram.results.snooping_log import Removal
 from photogram.results.snooping_result import Snooped
 from photogram.show.angles import ARCSEC
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Table, column
 from photogram.words import phrase
 
 ODDS = 20.0  # Likelihood ratio below which another observation is an alternative
@@ -55,7 +53,6 @@ class Misfits:
             if self._image_of(entry) not in explained:
                 self._add(entry)
         common = [each.fields for each in found.outcome.remarks if each.code == "snooping.common"]
-        self.is_common = bool(common)
         self.in_section += [finding("grave", phrase("check.common-error", **each)) for each in common]
 
     @property
@@ -135,10 +132,6 @@ class Misfits:
         """Return the root of T in units of the remaining variance."""
         return math.sqrt(entry.fisher * entry.dimension)
 
-    def _largest(self, entry: Removal) -> int:
-        """Return the component with the largest error in standard deviations."""
-        return int(np.argmax(np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd))))
-
     def _image(self, entry: Removal) -> Finding:
         block, row = self.block, self._image_of(entry)
         photo, point = int(block.image_photos[row]), int(block.image_points[row])
@@ -176,21 +169,21 @@ class Misfits:
             for rival in entry.rivals
             if rival.odds < ODDS and suspects.kinds[rival.group] == CONTROL
         ]
+        rivals = phrase("check.rival.control", points=others) if others else ""
         sizes = np.abs(entry.error) / np.array(entry.error_sd) / spread_of(self.result)
         limit = critical(self.found.outcome.tests, FOUND)
         chosen = [k for k in range(len(sizes)) if sizes[k] > limit] or [int(np.argmax(np.nan_to_num(sizes)))]
-        return [
-            control_finding(
-                block,
-                int(suspects.points[entry.group]),
-                int(suspects.components[entry.rows[k]]),
-                entry.error[k],
-                float(sizes[k]) if len(chosen) > 1 else self._test(entry),
-                self._level(entry),
-                others,
-            )
-            for k in chosen
-        ]
+        name = block.point_ids[suspects.points[entry.group]]
+        found = []
+        for k in chosen:
+            axis, component = int(suspects.components[entry.rows[k]]), suspects.row_name(entry.rows[k])
+            error, unit = _shown(entry.error[k], suspects.unit(entry.rows[k]))
+            test = float(sizes[k]) if len(chosen) > 1 else self._test(entry)
+            fields = {"component": component, "point": name, "test": test, "error": error, "unit": unit}
+            message = phrase("check.control-misfit.component", **fields, rivals=rivals)
+            values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
+            found.append(finding(self._level(entry), message, [], [name, *others], values))
+        return found
 
     def _station(self, entry: Removal) -> list[Finding]:
         name, test = self.block.photo_ids[self.suspects.photos[entry.group]], self._test(entry)
@@ -203,44 +196,21 @@ class Misfits:
         return found
 
     def _other(self, entry: Removal) -> Finding:
+        """Return the finding on an additional observation, of its component with the largest error."""
         observation = self.suspects.observations[int(self.suspects.subjects[entry.group])]
-        k = self._largest(entry)
-        named = entry.components[k], entry.units[k]
-        parts = entry.error[k], self._test(entry), entry.redundancy, self._level(entry)
-        return observation_finding(observation, named, *parts)
+        k = int(np.argmax(np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd))))
+        error, unit = _shown(entry.error[k], entry.units[k])
+        fields = {"component": entry.components[k], "error": error, "unit": unit, "test": self._test(entry)}
+        fields |= {"observation": observation.name, "redundancy": entry.redundancy}
+        values = {"test_value": fields["test"], "redundancy": entry.redundancy}
+        values |= {f"error_{unit}".rstrip("_"): error}
+        message = phrase("check.observation-misfit", **fields)
+        return finding(self._level(entry), message, observation.photos, observation.points, values)
 
 
-def control_finding(
-    block: Block, row: int, axis: int, error: float, test: float, level: Level, others: Sequence[str] = ()
-) -> Finding:
-    """Return the finding on a control component; `error` is that of the given value."""
-    name, unit = block.point_ids[row], block.linear_unit
-    names = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
-    if block.geographic and axis < 2:
-        error, unit = error / ARCSEC, "arcsec"
-    fields = {"component": names[axis], "point": name, "test": test, "error": error, "unit": unit}
-    rivals = phrase("check.rival.control", points=list(others)) if others else ""
-    message = phrase("check.control-misfit.component", **fields, rivals=rivals)
-    values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
-    return finding(level, message, [], [name, *others], values)
-
-
-def observation_finding(
-    observation: Observation,
-    component: tuple[str, str],
-    error: float,
-    test: float,
-    redundancy: float,
-    level: Level,
-) -> Finding:
-    """Return the finding on a component, with its unit, of an additional observation."""
-    name, unit = component
-    if unit == "rad":
-        error, unit = error / ARCSEC, "arcsec"
-    fields = {"component": name, "test": test, "redundancy": redundancy, "error": error, "unit": unit}
-    message = phrase("check.observation-misfit", observation=observation.name, **fields)
-    values = {"test_value": test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
-    return finding(level, message, observation.photos, observation.points, values)
+def _shown(error: float, unit: str) -> tuple[float, str]:
+    """Return an error in the unit of reports: angles in arc seconds."""
+    return (error / ARCSEC, "arcsec") if unit == "rad" else (error, unit)
 
 
 def list_test_values(result: Result, section: Section) -> None:
@@ -265,13 +235,13 @@ def list_test_values(result: Result, section: Section) -> None:
     photos, points = block.image_photos[rows].tolist(), block.image_points[rows].tolist()
     small = (Axis.of("", unit),)
     columns = [
-        Quantity([block.photo_ids[photo] for photo in photos], kind="name", head="Photo"),
-        Quantity([block.point_ids[point] for point in points], kind="name", head="Point"),
-        Quantity(["xy"[k] for k in axis], kind="name", head="Axis"),
-        Quantity(residuals, small, "deviation", head="Residual", decimals=1),
-        Quantity(redundancy, head="Redundancy", decimals=3),
-        Quantity(values[rows, axis], head="Test value", decimals=2),
-        Quantity(residuals / redundancy, small, "deviation", head="Error", decimals=1),
+        column("photo", [block.photo_ids[photo] for photo in photos], "Photo", kind="name"),
+        column("point", [block.point_ids[point] for point in points], "Point", kind="name"),
+        column("axis", ["xy"[k] for k in axis], "Axis", kind="name"),
+        column("residual", residuals, "Residual", axes=small, kind="deviation", decimals=1),
+        column("redundancy", redundancy, "Redundancy", decimals=3),
+        column("test_value", values[rows, axis], "Test value", decimals=2),
+        column("error", residuals / redundancy, "Error", axes=small, kind="deviation", decimals=1),
     ]
     note = "The error is the gross error that would explain the residual."
     section.parts.append(Table("", "Largest test values of the other observations", columns, note))

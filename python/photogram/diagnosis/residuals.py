@@ -13,7 +13,7 @@ from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Table, column
 from photogram.statistics.patterns import group_patterns
 from photogram.words import phrase
 
@@ -51,10 +51,10 @@ def _by_rays(result: Result, section: Section) -> None:
     rms = factor * np.sqrt([squares[rows].mean(axis=0) for rows in own])
     axes = (Axis.of("x", unit), Axis.of("y", unit))
     columns = [
-        Quantity(numbers, head="Rays"),
-        Quantity([int(rows.sum()) for rows in own], head="Image observations"),
-        Quantity(rms, axes, "deviation", head="rms {}", decimals=2),
-        Quantity([result.redundancy[rows].mean() for rows in own], head="Mean redundancy", decimals=3),
+        column("rays", numbers, "Rays"),
+        column("images", [int(rows.sum()) for rows in own], "Image observations"),
+        column("rms", rms, "rms {}", axes=axes, kind="deviation", decimals=2),
+        column("redundancy", [result.redundancy[rows].mean() for rows in own], "Mean redundancy", decimals=3),
     ]
     section.parts.append(Table("", "Residuals by number of rays", columns))
 

@@ -17,11 +17,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.adjusting import Adjuster, Proposal, best_of, residuals_explained
+from photogram.diagnosis.mistakes import Adjuster, Proposal, explain
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.motion import timed_photos
@@ -40,14 +41,15 @@ MILLISECOND = 1e-3
 OTHER: dict[Direction, Direction] = {"down": "up", "up": "down", "right": "left", "left": "right"}
 
 
-def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> list[Message]:
+def readout_hints(block: Block, adjusted: Adjuster) -> list[Message]:
     """Try other rolling shutter readouts if the adjustment failed or fits badly."""
     if not any(each.shutter is not None for each in block.timed):
         return []
-    if first is not None and first.converged and (first.loss or not is_suspected(first)):
+    first = adjusted.converged(block)
+    if first is not None and (first.loss or not is_suspected(first)):
         return []
-    found = best_of(first, _proposals(block), adjusted)
-    return [] if found is None else [Message(residuals_explained(*found))]
+    found = explain(block, _proposals(block), adjusted)
+    return [Message(found.message())] if found is not None and found.is_certain else []
 
 
 def backward_readouts(result: Result) -> list[Message]:
@@ -80,14 +82,17 @@ def _proposals(block: Block) -> Iterator[Proposal]:
     def across_back(own: Shutter) -> Shutter:
         return opposite(across(own))
 
-    yield Proposal(phrase("mistake.shutter.opposite"), _changed(block, opposite))
+    def proposal(name: str, change: Callable[[Shutter], Shutter]) -> Proposal:
+        return Proposal(name, phrase(f"mistake.shutter.{name}"), partial(_changed, change=change))
+
+    yield proposal("opposite", opposite)
     rows = any(own.shutter.direction in ("down", "up") for own in block.timed if own.shutter is not None)
-    code = f"mistake.shutter.{'columns' if rows else 'rows'}"
-    yield Proposal(phrase(f"{code}.first"), _changed(block, across))
+    code = "columns" if rows else "rows"
+    yield proposal(f"{code}.first", across)
     readouts = [own.readout for own in block.timed if own.shutter is not None]
     if not all(each is not None and np.isinf(each.sd).all() for each in readouts):
         # A free readout time adopts the sign that fits.
-        yield Proposal(phrase(f"{code}.last"), _changed(block, across_back))
+        yield proposal(f"{code}.last", across_back)
     if any(each is not None and abs(float(each.position[0])) > LONGEST for each in readouts):
         known: dict[int, Readout] = {}
 
@@ -100,7 +105,7 @@ def _proposals(block: Block) -> Iterator[Proposal]:
             )
             return replace(own, readout=known.setdefault(id(readout), meant))
 
-        yield Proposal(phrase("mistake.shutter.milliseconds"), _changed(block, thousandth))
+        yield proposal("milliseconds", thousandth)
 
 
 def _changed(block: Block, change: Callable[[Shutter], Shutter]) -> Block:

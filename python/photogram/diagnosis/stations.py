@@ -191,7 +191,6 @@ def _base(block: Block) -> float:
 
 NEIGHBOURS = 8  # Points of a local plane
 DEPARTURE = 6.0  # Departures from the plane in robust standard deviations of all
-PER_CELL = 4  # Points of a cell of the search grid, on average
 
 
 def two_ray_heights(result: Result) -> Section:
@@ -208,15 +207,16 @@ def two_ray_heights(result: Result) -> Section:
     positions = local_axes(block).positions(result.point_positions[known])
     heights = result.point_positions[known, 2]
     two = np.flatnonzero((result.point_rays[known] == 2) & ~np.isfinite(block.point_sd[known, 2]))
-    if len(known) <= NEIGHBOURS + 1 or not two.size:
-        section.remark(f"{len(two)} two-ray points of {len(known)}: nothing to compare")
+    count = len(two)
+    two, near = _neighbours(block, positions[:, :2], known, two)
+    if not two.size:
+        section.remark(f"{count} two-ray points of {len(known)}: nothing to compare")
         return section
-    near = neighbours(positions[:, :2], two, NEIGHBOURS)
     departures, extrapolation = _above_planes(positions[:, :2], heights, two, near)
     own_sd = np.sqrt(np.maximum(result.point_covariances[known[two], 2, 2], 0))
     spread = MAD_TO_SD * float(np.median(np.abs(departures) / extrapolation))
     unit = block.linear_unit
-    section.figure("two-ray points", f"{len(two)} of {len(known)}")
+    section.figure("two-ray points", f"{count} of {len(known)}")
     section.figure("spread about the planes of their neighbours", f"{spread:.3f} {unit}")
     section.figure("median standard deviation of their heights", f"{float(np.median(own_sd)):.3f} {unit}")
     scale = np.maximum(spread * extrapolation, own_sd)
@@ -258,38 +258,27 @@ def _planes(design: Floats, z: Floats, weights: Floats) -> tuple[Floats, Floats]
     return np.einsum("nij,nj->ni", inverse, right), inverse[:, 0, 0]
 
 
-def neighbours(plan: Floats, rows: Indices, count: int) -> Indices:
-    """Return (k, count) other points nearest in plan to each of some points.
+def _neighbours(block: Block, plan: Floats, known: Indices, rows: Indices) -> tuple[Indices, Indices]:
+    """Return the rows of points with enough others on their photos, and (k, 8) the nearest of these in plan.
 
-    Points are sorted into square cells. The search visits rings of cells around a point, so that its work is
-    proportional to the number of evenly distributed points.
+    Rows and nearest points are indices of the `known` points with (n, 2) positions `plan`.
     """
-    low, extent = plan.min(axis=0), np.ptp(plan, axis=0).max()
-    cell = max(float(extent) * np.sqrt(PER_CELL / len(plan)), 1e-300)
-    cells = np.floor((plan - low) / cell).astype(np.int64)
-    width = int(cells.max()) + 1
-    key = cells[:, 0] * width + cells[:, 1]
-    order = np.argsort(key, kind="stable")
-    sorted_key = key[order]
+    place = np.full(len(block.point_ids), -1)
+    place[known] = np.arange(len(known))
+    points, photos = place[block.image_points], block.image_photos
+    on_photos, of_points = _grouped(points, photos), _grouped(photos, block.image_points)
+    enough, near = [], []
+    for row in rows.tolist():
+        others = np.unique(np.concatenate([on_photos[photo] for photo in of_points[known[row]].tolist()]))
+        others = others[(others >= 0) & (others != row)]
+        if len(others) >= NEIGHBOURS:
+            distances = np.linalg.norm(plan[others] - plan[row], axis=1)
+            enough.append(row)
+            near.append(others[np.argsort(distances, kind="stable")[:NEIGHBOURS]])
+    return np.array(enough, dtype=np.int64), np.array(near, dtype=np.int64).reshape(-1, NEIGHBOURS)
 
-    def within(x: int, y: int, ring: int) -> Indices:
-        columns = np.arange(max(x - ring, 0), min(x + ring, width - 1) + 1)
-        first = np.searchsorted(sorted_key, columns * width + max(y - ring, 0), "left")
-        last = np.searchsorted(sorted_key, columns * width + min(y + ring, width - 1), "right")
-        return np.concatenate([order[a:b] for a, b in zip(first, last, strict=True)])
 
-    found = np.empty((len(rows), count), dtype=np.int64)
-    for index, row in enumerate(rows.tolist()):
-        (x, y), ring = cells[row].tolist(), 1
-        while True:
-            candidates = within(x, y, ring)
-            candidates = candidates[candidates != row]
-            distances = np.hypot(*(plan[candidates] - plan[row]).T)
-            # Everything within `ring` cells of the point has been seen.
-            if len(candidates) >= count and (
-                np.partition(distances, count - 1)[count - 1] <= ring * cell or ring >= width
-            ):
-                break
-            ring += 1
-        found[index] = candidates[np.argsort(distances, kind="stable")[:count]]
-    return found
+def _grouped(values: Indices, rows: Indices) -> list[Indices]:
+    """Return the values with each row number."""
+    order = np.argsort(rows, kind="stable")
+    return np.split(values[order], np.cumsum(np.bincount(rows))[:-1])

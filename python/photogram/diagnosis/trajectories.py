@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.adjustment.snooping import snoop
-from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import explained, remarks
 from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.findings import Finding, Section, finding, note, note_all, note_verdict
-from photogram.diagnosis.shutters import shutter_hints
+from photogram.diagnosis.mistakes import Adjuster
+from photogram.diagnosis.shutters import readout_hints
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectory_hints import flown_hints
 from photogram.diagnosis.weights import weight_hints
@@ -48,7 +48,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
         note(section, "grave", phrase("check.no-adjustment", reason=str(error)))
-        note_all(section, "convention", "grave", flown_hints(block) or shutter_hints(block, None, adjusted))
+        note_all(section, "convention", "grave", flown_hints(block) or readout_hints(block, adjusted))
         return [structure, section], None
     note_all(section, "convention", "grave", explained(result))
     note_all(section, "moving", "look", remarks(result))

@@ -21,7 +21,8 @@ from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.clocks import differences
 from photogram.diagnosis.conventions import SUSPICION, Verdict, passing
-from photogram.diagnosis.hypotheses import Change, Hypothesis, quaternion_readings
+from photogram.diagnosis.hypotheses import quaternion_readings
+from photogram.diagnosis.mistakes import Change, Proposal
 from photogram.diagnosis.regression import UNKNOWN, given_points, relative, spread
 from photogram.errors import InputError
 from photogram.messages import Message
@@ -61,7 +62,7 @@ def _of_records(block: Block) -> list[Verdict]:
     if not given[0] > SUSPICION:
         return []
     tried = (
-        Hypothesis(f"records {seconds:+g} s", message, partial(shifted_records, seconds=seconds))
+        Proposal(f"records {seconds:+g} s", message, partial(shifted_records, seconds=seconds))
         for message, seconds in shifts("records")
     )
     found = passing(tried, block, given, _records_misfit)
@@ -102,14 +103,14 @@ def _records_misfit(block: Block) -> Floats:
 KILOMETRE = 1000.0
 
 
-def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Hypothesis]:
+def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Proposal]:
     """Yield possible mistakes for `photos` on trajectories, without observations."""
     if any(each.trajectory is not None for each in block.timed):
         yield from _of_tables()
         for message, seconds in shifts("images"):
-            yield Hypothesis(f"images {seconds:+g} s", message, partial(_shifted_images, seconds=seconds))
+            yield Proposal(f"images {seconds:+g} s", message, partial(_shifted_images, seconds=seconds))
     if block.principal_distances is not None or any("c" in each.names for each in block.cameras):
-        yield Hypothesis("sign of c", phrase("mistake.sign of c"), _looking_back)
+        yield Proposal("sign of c", phrase("mistake.sign of c"), _looking_back)
     if any(each.lines is not None for each in block.timed):
         yield from _of_scanners(block, photos)
 
@@ -122,9 +123,9 @@ def shifts(of: str) -> Iterator[tuple[Phrase, float]]:
             yield phrase(f"mistake.times.{of}", **fields), sign * seconds
 
 
-def _of_tables() -> Iterator[Hypothesis]:
-    def changed(name: str, message: Phrase, change: Callable[[Table], Table]) -> Hypothesis:
-        return Hypothesis(name, message, partial(_with_tables, change=change))
+def _of_tables() -> Iterator[Proposal]:
+    def changed(name: str, message: Phrase, change: Callable[[Table], Table]) -> Proposal:
+        return Proposal(name, message, partial(_with_tables, change=change))
 
     def transposed(table: Table) -> Table:
         return replace(table, attitudes=np.swapaxes(table.attitudes, 1, 2))
@@ -196,7 +197,7 @@ def shifted_records(block: Block, seconds: float) -> Block:
     )
 
 
-def _of_scanners(block: Block, photos: Indices) -> Iterator[Hypothesis]:
+def _of_scanners(block: Block, photos: Indices) -> Iterator[Proposal]:
     """Yield the hypotheses that lines, samples or both are counted from the other end.
 
     With l the observed and p the predicted lines, l = s - p if they are; s is the median of l + p.
@@ -204,7 +205,7 @@ def _of_scanners(block: Block, photos: Indices) -> Iterator[Hypothesis]:
     predicted = flown_predictions(block, photos)
     for name, axes in (("reversed", (1,)), ("turned", (0, 1)), ("mirrored samples", (0,))):
         change: Change = partial(_counted_back, predicted=predicted, axes=axes)
-        yield Hypothesis(name, phrase(f"mistake.scanner.{name}"), change, exact=False)
+        yield Proposal(name, phrase(f"mistake.scanner.{name}"), change, exact=False)
 
 
 def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Block:

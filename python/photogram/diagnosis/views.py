@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from photogram.arguments.types import Bools, Indices
-from photogram.diagnosis.hypotheses import Change
+from photogram.diagnosis.mistakes import Change
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses

@@ -7,10 +7,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from photogram import _photocore
 from photogram.arguments.types import Bools, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.network_trial import (
+    CONTROL,
     KINDS,
     LostSupportError,
     NamedSuspects,
@@ -38,6 +41,7 @@ class Aside:
     images: Indices  # Images, by number, that do not agree with most of their point and photo
     photos: dict[int, str | Phrase]  # Photos whose observations agree with no pose, with the reason
     found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
+    control: Indices | tuple[()] = ()  # Control points, by number
 
 
 @dataclass(frozen=True)
@@ -148,7 +152,8 @@ def snooped(
 ) -> Outcome:
     """Remove gross errors from a network and return the outcome.
 
-    `start` excludes suspected images at first; those that agree with the others are included again.
+    `start` excludes suspected images and control at first; those that agree with the others are included
+    again.
 
     `afresh` restarts the trial from a consensus if its adjustment diverges, and returns the rejected
     observations or None. `common` returns common errors of sets that explain the tests better than single
@@ -169,7 +174,10 @@ def snooped(
     )
 
     def excluded(aside: Aside) -> tuple[list[int], set[int]]:
-        return trial.suspects.of_images(aside.images).tolist(), set(aside.photos)
+        suspects = trial.suspects
+        control = (suspects.kinds == CONTROL) & np.isin(suspects.subjects, aside.control)
+        groups = [*suspects.of_images(aside.images).tolist(), *np.flatnonzero(control).tolist()]
+        return groups, set(aside.photos)
 
     aside = start
     try:

@@ -16,6 +16,7 @@ use super::super::trial::Excluded;
 use super::choosing::Choosing;
 use super::groups::Groups;
 use super::log::{Consequence, Remark, Removal};
+use super::settings::ControlParts;
 use super::state::Snooping;
 use super::tried::Tried;
 
@@ -128,7 +129,8 @@ impl Snooping {
         self.apply(network, entries, &[])
     }
 
-    /// Returns entries for the excluded observations that contradict their predictions.
+    /// Returns entries for the excluded observations that contradict their predictions. Components of control that agree are not
+    /// entered if single components may be excluded.
     fn contradicting(&self, network: &mut dyn Tried, groups: &[usize]) -> Result<Vec<Removal>, NetworkError> {
         let limit = self.level.limit(0).ln();
         let freedom = self.standing.degrees_of_freedom.max(1) as f64;
@@ -139,14 +141,19 @@ impl Snooping {
             let dimension = own.rows.len();
             let log_probability = self.log_probability(own.statistic, dimension, group);
             let fisher = own.statistic / dimension as f64 / variance;
-            (log_probability < limit).then(|| Removal {
+            let single = |k: usize| self.log_probability((own.error[k] / own.error_sd[k]).powi(2), 1, group);
+            let mut rows: Vec<usize> = (0..dimension).collect();
+            if self.groups.control == ControlParts::Components && !self.groups.is_image(group) {
+                rows.retain(|&k| single(k) < limit);
+            }
+            (log_probability < limit && !rows.is_empty()).then(|| Removal {
                 fisher: if variance > 0.0 { fisher } else { f64::NAN },
                 log_probability,
-                error: own.error,
-                error_sd: own.error_sd,
+                error: rows.iter().map(|&k| own.error[k]).collect(),
+                error_sd: rows.iter().map(|&k| own.error_sd[k]).collect(),
                 ..self.entry(
                     group,
-                    own.rows.iter().map(|row| first + row).collect(),
+                    rows.iter().map(|&k| first + own.rows[k]).collect(),
                     own.statistic,
                     dimension,
                 )

@@ -10,12 +10,15 @@ use super::super::trial::Excluded;
 use super::choosing::Choosing;
 use super::groups::Groups;
 use super::log::{Remark, Removal, Round, Standing};
-use super::settings::Settings;
+use super::settings::{ControlParts, Settings};
 use super::tried::Tried;
 use super::unit_weight::{Level, UnitWeight};
 
 /// Smallest redundancy number of a tested row.
 pub(super) const TESTABLE: f64 = 0.01;
+/// The same of rows that are no image coordinates, if single components of control are tested. Precise control at the edge of a
+/// block, or a precise distance, has a redundancy number of a thousandth. Its test value is still meaningful.
+const TESTABLE_COMPONENT: f64 = 1e-5;
 
 /// Data snooping of a network.
 #[derive(Debug)]
@@ -106,9 +109,11 @@ impl Snooping {
 
     /// Returns whether an error in some direction of a group shows in its own residuals.
     pub(super) fn is_testable(&self, group: usize) -> bool {
+        let components = self.groups.control == ControlParts::Components;
+        let least = if components && !self.groups.is_image(group) { TESTABLE_COMPONENT } else { TESTABLE };
         self.tests.active[group]
             && self.tests.rank[group] > 0
-            && (0..self.groups.rows(group).len()).any(|k| self.redundancy(group, k) > TESTABLE)
+            && (0..self.groups.rows(group).len()).any(|k| self.redundancy(group, k) > least)
     }
 
     /// Returns the redundancy number of a row of a group; zero if it is excluded.

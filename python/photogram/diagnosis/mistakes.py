@@ -1,0 +1,151 @@
+"""Mistakes of whole sets of data: proposals, evaluated by adjustment.
+
+A proposal changes a block to the one without a possible mistake. The likelihood ratio of the adjustments of
+both blocks decides (:mod:`photogram.statistics.likelihood`). A parameter that a proposal estimates must gain
+ln f more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from photogram.adjustment.adjustment import adjust
+from photogram.diagnosis.findings import Finding, Level, finding, likely
+from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.block import Block
+from photogram.results.result import Result
+from photogram.statistics.likelihood import Judged, judged
+from photogram.words import Phrase, phrase
+
+KEPT = 2  # Adjustments that are stored
+CLEARLY = 2 * math.log(20)  # Additional cost of single wrong members of a set (likelihood ratio of 20)
+WORST = 1e6  # Assumed ratio to the worst proposal of a block that cannot be adjusted
+
+Change = Callable[[Block], Block]
+
+
+class Adjuster:
+    """Adjusts blocks with the same options, and stores the last results."""
+
+    def __init__(self, options: dict[str, Any], *known: tuple[Block, Result | AdjustmentError]) -> None:
+        self.options = options
+        self._known = [*known]
+
+    def __call__(self, block: Block) -> Result:
+        """Adjust a block; raise the same error for the same block."""
+        result = next((result for known, result in self._known if known == block), None)
+        if result is None:
+            try:
+                result = adjust(block, **self.options)
+            except AdjustmentError as error:
+                result = error
+            self._known = [*self._known[1 - KEPT :], (block, result)]
+        if isinstance(result, AdjustmentError):
+            raise result
+        return result
+
+    def tried(self, block: Block) -> Result | None:
+        """Adjust a block; None if that fails."""
+        try:
+            return self(block)
+        except AdjustmentError:
+            return None
+
+    def converged(self, block: Block) -> Result | None:
+        """Adjust a block; None if that fails or does not converge."""
+        result = self.tried(block)
+        return result if result is not None and result.converged else None
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A possible mistake, and its correction."""
+
+    name: str
+    message: Phrase
+    change: Change  # Returns the block without the mistake
+    exact: bool = True  # Whether the correction has no rough values
+    parameters: int = 0  # Estimated by the adjustment of the changed block
+    points: Sequence[str] = ()  # Points that it concerns; empty if it concerns all
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """An entry of a registry: the kind of its findings, and the search for it."""
+
+    kind: str
+    search: Callable[[Block, Adjuster], Explained | None]
+    of: str = "residuals"  # that it explains
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """The proposals that explain the residuals best; several if the data do not decide."""
+
+    best: list[Proposal]
+    results: list[Result | None]  # Their adjustments
+    judged: Judged
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether one proposal explains the residuals, and no other does."""
+        return self.judged.explained and len(self.best) == 1
+
+    def message(self, of: str = "residuals") -> Phrase:
+        """Return the message on the mistake; `of` are the residuals that it explains."""
+        effect = phrase(f"mistake.{of}", times=self.judged.fall)
+        return likely([each.message for each in self.best], effect)
+
+    def finding(self, kind: str, of: str = "residuals") -> Finding:
+        """Return the finding on the mistake; see :meth:`message`."""
+        values = {"likelihood_ratio": self.judged.likelihood, "times_smaller": self.judged.fall}
+        first = self.best[0]
+        if first.points:
+            return finding("grave", first.message, points=first.points, values=values)
+        level: Level = "grave" if self.judged.explained else "look"
+        return finding(level, self.message(of), kind=kind, values=values)
+
+
+def explain(
+    block: Block,
+    proposals: Iterable[Proposal],
+    adjusted: Adjuster,
+    members: Callable[[Block], float] | None = None,
+) -> Explained | None:
+    """Return the proposals that explain the residuals of a block, if any.
+
+    `members` returns the cost of an explanation by single wrong members of the set, in terms of the sum of
+    squares. Such errors hide a mistake in the set. If no proposal is clearly better, both are compared with
+    this cost.
+    """
+    tried = list(proposals)
+    blocks = [each.change(block) for each in tried]
+    results = [*map(adjusted.converged, blocks)]
+    freedom = next((each.degrees_of_freedom for each in results if each is not None), 0)
+    if freedom < 1:
+        return None
+    counts = [each.parameters for each in tried]
+    given, omegas = omega(adjusted.converged(block)), [*map(omega, results)]
+
+    def best_of(given: float) -> Judged | None:
+        # A block that cannot be adjusted is worse than all that can.
+        given = min(given, WORST * max(each for each in omegas if math.isfinite(each)))
+        return judged(given, omegas, freedom, parameters=counts, known_weight=True)
+
+    found = best_of(given)
+    if members is not None:
+        single = members(block)
+        if found is None or min(omegas) + CLEARLY > single:
+            omegas = [min(own, members(each)) for own, each in zip(omegas, blocks, strict=True)]
+            found = best_of(min(single, given))
+    if found is None:
+        return None
+    return Explained([tried[row] for row in found.best], [results[row] for row in found.best], found)
+
+
+def omega(result: Result | None) -> float:
+    """Return the sum of squares of an adjustment; infinite without one."""
+    return math.inf if result is None else result.sums_of_squares.total
