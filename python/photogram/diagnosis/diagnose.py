@@ -52,10 +52,10 @@ MOST_SETS = 5  # Maximum number of successive corrections of sets
 
 LENS = Mistake("lens", wrong_terms)
 SETS = (
-    Mistake("control-set", wrong_control, "control-misfit"),
     Mistake("observed-positions", wrong_positions),
+    Mistake("control-set", wrong_control, "control-misfit"),
 )
-"""Mistakes of sets that adjustments decide: lenses before predictions, control and positions after them."""
+"""Mistakes of sets that adjustments decide: lenses before predictions, positions and control after them."""
 
 
 @dataclass(frozen=True)

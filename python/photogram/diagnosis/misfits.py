@@ -200,11 +200,11 @@ class Misfits:
         observation = self.suspects.observations[int(self.suspects.subjects[entry.group])]
         k = int(np.argmax(np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd))))
         error, unit = _shown(entry.error[k], entry.units[k])
-        fields = {"component": entry.components[k], "error": error, "unit": unit, "test": self._test(entry)}
-        fields |= {"observation": observation.name, "redundancy": entry.redundancy}
-        values = {"test_value": fields["test"], "redundancy": entry.redundancy}
-        values |= {f"error_{unit}".rstrip("_"): error}
+        test, redundancy = self._test(entry), entry.redundancy
+        fields = {"component": entry.components[k], "test": test, "redundancy": redundancy}
+        fields |= {"observation": observation.name, "error": error, "unit": unit}
         message = phrase("check.observation-misfit", **fields)
+        values = {"test_value": test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
         return finding(self._level(entry), message, observation.photos, observation.points, values)
 
 

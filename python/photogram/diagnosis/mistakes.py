@@ -20,7 +20,8 @@ from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
 from photogram.words import Phrase, phrase
 
-KEPT = 2  # Adjustments that are stored
+KEPT = 2  # Adjustments that are always stored
+STORED = 500_000  # Image observations of the blocks of all stored adjustments, if there are more
 CLEARLY = 2 * math.log(20)  # Additional cost of single wrong members of a set (likelihood ratio of 20)
 WORST = 1e6  # Assumed ratio to the worst proposal of a block that cannot be adjusted
 
@@ -42,7 +43,9 @@ class Adjuster:
                 result = adjust(block, **self.options)
             except AdjustmentError as error:
                 result = error
-            self._known = [*self._known[1 - KEPT :], (block, result)]
+            self._known.append((block, result))
+            while len(self._known) > KEPT and sum(len(own.image_xy) for own, _ in self._known) > STORED:
+                del self._known[0]
         if isinstance(result, AdjustmentError):
             raise result
         return result
