@@ -32,6 +32,7 @@ FEWEST = 5  # Smallest number of observed positions
 EQUAL = 0.15  # Relative difference within which a lever arm is the given one with other signs or axes
 COORDINATES = {"feet in heights": ([0, 1, 2], 2), "feet": ([0, 1, 2], 0), "X and Y exchanged": ([1, 0, 2], 3)}
 """Order of the axes, and first axis in feet."""
+NEARLY = 0.9  # Log odds of a proposal, as a part of the largest
 FREE = ("gnss-heights", "gnss-shift", "lever-arm")  # Tried if the block cannot be adjusted
 
 
@@ -103,7 +104,10 @@ def _of_catalogue(block: Block, given: list[Position], adjusted: Adjuster) -> It
         likely = dict.fromkeys(FREE, 0.0)
     else:
         found = errors.hypotheses
-        likely = {str(found.code[row]): float(found.estimate[row, 0]) for row in found.common()}
+        # First-order odds of large errors are approximate; adjustments decide.
+        least = NEARLY * max((found.log_odds[row] for row in found.common()), default=math.inf)
+        rows = np.flatnonzero(found.log_odds[: len(found.sets)] >= least).tolist()
+        likely = {str(found.code[row]): float(found.estimate[row, 0]) for row in rows}
     for code, size in likely.items():
         if code in FREE:
             yield from _free(block, given, code, adjusted)
