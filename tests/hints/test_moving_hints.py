@@ -20,9 +20,9 @@ from moving_blocks import (
     scanned,
 )
 from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
-from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
 from photogram.diagnosis.clocks import counted_lines
+from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.shutters import rolling_hints
 from photogram.diagnosis.trajectory_hints import flown_hints
 from photogram.network import Attitude, Boresight, Clock, Lines, Readout

@@ -217,28 +217,22 @@ def explained(block):
     return diagnose(block, adjust(block))
 
 
-def weights_of(block):
-    found = [each.phrase for each in explained(block).findings if each.kind == "weights"]
-    return [each for each in found if each and each.code.startswith("weighting.")]
-
-
 def test_standard_deviations_that_are_wrong():
     right = aerial(11)
     good = explained(right)
     assert good.findings == []
     assert good.verdict.code == "accepted"
-    (small,) = weights_of(right.replace(image_sd=right.image_sd / 3))
-    assert nested_codes(small) == ["weighting.small", "test.images"]
-    assert small.fields["factor"] == pytest.approx(3, rel=0.1)
-    (large,) = weights_of(right.replace(image_sd=right.image_sd * 4))
-    assert large.code == "weighting.large"
-    assert large.fields["factor"] == pytest.approx(4, rel=0.1)
+    small = explained(right.replace(image_sd=right.image_sd / 3)).verdict
+    assert (small.code, small.exit) == ("weights", 4)
+    assert small.message.fields["factor"].fields["factor"] == pytest.approx(3, rel=0.1)
+    large = explained(right.replace(image_sd=right.image_sd * 4)).verdict
+    assert (large.code, large.exit) == ("weights-of-types", 4)
+    (images,) = large.message.fields["types"]
+    assert images.fields["factor"] == pytest.approx(1 / 4, rel=0.1)
     xy = right.image_xy.copy()
     xy[100] += 0.5
     wrong = explained(right.replace(image_xy=xy))
     assert [finding.kind for finding in wrong.grave] == [wrong.verdict.code] == ["gross-errors"]
-    told = explained(right.replace(image_sd=right.image_sd / 8)).result.messages
-    assert nested_codes(told[0]) == ["weighting.small", "test.images"]
 
 
 def test_longitude_and_latitude():

@@ -46,7 +46,7 @@ def diagnosed(result: Result) -> Result:
     """Add hints and exchanged names to a result that has not converged or fits badly.
 
     Mistakes in conventions (`hints`) and exchanged names (`exchanged`) enter the verdict. Hints are also
-    messages. Hints on standard deviations are messages only, because the verdict tests these separately.
+    messages.
     """
     return with_exchanges(_with_hints(result))
 
@@ -94,10 +94,6 @@ def _bad(result: Result) -> bool:
 
 def _with_hints(result: Result) -> Result:
     found, said = explained(result), remarks(result)
-    if not found and result.converged and result.loss is None and _bad(result):
-        from photogram.diagnosis.weights import weight_hints
-
-        said = [*weight_hints(result), *said]
     if not (found or said):
         return result
     return replace(
@@ -111,7 +107,6 @@ def diagnosis_of(result: Result) -> Diagnosis:
     """Return the diagnosis and verdict of an adjustment that failed or fits badly."""
     from photogram.diagnosis.diagnosis import Diagnosis
     from photogram.diagnosis.findings import Section, note_all, note_verdict
-    from photogram.diagnosis.weights import weight_hints
 
     found = diagnosed(result)
     section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
@@ -119,7 +114,5 @@ def diagnosis_of(result: Result) -> Diagnosis:
     note_all(section, "convention", "grave", hints)
     note_all(section, "exchanged-points", "grave", found.exchanged)
     note_all(section, "moving", "look", remarks(found))
-    if found.converged and not found.hints:
-        note_all(section, "weights", "look", weight_hints(found))
     note_verdict(section, found.verdict)
     return Diagnosis(result.block.title, [section], found, adjusted_before=True)

@@ -18,7 +18,6 @@ from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.shutters import readout_hints
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectory_hints import flown_hints
-from photogram.diagnosis.weights import weight_hints
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import counted
 from photogram.network.block import Block, flown_by
@@ -56,8 +55,6 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     found = _snooped(block, adjusted)
     if found is not None and (result.converged or found.result.converged):
         section.findings += [_finding(each) for each in found.removed]
-    if result.converged:
-        note_all(section, "weights", "look", weight_hints(result))
     note_verdict(section, result.verdict)
     return [structure, section], result
 
