@@ -57,7 +57,7 @@ from photogram.results.snooping_log import Aside, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped, recorded
 from photogram.results.type_factors import type_factors
-from photogram.statistics.findings import IMAGES, Tested
+from photogram.statistics.findings import IMAGES, Removed, Tested
 from photogram.statistics.weight_rules import needed, wrong_types
 from photogram.words import Phrase, phrase
 
@@ -173,6 +173,13 @@ def snoop_block(
         trial = block_trial(block, None, core, threads, control=control)
         # Errors of fixed values resemble common errors.
         outcome = snooped(trial, options, None if start else afresh, None if has_held else common, start)
+        if not has_held and Removed([], trial.suspects.counts(outcome.out.rows, outcome.active)).excessive:
+            # A robust start removes members of sets before errors in common are tested.
+            other = block_trial(block, None, core, threads, control=control)
+            with suppress(LostSupportError, _photocore.BlockError):
+                whole = snooped(other, replace(options, robust=False, max_rounds=1), None, common)
+                if any(each.code == "snooping.common" for each in whole.remarks):
+                    trial, outcome = other, whole
     except (LostSupportError, _photocore.BlockError):
         # This adjustment names undetermined unknowns, or continues without some points.
         covariance = chosen.unit_variance == "redundancy"

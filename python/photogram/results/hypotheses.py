@@ -213,7 +213,7 @@ class Hypotheses:
     def common(self, rivals: float = -math.inf) -> list[int]:
         """Return rows of common errors that explain more than single values, the likeliest first."""
         odds, sets = self.log_odds, range(len(self.sets))
-        found = [k for k in sets if self.code[k] != "bending" and self._is_significant(k)]
+        found = [row for row in sets if self._is_significant(row)]
         found.sort(key=lambda row: -odds[row])
         # Tests of rivals do not include check points.
         if not found or odds[found[0]] < max(self.single_odds, rivals + self.by_checks[found[0]]):
@@ -385,7 +385,13 @@ def hypotheses(
         of_checks, of_points = np.split(changes, [checks])
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = np.zeros(0) if agreement is None else np.abs(of_checks) / agreement.sd
-        detected = bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
+        ratios, joint = np.nan_to_num(ratios, posinf=0.0), agreement and agreement.joint
+        shown = float(np.square(ratios).max(initial=0.0))
+        if joint is not None and np.isfinite(moved := of_checks.ravel()[joint[0]]).all():
+            shown = max(shown, float(moved @ np.linalg.solve(joint[2], moved)))
+        # Residuals and check points together detect a smaller error.
+        ratio, least = sizes[2], DETECTED**2
+        detected = shown > least or ratio < limit * math.sqrt(1.0 + shown / least)
         effects[row] = Effect(detected, of_points, *sizes)
         if not known or agreement is None or agreement.joint is None:
             continue

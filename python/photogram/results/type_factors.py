@@ -7,15 +7,17 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from photogram.arguments.types import Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial, Tests
 from photogram.statistics.evidence import MEDIAN
-from photogram.statistics.findings import CONTROL_POINTS, NOMINAL, Agreement, Text, TypeFactor
+from photogram.statistics.findings import CONTROL_POINTS, LARGEST_FACTOR, NOMINAL, Agreement, Text, TypeFactor
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
 
 MOST_ROWS = 64  # Largest number of observations with an exact sum of R_ij^2
+VISIBLE = 1e-6  # Least redundancy of a direction
+FACTORS = 100  # Number of examined factors
 DETECTED = 2.3  # Factor that differences of three check points detect
 FEW, WEAK = 20.0, 0.1
 """Redundancy, and mean redundancy, below which chi-square with r degrees of freedom is wrong."""
@@ -72,13 +74,14 @@ def _factor(trial: NetworkTrial, tests: Tests, kind: Text, groups: Indices, limi
     w = w[np.isfinite(w) & (redundancy > TESTABLE)]
     is_control = bool(suspects.kinds[groups[0]] == CONTROL)
     equal = suspects.kinds[groups[0]] == IMAGE and len(sd) and np.ptp(sd) <= 1e-9 * sd[0]
-    spread = math.nan
+    spread, likeliest = math.nan, None
     if len(rows) <= MOST_ROWS and r < max(FEW, WEAK * len(rows)):
         mixed = TypeFactor(kind, squares, r, spread=float(np.square(redundancy).sum()))
         # The squares of R outside the diagonal increase the sum.
         if squares > NOMINAL**2 * r or (is_control and mixed.undetected > limit):
-            columns = trial.core.responses(groups.tolist())
-            spread = float(np.square(columns[:, rows]).sum())
+            within = np.flatnonzero(np.isin(np.hstack([*map(suspects.rows, groups.tolist())]), rows))
+            found = trial.core.responses(groups.tolist())[within][:, rows]
+            spread, likeliest = float(np.square(found).sum()), _likeliest(found, residuals)
     return TypeFactor(
         kind,
         squares,
@@ -87,4 +90,21 @@ def _factor(trial: NetworkTrial, tests: Tests, kind: Text, groups: Indices, limi
         sd=float(sd[0]) if equal else math.nan,
         unit=suspects.given.image_unit,
         spread=spread,
+        likeliest=likeliest,
     )
+
+
+def _likeliest(cofactors: Floats, residuals: Floats) -> tuple[float, float]:
+    """Return the likeliest factor F of the standard deviations of residuals, and the gain of log L.
+
+    Along the eigenvectors of their cofactors R, with eigenvalues mu, residuals have the variances mu + (F^2 -
+    1) mu^2.
+    """
+    mu, vectors = np.linalg.eigh((cofactors + cofactors.T) / 2)
+    seen = mu > VISIBLE
+    squares = (vectors.T[seen] @ residuals) ** 2 / mu[seen]
+    factors = np.geomspace(1.0, LARGEST_FACTOR, FACTORS)
+    growth = 1.0 + np.multiply.outer(factors**2 - 1.0, mu[seen])
+    gains = (squares * (1.0 - 1.0 / growth) - np.log(growth)).sum(axis=1) / 2
+    best = int(gains.argmax())
+    return float(factors[best]), float(gains[best])

@@ -178,6 +178,8 @@ class TypeFactor:
     sd: float = math.nan  # The given standard deviation of images, with its unit; NaN if there are several
     unit: str = ""
     spread: float = math.nan  # s; NaN if it is not required
+    # Of a type with s: factor of the largest likelihood, and the gain of its logarithm
+    likeliest: tuple[float, float] | None = None
 
     @property
     def _spread(self) -> float:
@@ -190,17 +192,18 @@ class TypeFactor:
 
     @property
     def factor(self) -> float:
-        """Factor of the standard deviations, from the expectation of q."""
-        return math.sqrt(max(1.0 + (self.squares - self.redundancy) / self._spread, 0.0))
+        """Factor of the standard deviations, by likelihood or from the expectation of q."""
+        return math.sqrt(self.squares / self.redundancy) if self.likeliest is None else self.likeliest[0]
 
     @property
     def log_odds(self) -> float:
         """Log odds of this factor against none; minus infinity if it is small or of few values."""
-        enough = self.redundancy >= (1.0 if math.isnan(self.spread) else LEAST_REDUNDANCY)
-        if not enough or not min(self.factor, self.median) > NOMINAL:
+        enough = self.redundancy >= (1.0 if self.likeliest is None else LEAST_REDUNDANCY)
+        if not (enough and min(self.factor, self.median) > NOMINAL and self.factor < LARGEST_FACTOR):
             return -math.inf
-        ratio, freedom = self.squares / self.redundancy, self._freedom
-        return freedom / 2 * (ratio - 1.0 - math.log(ratio)) - math.log(freedom) / 2
+        gain = self._log_likelihood(self.factor) - self._log_likelihood(1.0)
+        gain = gain if self.likeliest is None else self.likeliest[1]
+        return gain - math.log(self._freedom) / 2
 
     @property
     def is_rejected(self) -> bool:
@@ -248,6 +251,7 @@ MOST: Mapping[Text, float] = {
 }  # Largest removable shares
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 EVIDENCE = 2.0  # Difference of log likelihoods that decides: 1.92 at the ends of a 95 percent interval
+LARGEST_FACTOR = 30.0  # Largest plausible factor of the standard deviations of a type
 NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least
 TYPE_LEVEL = 0.001  # Significance level of the standard deviations of a type
 LEAST_REDUNDANCY = 0.5  # Of a type with a known s: below, q is a nearly singular mixture
