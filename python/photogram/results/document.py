@@ -164,8 +164,10 @@ def _members(result: Result) -> dict[str, Any]:
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
     )
     of_camera = ("name", "photos", "images", "covariance")
-    of_unknown = ("kind", "name", "position", "observations", "components", "units", "change", "sd")
-    of_unknown += ("redundancy", "standardized", "covariance")
+    of_unknown = (
+        *("kind", "name", "position", "observations", "components", "units", "change", "sd"),
+        *("redundancy", "standardized", "covariance"),
+    )
     found: dict[str, Any] = {}
     if result.cameras:
         found["cameras"] = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -65,8 +65,8 @@ class ReliabilitySummary:
         """Groups that reports list: verdicts do not need them."""
         list_groups = self.list_groups
         if list_groups is None:  # Another thread has just stored them.
-            return vars(self)["listed"]
-        found = vars(self)["listed"] = list_groups()
+            return cast(Listed, vars(self)["listed"])
+        found: Listed = vars(self)["listed"] = list_groups()
         self.list_groups = None
         return found
 

@@ -41,7 +41,7 @@ def type_factors(
             found[suspects.type(kind, 0)] = [groups]
             continue
         for group in groups:
-            found.setdefault(suspects.type(kind, int(suspects.subjects[group])), []).append(group)
+            found.setdefault(suspects.type(kind, int(suspects.subjects[group])), []).append(np.array([group]))
     return [_factor(trial, tests, kind, np.hstack(groups), limit) for kind, groups in found.items()]
 
 
