@@ -250,12 +250,11 @@ class Pattern:
     @cached_property
     def hypotheses(self) -> Hypotheses | None:
         """Undetected errors and their effects without check points; None without redundancy."""
-        result = self.result
-        if not result.degrees_of_freedom > 0:
+        if not self.result.degrees_of_freedom > 0:
             return None
         # In a plan, all points have given coordinates, but these check nothing.
-        found, _ = result._evaluated(result.reliability(), block_facts(self.block, result.photo_positions))
-        return found
+        facts = block_facts(self.block, self.result.photo_positions)
+        return self.result._evaluated(self.result.reliability(), facts)[0]
 
     @property
     def known_rms_sd(self) -> tuple[float, float, float] | None:
