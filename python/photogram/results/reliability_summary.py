@@ -66,8 +66,8 @@ class ReliabilitySummary:
         list_groups = self.list_groups
         if list_groups is None:  # Another thread has just stored them.
             return cast(Listed, vars(self)["listed"])
-        found: Listed = vars(self)["listed"] = list_groups()
-        self.list_groups = None
+        found = list_groups()
+        vars(self)["listed"], self.list_groups = found, None
         return found
 
     def __getstate__(self) -> dict[str, Any]:
