@@ -1,6 +1,7 @@
 """Documents: a table that is declared once, in all forms, and documents of several things in layers."""
 
 import csv
+import gc
 import json
 import re
 import zlib
@@ -29,7 +30,7 @@ from photogram.show.page import (
     Text,
     layered,
 )
-from photogram.show.quantity import Axis, Quantity, records
+from photogram.show.quantity import Axis, Quantity, for_people, records
 from photogram.words import words_of
 
 AXES = (Axis.of("x", "m"), Axis.of("y", "m"))
@@ -71,6 +72,37 @@ def test_a_table_is_declared_once_for_all_forms():
     assert comment == "# unit of position_x, position_y, sd_x, sd_y: m"
     (_, second) = csv.DictReader(lines)
     assert second == {"id": "P2", "position_x": "3.0", "position_y": "4.0", "sd_x": "0.01", "sd_y": ""}
+
+
+def test_only_json_creates_large_members():
+    calls = []
+
+    def members():
+        calls.append(1)
+        return {"name": "A", "log": {"level": 0.05}}
+
+    log = replace(table(), key="log.points")
+    hidden = replace(table(), key="hidden", columns=for_people(table().columns))
+    whole = Document("Survey", "A", sections=[Section.of(log), Section.of(hidden)], members=members)
+    whole = whole.with_members(lambda: {"more": [1]})
+    assert "P1" in text(whole)
+    assert "P1" in html.page_html(whole).decode()
+    assert not calls
+    written_members = json.loads(to_json(whole))
+    assert len(calls) == 1
+    assert list(written_members) == ["program", "name", "log", "more"]
+    assert written_members["log"]["level"] == 0.05
+    assert [row["id"] for row in written_members["log"]["points"]] == ["P1", "P2"]
+
+
+def test_a_json_document_leaves_the_search_for_cycles_as_it_was():
+    for enabled in (True, False):
+        (gc.enable if enabled else gc.disable)()
+        try:
+            to_json(document())
+            assert gc.isenabled() is enabled
+        finally:
+            gc.enable()
 
 
 def test_text_and_page_write_the_same_cells():
