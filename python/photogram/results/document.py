@@ -164,10 +164,8 @@ def _members(result: Result) -> dict[str, Any]:
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
     )
     of_camera = ("name", "photos", "images", "covariance")
-    of_unknown = (
-        *("kind", "name", "position", "observations", "components", "units", "change", "sd"),
-        *("redundancy", "standardized", "covariance"),
-    )
+    of_unknown = ("kind", "name", "position", "observations", "components", "units", "change", "sd")
+    of_weight = ("redundancy", "standardized", "covariance")
     found: dict[str, Any] = {}
     if result.cameras:
         found["cameras"] = [
@@ -178,7 +176,8 @@ def _members(result: Result) -> dict[str, Any]:
         found["calibrations"] = [calibration_member(result, each) for each in calibrations(result)]
     if result.unknowns:
         found["unknowns"] = [
-            members(each, *of_unknown, matrix="attitude", sd_given="given.deviations", value="values")
+            members(each, *of_unknown, *of_weight, matrix="attitude", sd_given="given.deviations")
+            | members(each, value="values")
             for each in result.unknowns
         ]
     return found | {
