@@ -290,6 +290,7 @@ def parameters_table(found: Calibration, law: str = "") -> Table:
     names = replace(component(axes, of)[0], head="Parameter")
     alike: dict[str, Any] = {"axes": axes, "of": of}
     free = {math.inf: "free"}
+    weighted = np.array([0 < each.given_sd < math.inf for each in every], dtype=bool)
     columns = [
         of_each(every, "name", member="name", kind="name"),
         of_each(every, "unit", kind="name"),
@@ -304,7 +305,8 @@ def parameters_table(found: Calibration, law: str = "") -> Table:
         of_each(every, "significant"),
         of_each(every, "multiple_correlation", head="R with all others", decimals=4),
         of_each(every, "from_prior"),
-        of_each(every, "gain"),
+        of_each(every, "redundancy", member="", head="Redundancy", decimals=3, seen=weighted),
+        of_each(every, "gain", head="Gain"),
         Quantity(
             [outcome(each) for each in every],
             kind="name",
@@ -316,21 +318,6 @@ def parameters_table(found: Calibration, law: str = "") -> Table:
     note = about("camera", **lens, photos=camera.photos, images=camera.images)
     deviations = np.array([each.sd for each in every])
     return Table(f"parameters-{camera.name}", camera.name, columns, note, "", deviations)
-
-
-def gains_section(result: Result) -> Section:
-    """Return redundancy numbers and gains of parameters, for text reports."""
-    tables = []
-    for found in calibrations(result)[:LISTED]:
-        every, name = found.parameters, found.camera.name
-        weighted = np.array([0 < each.given_sd < math.inf for each in every], dtype=bool)
-        columns = [
-            of_each(every, "name", kind="name", head="Parameter"),
-            of_each(every, "redundancy", head="Redundancy", decimals=3, seen=weighted),
-            of_each(every, "gain", head="Gain"),
-        ]
-        tables.append(Table(f"gains-{name}", name, for_people(columns)))
-    return Section("gains", "Redundancy numbers and gains of camera parameters", tables, about("gains"))
 
 
 def outcome(each: ParameterTest) -> str:

@@ -14,7 +14,7 @@ from photogram.network.structuring import structure
 from photogram.results import network_document as of_network
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
-from photogram.results.calibration import calibration_member, calibrations, cameras_section, gains_section
+from photogram.results.calibration import calibration_member, calibrations, cameras_section
 from photogram.results.datum import observed_control
 from photogram.results.features import features_members, features_section
 from photogram.results.film_report import films_section
@@ -59,7 +59,6 @@ def block_document(result: Result) -> Document:
         beside=[features_section(result.features, pictures["features"])],
         datum=about(f"datum.{'chosen' if datum.is_chosen else 'given'}", datum=datum.phrase),
         poses=about("poses") if result.block.timed else "",
-        details=[gains_section(result)],
         work=[Fact(f"Bandwidth {name}", value, note=head) for name, value in figures],
         members=partial(_members, result),
     )

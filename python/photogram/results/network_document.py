@@ -43,14 +43,13 @@ def network_document(
     datum: str = "",
     poses: str = "",
     work: Sequence[Fact] = (),
-    details: Sequence[Section] = (),
     members: Callable[[], Mapping[str, Any]],
 ) -> Document:
     """Return the document of a network from its `photos`, `size` and `given` data.
 
     `more` are additional highlights, `redundancy` tables below the plot of redundancy numbers, `beside`
     sections below the plan. `datum` describes the reference of coordinates, `poses` the meaning of photo
-    poses. `work` are other facts on the normal equations, `details` sections of the text report only.
+    poses. `work` are other facts on the normal equations.
     `members` returns the members of JSON documents that are no tables.
     """
     pictures, tests = drawings(result), Tests(result)
@@ -93,7 +92,6 @@ def network_document(
         ],
         details=[
             Section("work", "Work", [Facts("Work", [*_work(result), *work])]),
-            *details,
             sections.images_section(result),
         ],
         members=members,
