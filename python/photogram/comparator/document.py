@@ -30,7 +30,6 @@ from photogram.show.page import (
     Part,
     Section,
     conventions,
-    significant,
 )
 from photogram.show.quantity import members
 from photogram.statistics.findings import Findings, Systematic, Tested
@@ -83,9 +82,8 @@ def _highlights(calibration: Calibration) -> list[Fact]:
     variance, joint = calibration.variance, calibration.joint
     after = variance.after_nonlinear or variance.after_linear
     lack = calibration.linear.correction.nonorthogonality_rad / ARCSEC
-    before = significant(variance.before.total, 3)
     found = [
-        Fact("A coordinate before", before, UM, "standard deviation of one axis"),
+        Fact.of("A coordinate before", variance.before.total, UM, "sd of one axis", figures=3),
         Fact.of("After the calibration", after.total, UM, figures=3),
         Fact.of("Random comparator", variance.random, UM, figures=3),
         Fact.of("Pointing, mean of a point", variance.pointing.total, UM, figures=3),

@@ -10,7 +10,17 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section, tests_section, verdict_document
-from photogram.show.page import Document, Fact, Facts, Layers, Remarks, Section, conventions, significant
+from photogram.show.page import (
+    Document,
+    Fact,
+    Facts,
+    Layers,
+    Remarks,
+    Section,
+    about,
+    conventions,
+    significant,
+)
 from photogram.show.quantity import Table, members
 from photogram.stellar import tables
 from photogram.stellar.camera_tables import correlated_members, matrix_table
@@ -207,8 +217,8 @@ def _residuals(result: Result) -> list[Fact]:
     problem, residuals = result.problem, 1e6 * result.solved.residuals.T
     weights = problem.star_weights[problem.known & ~problem.held]
     return [
-        Fact("Common mean error of the plate", *_before(result, problem.image_weights, 1e-6, "µm")),
-        Fact("Common mean error of the stars", *_before(result, weights, ARCSEC, "arcsec")),
+        _prior(result, "Common mean error of the plate", problem.image_weights, 1e-6, "µm"),
+        _prior(result, "Common mean error of the stars", weights, ARCSEC, "arcsec"),
         *(
             Fact.of(
                 f"Sums of {axis} residuals: +, -, both",
@@ -221,22 +231,19 @@ def _residuals(result: Result) -> list[Fact]:
     ]
 
 
-def _before(result: Result, weights: Floats, unit: float, name: str) -> tuple[str, str]:
-    """Return the text of the prior mean errors from a common weight."""
+def _prior(result: Result, name: str, weights: Floats, size: float, unit: str) -> Fact:
+    """Return the prior mean errors from a common weight."""
     if not len(weights) or not have_common_weight(weights):
-        return "individual weights" if len(weights) else "-", ""
-    x, y = result.mean_error / np.sqrt(np.diag(weights[0])) / unit
-    return f"{x:.4f}, {y:.4f}", name
+        return Fact(name, "individual weights" if len(weights) else "-")
+    return Fact.of(name, result.mean_error / np.sqrt(np.diag(weights[0])) / size, unit, decimals=4)
 
 
 def _scale_test(result: Result) -> str:
     pair, freedom = [INDEX["cx"], INDEX["cy"]], result.degrees_of_freedom
     if not (result.solved.free[pair].all() and freedom):
-        return "not made: they are not estimated both"
-    f, probability = equal(result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], freedom)
-    verdict = "refused" if probability < LEVEL else "not refused"
-    degrees = f"1 and {freedom} degrees of freedom"
-    return f"F = {f:.2f} with {degrees}, probability {probability:.2G}: {verdict} at {LEVEL:g}"
+        return about("scales.none")
+    f, p = equal(result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], freedom)
+    return about(f"scales.{'refused' if p < LEVEL else 'kept'}", f=f, freedom=freedom, p=p, level=LEVEL)
 
 
 def _derived(result: Result) -> list[Fact]:
@@ -256,7 +263,8 @@ def _derived(result: Result) -> list[Fact]:
         ]
     if options.comparator_angle is not None:
         frame = comparator_frame(result, options.comparator_angle)
-        x, y, oblique = (f"mean error {error:.3e}" for error in np.divide(frame.mean_errors, [1, 1, GRAD]))
+        errors = np.divide(frame.mean_errors, [1, 1, GRAD])
+        x, y, oblique = (about("mean-error", error=error) for error in errors)
         facts += [
             Fact.of("Comparator, angle x to y", options.comparator_angle / GRAD, "grads", decimals=9),
             Fact.of("Comparator, scale x", frame.scale_x, note=x, decimals=12),

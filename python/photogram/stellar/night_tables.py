@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.show.angles import ARCSEC
-from photogram.show.page import Fact
+from photogram.show.page import Fact, about
 from photogram.show.quantity import Axis, Quantities, Quantity, Table, chosen, of_each
 from photogram.stellar.camera_tables import (
     ARC_SECONDS,
@@ -293,7 +293,6 @@ def _first_attitudes(night: Night) -> str:
 def _global_test(result: CalibratedNight) -> str:
     test = result.test
     if test is None:
-        return "no degrees of freedom"
-    low, high = test.limits
-    verdict = "fails" if test.rejected_high or test.rejected_low else "holds"
-    return f"{verdict}: variance {test.variance:.4f}, expected {low:.3f} to {high:.3f}"
+        return about("global-test.none")
+    verdict, (low, high) = "fails" if test.rejected_high or test.rejected_low else "holds", test.limits
+    return about(f"global-test.{verdict}", variance=test.variance, low=low, high=high)
