@@ -37,7 +37,7 @@ SD = Quantity(np.array([1e-5, 0.0, 17.1]), AXES, "deviation", head="sd", words={
 
 def test_components_of_different_units_share_a_column_each_with_its_own_decimals():
     table = written(Table("", "", [component(AXES, OF)[0], VALUES, SD], deviations=SD.values))
-    rows = [[cell.text for cell in row] for row in table.rows]
+    rows = [[*row] for row in zip(*(column.cells for column in table.columns), strict=True)]
     # Two figures of 2.1 seconds of arc, of degrees four more; significant figures where nothing is known.
     assert rows[0] == ["omega, ″", "28.64789", "2.06"]
     assert rows[1] == ["s, mm / m", "0.250000", "held"]
@@ -47,7 +47,8 @@ def test_components_of_different_units_share_a_column_each_with_its_own_decimals
 def test_what_is_to_be_looked_at_is_marked():
     marked = np.array([False, True])
     tests = Quantity(np.array([1.0, -6.6]), head="t", decimals=2, marked=marked)
-    assert [cell.tone for (cell,) in written(Table("", "", [tests])).rows] == ["", "look"]
+    (column,) = written(Table("", "", [tests])).columns
+    assert column.toned == [("1.00", ""), ("-6.60", "look")]
 
 
 def test_facts_are_lines():
@@ -76,7 +77,7 @@ def test_an_attribute_of_many_things_is_a_quantity():
     assert records(table)[1] == {"name": "y^2", "sd_um": 0.25, "p": 0.05}
     page = written(Table("", "", table))
     assert [(column.head, column.unit) for column in page.columns] == [("Term", ""), ("sd", "µm"), ("p", "")]
-    assert [(cell.text, cell.number) for cell in page.rows[0]] == [("x^2", None), ("0.500", 0.5), ("", None)]
+    assert [column.cells for column in page.columns] == [["x^2", "y^2"], ["0.500", "0.250"], ["", "0.05"]]
 
 
 def test_documents_take_arrays_however_they_lie_and_data_classes():
