@@ -29,7 +29,7 @@ def listed(stated, table="table.removed"):
     """Return the rows of the table of removed observations on the page."""
     (annex,) = [each for each in stated.document().sections if each.key == "annex-e"]
     found = [part for part in annex.parts if getattr(part, "title", "") == stated.texts(table)]
-    return written(found[0]).rows if found else []
+    return [*zip(*(column.cells for column in written(found[0]).columns), strict=True)] if found else []
 
 
 def keys(stated):

@@ -142,8 +142,11 @@ def test_page_and_document_have_one_verdict_for_each_class(result, count):
             f"{SENTENCES[verdict]}.{name}" for name, verdict in verdicts.items() if count or name != "3d"
         }
         (section,) = [each for each in found.document().sections if each.key == "figures"]
-        rows = written(section.parts[0]).rows if count else []
-        shown = {row[0].text: row[-1].text for row in rows if row[-1].text}
+        cells = {column.head: column.cells for column in written(section.parts[0]).columns} if count else {}
+        names, verdicts_of = (
+            cells.get(found.texts(f"column.{each}"), []) for each in ("component", "verdict")
+        )
+        shown = {name: each for name, each in zip(names, verdicts_of, strict=False) if each}
         of_page = {"plan": "h", "h": "v", "all": "3d"}
         assert shown == {
             found.texts(f"component.{part}"): found.texts(f"asprs.verdict.{verdicts[name]}")
