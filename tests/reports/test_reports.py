@@ -12,6 +12,10 @@ import pytest
 import browser as browsers
 import photogram
 from photogram import InnerConstraints, adjust, simulate, snoop
+from photogram.show.html import page_html
+from photogram.show.page import Document, Section
+from photogram.show.quantity import Axis, Quantity, Table
+from photogram.words import words_of
 
 EXAMPLES = str(Path(photogram.__file__).parent / "examples")
 NETWORK = ["Verdict", "Plan of the network", "Size and fit", "Image residuals", "Redundancy", "Tests"]
@@ -167,6 +171,26 @@ def test_tables_are_sorted_by_their_heads_and_back(made, browser):
         name.locator("button").click()
         assert name.get_attribute("aria-sort") == "ascending"
         assert head.get_attribute("aria-sort") is None
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_angles_bounds_and_decimal_commas_are_sorted_as_numbers(browser, tmp_path, language):
+    angles = np.radians([[-1.5], [2.25], [0.001], [-0.5], [np.nan]])
+    columns = [
+        Quantity(angles, (Axis.turned("phi", "dms"),), "value", head="Angle", decimals=2),
+        Quantity(np.array([0.5, 1e-120, 1e-7, 0.04, 1.0]), kind="probability", head="p"),
+    ]
+    table = Section.of(Table("t", "Table", columns))
+    (tmp_path / "a.html").write_bytes(
+        page_html(Document("A", "B", sections=[table], words=words_of(language)))
+    )
+    with browser.opened(tmp_path / "a.html") as page:
+        for column, expected in (("Angle", [1, 2, 3, 0, 4]), ("p", [4, 0, 3, 2, 1])):
+            cells = page.locator(f"tbody td:nth-child({1 + (column == 'p')})")
+            before = cells.all_inner_texts()
+            page.locator("th", has_text=column).locator("button").click()
+            assert cells.all_inner_texts() == [before[row] for row in expected]
+            page.reload()
 
 
 def test_one_layer_is_shown_at_a_time(made, browser):
