@@ -6,10 +6,10 @@ the same declarations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,14 +62,14 @@ class Form(NamedTuple):
     number: Callable[[dict[str, Any]], int] | None
 
 
-def _stored(kind: str | type, names: str = "", number: Callable[[dict[str, Any]], int] | None = None) -> Any:
+def _form(kind: str | type, names: str = "", number: Callable[[dict[str, Any]], int] | None = None) -> Any:
     return field(metadata={"form": Form(kind, tuple(names.split()), number)})
 
 
 @cache
-def layout(kind: Hashable) -> dict[str, Form]:
+def layout(kind: type) -> dict[str, Form]:
     """Return the stored fields of a record with their forms."""
-    return {each.name: each.metadata["form"] for each in fields(cast("Any", kind)) if each.metadata}
+    return {each.name: each.metadata["form"] for each in fields(kind) if each.metadata}
 
 
 _POSE = "QW QX QY QZ TX TY TZ"
@@ -80,11 +80,11 @@ _POSE = "QW QX QY QZ TX TY TZ"
 class Camera:
     """A record of cameras."""
 
-    number: int = _stored("I", "CAMERA_ID")
-    model: str = _stored("model", "MODEL")
-    width: int = _stored("Q", "WIDTH")
-    height: int = _stored("Q", "HEIGHT")
-    parameters: tuple[float, ...] = _stored("d", "parameter", lambda own: MODELS.get(own["model"], 0))
+    number: int = _form("I", "CAMERA_ID")
+    model: str = _form("model", "MODEL")
+    width: int = _form("Q", "WIDTH")
+    height: int = _form("Q", "HEIGHT")
+    parameters: tuple[float, ...] = _form("d", "parameter", lambda own: MODELS.get(own["model"], 0))
     place: Place = Place()
 
 
@@ -92,11 +92,11 @@ class Camera:
 class Image:
     """A record of images; its pose is camera from world."""
 
-    number: int = _stored("I", "IMAGE_ID")
-    pose: tuple[float, ...] = _stored("d", _POSE)
-    camera: int = _stored("I", "CAMERA_ID")
-    name: str = _stored("name", "NAME")
-    features: np.ndarray[Any, Any] = _stored("features", "POINTS2D")
+    number: int = _form("I", "IMAGE_ID")
+    pose: tuple[float, ...] = _form("d", _POSE)
+    camera: int = _form("I", "CAMERA_ID")
+    name: str = _form("name", "NAME")
+    features: np.ndarray[Any, Any] = _form("features", "POINTS2D")
     place: Place = Place()
 
 
@@ -104,26 +104,26 @@ class Image:
 class Sensor:
     """A sensor of a rig."""
 
-    kind: str = _stored("sensor", "SENSOR_TYPE")
-    number: int = _stored("I", "SENSOR_ID")
+    kind: str = _form("sensor", "SENSOR_TYPE")
+    number: int = _form("I", "SENSOR_ID")
 
 
 @dataclass(frozen=True)
 class MountedSensor(Sensor):
     """A sensor with its pose, sensor from rig, if it is known."""
 
-    has_pose: bool = _stored("?", "HAS_POSE")
-    pose: tuple[float, ...] = _stored("d", _POSE, lambda own: own["has_pose"])
+    has_pose: bool = _form("?", "HAS_POSE")
+    pose: tuple[float, ...] = _form("d", _POSE, lambda own: own["has_pose"])
 
 
 @dataclass(frozen=True)
 class Rig:
     """A rig: number of sensors, its reference sensor, if any, and others."""
 
-    number: int = _stored("I", "RIG_ID")
-    count: int = _stored("I", "NUM_SENSORS")
-    reference: tuple[Sensor, ...] = _stored(Sensor, number=lambda own: min(own["count"], 1))
-    sensors: tuple[MountedSensor, ...] = _stored(MountedSensor, number=lambda own: own["count"] - 1)
+    number: int = _form("I", "RIG_ID")
+    count: int = _form("I", "NUM_SENSORS")
+    reference: tuple[Sensor, ...] = _form(Sensor, number=lambda own: min(own["count"], 1))
+    sensors: tuple[MountedSensor, ...] = _form(MountedSensor, number=lambda own: own["count"] - 1)
     place: Place = Place()
 
 
@@ -131,18 +131,18 @@ class Rig:
 class SensorImage(Sensor):
     """An image of a sensor."""
 
-    image: int = _stored("Q", "DATA_ID")
+    image: int = _form("Q", "DATA_ID")
 
 
 @dataclass(frozen=True)
 class Frame:
     """A frame: the pose of its rig, rig from world, and the images of its sensors."""
 
-    number: int = _stored("I", "FRAME_ID")
-    rig: int = _stored("I", "RIG_ID")
-    pose: tuple[float, ...] = _stored("d", _POSE)
-    count: int = _stored("I", "NUM_DATA_IDS")
-    data: tuple[SensorImage, ...] = _stored(SensorImage, number=lambda own: own["count"])
+    number: int = _form("I", "FRAME_ID")
+    rig: int = _form("I", "RIG_ID")
+    pose: tuple[float, ...] = _form("d", _POSE)
+    count: int = _form("I", "NUM_DATA_IDS")
+    data: tuple[SensorImage, ...] = _form(SensorImage, number=lambda own: own["count"])
     place: Place = Place()
 
 

@@ -53,7 +53,7 @@ _HEADS = {
 def _read(source: _Line | _Bytes, kind: type[_Kind]) -> _Kind:
     """Return a record of declared fields."""
     values: dict[str, Any] = {"place": source.place} if hasattr(kind, "place") else {}
-    for name, form in layout(kind).items():
+    for name, form in layout(kind).items():  # type: ignore[arg-type]
         if form.number is None:
             found = source.take(str(form.kind), form.names)
             values[name] = found[0] if len(form.names) == 1 else found
@@ -281,7 +281,7 @@ class _Places(Sequence[Place]):
 
 def _values(record: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Yield the values of a record with their forms."""
-    for name, form in layout(type(record)).items():
+    for name, form in layout(type(record)).items():  # type: ignore[arg-type]
         value = getattr(record, name)
         if isinstance(form.kind, str):
             yield form.kind, value if isinstance(value, tuple) else (value,)

@@ -57,7 +57,7 @@ def _table(columns: Sequence[tuple[_Head, Any]]) -> bytes:
     return ("\n".join(lines) + "\n").encode() + rows
 
 
-def _three(what: str, names: Sequence[str], units: str, values: Floats) -> list[tuple[_Head, Floats]]:
+def _triple(what: str, names: Sequence[str], units: str, values: Floats) -> list[tuple[_Head, Floats]]:
     """Return three columns of (n, 3) values."""
     heads = zip(names, units.split(), strict=True)
     return [((what, name, f"({unit})"), column) for (name, unit), column in zip(heads, values.T, strict=True)]
@@ -104,11 +104,11 @@ def _table_of_points(outcome: Outcome) -> bytes:
             (("", "Accepted", "Measures"), np.bincount(taken, minlength=len(block.point_ids))[used]),
             (("", "Rejected", "Measures"), rejected[rows]),
             (("", "Residual", "RMS"), outcome.point_rms[used]),
-            *_three("3-d", _AXES, "dd dd km", degrees),
-            *_three("Sigma", _AXES, "m m m", outcome.local_sigmas[used]),
-            *_three("Correction", _AXES, "m m m", outcome.corrections[used]),
-            *_three("Coordinate", "XYZ", "km km km", outcome.xyz[used] / KM),
-            *_three("Sigma", "XYZ", "m m m", np.sqrt(np.maximum(variances, 0.0))),
+            *_triple("3-d", _AXES, "dd dd km", degrees),
+            *_triple("Sigma", _AXES, "m m m", outcome.local_sigmas[used]),
+            *_triple("Correction", _AXES, "m m m", outcome.corrections[used]),
+            *_triple("Coordinate", "XYZ", "km km km", outcome.xyz[used] / KM),
+            *_triple("Sigma", "XYZ", "m m m", np.sqrt(np.maximum(variances, 0.0))),
         ]
     )
 

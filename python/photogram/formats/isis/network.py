@@ -55,7 +55,7 @@ _ABSENT: Mapping[type, np.generic] = {
 """Missing values of columns by type."""
 
 
-_other: Callable[..., Any] = field  # Declares a field that is no column
+_no_column: Callable[..., Any] = field  # Declares a field that is no column
 
 
 def _column(kind: type, *names: str, width: int = 1) -> Any:
@@ -117,7 +117,7 @@ class ControlPoints(_Columns):
     adjusted: Floats = _axes(np.float64, "adjusted_{}")  # (n, 3) coordinates of an adjustment
     adjusted_covariance: Floats = _column(np.float64, width=6)
     # All other message fields as bytes, and the start of each point (n + 1); written unchanged
-    rest: _Rest = _other()
+    rest: _Rest = _no_column()
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -155,7 +155,7 @@ class ControlMeasures(_Columns):
     edit_lock: Bools = _column(np.bool_)  # (m,) the measure must not be edited
     ignore: Bools = _column(np.bool_)
     rejected: Bools = _column(np.bool_)
-    rest: _Rest = _other()
+    rest: _Rest = _no_column()
 
     def __len__(self) -> int:
         return len(self.serial)

@@ -66,7 +66,7 @@ def _word(**words: str) -> Callable[[str], str]:
 _SOLVED = {"velocities": "second", "accelerations": "third", "all": "all", "none": "none"}
 
 
-def _said(names: str, read: Callable[[str], Any], default: Any) -> Any:
+def _setting(names: str, read: Callable[[str], Any], default: Any) -> Any:
     """Declare a field with its names in jigsaw and the reader of their values."""
     return field(default=default, metadata={"names": names.split(), "read": read})
 
@@ -79,44 +79,44 @@ class Settings:
     """Adjusted parameters and their weights; defaults are the defaults of jigsaw."""
 
     # Degrees of the polynomials fitted to the angles of an image, and of the adjusted ones
-    ck_degree: int = _said("CKDEGREE", _degree, 2)
-    ck_solve_degree: int = _said("CKSOLVEDEGREE", _degree, 2)
+    ck_degree: int = _setting("CKDEGREE", _degree, 2)
+    ck_solve_degree: int = _setting("CKSOLVEDEGREE", _degree, 2)
     # Free coefficients, and whether coefficients of the third angle are free
-    angles: Solved = _said("CAMSOLVE", _word(**_SOLVED, angles="first"), "first")
-    twist: bool = _said("TWIST", _yes, True)
+    angles: Solved = _setting("CAMSOLVE", _word(**_SOLVED, angles="first"), "first")
+    twist: bool = _setting("TWIST", _yes, True)
     # Whether polynomials are added to the angles of the table instead
-    over_existing: bool = _said("OVEREXISTING", _yes, False)
+    over_existing: bool = _setting("OVEREXISTING", _yes, False)
     # The same for positions
-    spk_degree: int = _said("SPKDEGREE", _degree, 2)
-    spk_solve_degree: int = _said("SPKSOLVEDEGREE", _degree, 2)
-    positions: Solved = _said("SPSOLVE", _word(**_SOLVED, position="first", positions="first"), "none")
-    over_hermite: bool = _said("OVERHERMITE", _yes, False)
-    radius: bool = _said("RADIUS", _yes, False)  # Whether radii of free points are free
+    spk_degree: int = _setting("SPKDEGREE", _degree, 2)
+    spk_solve_degree: int = _setting("SPKSOLVEDEGREE", _degree, 2)
+    positions: Solved = _setting("SPSOLVE", _word(**_SOLVED, position="first", positions="first"), "none")
+    over_hermite: bool = _setting("OVERHERMITE", _yes, False)
+    radius: bool = _setting("RADIUS", _yes, False)  # Whether radii of free points are free
     # Coordinates in which points are adjusted
-    axes: Axes = _said(
+    axes: Axes = _setting(
         "CONTROL_POINT_COORDINATE_TYPE_BUNDLE",
         _word(latitudinal="latitudinal", rectangular="rectangular"),
         "latitudinal",
     )
     # Degrees: coefficients of degree 0, 1 and 2, by scaled time
-    angle_sigmas: Sigmas = _said(
+    angle_sigmas: Sigmas = _setting(
         "CAMERA_ANGLES_SIGMA CAMERA_ANGULAR_VELOCITY_SIGMA CAMERA_ANGULAR_ACCELERATION_SIGMA", _sigma, _FREE
     )
     # Metres: as for angles
-    position_sigmas: Sigmas = _said(
+    position_sigmas: Sigmas = _setting(
         "SPACECRAFT_POSITION_SIGMA SPACECRAFT_VELOCITY_SIGMA SPACECRAFT_ACCELERATION_SIGMA", _sigma, _FREE
     )
     # Metres: latitude, longitude, radius of all points, and X, Y, Z
-    latitude_sigmas: Sigmas = _said(
+    latitude_sigmas: Sigmas = _setting(
         "POINT_LATITUDE_SIGMA POINT_LONGITUDE_SIGMA POINT_RADIUS_SIGMA", _sigma, _FREE
     )
-    rectangular_sigmas: Sigmas = _said("POINT_X_SIGMA POINT_Y_SIGMA POINT_Z_SIGMA", _sigma, _FREE)
+    rectangular_sigmas: Sigmas = _setting("POINT_X_SIGMA POINT_Y_SIGMA POINT_Z_SIGMA", _sigma, _FREE)
     # Whether images of one observation share their coefficients
-    observations: bool = _said("OBSERVATIONS", _yes, False)
-    held: Path | None = _said("HELDLIST", Path, None)  # List of images with fixed poses; None: no image
+    observations: bool = _setting("OBSERVATIONS", _yes, False)
+    held: Path | None = _setting("HELDLIST", Path, None)  # List of images with fixed poses; None: no image
     # Whether measures with large residuals are rejected, and the limit in standard deviations
-    rejects: bool = _said("OUTLIER_REJECTION", _yes, False)
-    multiplier: float = _said("REJECTION_MULTIPLIER", _positive, 3.0)
+    rejects: bool = _setting("OUTLIER_REJECTION", _yes, False)
+    multiplier: float = _setting("REJECTION_MULTIPLIER", _positive, 3.0)
     remarks: tuple[Phrase, ...] = ()  # Remarks on settings replaced by others
 
     @property
