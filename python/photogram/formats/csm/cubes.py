@@ -16,14 +16,22 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
 from photogram.formats.cards import filled_lines
 from photogram.formats.csm.isd import Detector, Isd, Polynomials, Positions, Turns, of_angles, of_quaternions
-from photogram.formats.csm.reading import fitting, from_pixels, not_zero, read_drift, read_isd, transformed
+from photogram.formats.csm.reading import (
+    constant_rotation,
+    fitting,
+    from_pixels,
+    not_zero,
+    read_drift,
+    read_isd,
+    transformed,
+)
 from photogram.io.files import reading
 from photogram.io.json import Tree
 from photogram.io.places import at_place, one_word, positive
 from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
-from photogram.network.trajectories import Interpolation, increasing, rotations
+from photogram.network.trajectories import Interpolation, increasing
 from photogram.words import Phrase, phrase
 
 PIECE = 1 << 16
@@ -146,15 +154,6 @@ class _Table:
             raise self.error(phrase("csm.span", first=first, last=last))
         return Polynomials(own.T, float(reference), float(scale)).sampled(first, last)
 
-    @property
-    def constant(self) -> Floats:
-        """The constant rotation after the rotation of the records."""
-        if "ConstantRotation" not in self.keys:
-            return np.eye(3)
-        given = self.keys["ConstantRotation"].numbers(9)
-        with at_place(self):
-            return np.asarray(rotations("ConstantRotation", given.reshape(1, 3, 3), 1)[0])
-
 
 def read_positions(label: Group, path: Path) -> Positions:
     """Return the table InstrumentPosition of a cube."""
@@ -176,11 +175,12 @@ def read_positions(label: Group, path: Path) -> Positions:
 def read_turns(label: Group, name: str, path: Path) -> Turns:
     """Return a table of rotations of a cube, InstrumentPointing or BodyRotation."""
     table = _Table(label, name, path)
+    constant = constant_rotation(table.keys, "ConstantRotation")
     if table.has(_POLYNOMIALS[1]):
         times, angles = table.sampled(_POLYNOMIALS[1], "Ck")
-        return Turns(times, table.constant @ of_angles(angles), "lagrange")
+        return Turns(times, constant @ of_angles(angles), "lagrange")
     quaternions = of_quaternions(table, table.of(_QUATERNIONS))
-    return Turns(table.times, table.constant @ quaternions, "linear")
+    return Turns(table.times, constant @ quaternions, "linear")
 
 
 def _named(instrument: Tree) -> tuple[str, str]:

@@ -164,12 +164,15 @@ def _turns(tree: Tree, name: str) -> Turns:
     """Return K R(t): rotations of records, then the constant one."""
     own = tree[name]
     matrices = of_quaternions(own["quaternions"], _rows(own["quaternions"], 4))
-    constant = np.eye(3)
-    if "constant_rotation" in own:
-        given = own["constant_rotation"]
-        with at_place(given):
-            constant = rotations("constant_rotation", given.numbers(9).reshape(1, 3, 3), 1)[0]
-    return Turns(_times(own, len(matrices)), constant @ matrices)
+    return Turns(_times(own, len(matrices)), constant_rotation(own, "constant_rotation") @ matrices)
+
+
+def constant_rotation(table: Tree, key: str) -> Floats:
+    """Return the constant rotation after the rotations of the records."""
+    if key not in table:
+        return np.eye(3)
+    with at_place(table[key]):
+        return np.asarray(rotations(key, table[key].numbers(9).reshape(1, 3, 3), 1)[0])
 
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
