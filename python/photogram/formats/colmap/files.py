@@ -78,6 +78,12 @@ class _Line:
         if kind == "features":
             return [self._features()]
         words = self.words[self.at : self.at + len(names)]
+        values: Sequence[Any] = words
+        if kind == "d":
+            values = tuple(self.place.number(*each) for each in zip(words, names, strict=False))
+        elif kind in _HIGHEST:
+            highest = _HIGHEST[kind]
+            values = tuple(self.place.whole(*each, highest) for each in zip(words, names, strict=False))
         if len(words) < len(names):
             raise self.place.error(phrase("format.end", name=names[len(words)]))
         self.at += len(words)
@@ -85,12 +91,7 @@ class _Line:
             # Some programs write names with blanks.
             self.at = len(self.words)
             return [(self.place.text or "").split(None, 9)[9].rstrip()]
-        if kind in WORDS:
-            return words
-        pairs = zip(words, names, strict=True)
-        if kind == "d":
-            return tuple(self.place.number(word, name) for word, name in pairs)
-        return tuple(self.place.whole(word, name, _HIGHEST[kind]) for word, name in pairs)
+        return values
 
     def _features(self) -> Table:
         text, place = self.after.text or "", self.after
