@@ -22,7 +22,6 @@ from photogram.formats.metadata.record import (
     UNSAID,
     UNSAID_SYSTEM,
     Said,
-    Triple,
     geographic_position,
     usable_deviations,
 )
@@ -58,16 +57,22 @@ def is_reference(path: Path, pictures: Callable[[str], object] | None = None) ->
     head = [line for line in islice(read_lines(path), HEAD) if line.strip()]
     for k, line in enumerate(head):
         if (names := _header(line)) is not None:
-            return _names_photos(names, head[k + 1 :], pictures)
+            if any(is_photo(each) for each in names):
+                return not any(column_of(each) == "point" for each in names)
+            column = PLAIN.spelled(_KNOWN, names).index("photo")
+            rows = map(_cells, head[k + 1 :])
+            photos = [cells[column] for cells in rows if len(cells) > column]
+            unnamed = names[column] == "label" and pictures is None
+            return unnamed or any(_is_picture(each) or (pictures and pictures(each)) for each in photos)
     first = next((line for line in head if not line.startswith("#") and len(_cells(line)) > 1), "")
     if not _is_row(first):
         return False
-    photos = set[str]()
+    known = set[str]()
     for line in read_lines(path):
         name = _cells(line)[0]
-        if name in photos and _is_row(line):
+        if name in known and _is_row(line):
             return False
-        photos.add(name)
+        known.add(name)
     return True
 
 
@@ -79,16 +84,6 @@ def _header(line: str) -> list[str] | None:
     """Return the headings of photo and position columns; None without."""
     own = [each.lower() for each in _cells(line.lstrip().removeprefix("#"))]
     return own if set(_REQUIRED) <= set(PLAIN.spelled(_KNOWN, own)) else None
-
-
-def _names_photos(own: Sequence[str], lines: Sequence[str], pictures: Callable[[str], object] | None) -> bool:
-    if any(is_photo(each) for each in own):
-        return not any(column_of(each) == "point" for each in own)
-    column = PLAIN.spelled(_KNOWN, own).index("photo")
-    names = [cells[column] for line in lines if len(cells := _cells(line)) > column]
-    if pictures is None:
-        return own[column] == "label" or any(_is_picture(name) for name in names)
-    return any(_is_picture(name) or pictures(name) for name in names)
 
 
 def _is_picture(name: str) -> bool:
@@ -174,26 +169,19 @@ def read_geo_txt(path: Path) -> dict[str, Said]:
         name, *words = (place.text or "").split()
         if name in found:
             raise place.error(phrase("format.repeated", what="photo", name=name))
-        found[name] = _said_of_line(words, crs, place)
-    return found
-
-
-def _said_of_line(words: list[str], crs: str, place: Place) -> Said:
-    count = len(words) + 1
-    if count not in WORDS and count < WORDS[-1]:
-        raise place.error(
-            phrase("format.words", n=count, required="name x y [z [yaw pitch roll [sd_h sd_v]]]")
+        count = len(words) + 1
+        if count not in WORDS and count < WORDS[-1]:
+            required = "name x y [z [yaw pitch roll [sd_h sd_v]]]"
+            raise place.error(phrase("format.words", n=count, required=required))
+        values = [place.number(word) for word in words[:8]] + [math.nan] * (8 - len(words))
+        x, y, z, yaw, pitch, roll, horizontal, vertical = values
+        geographic = crs in (ELLIPSOIDAL, UNSAID_SYSTEM)
+        found[name] = Said(
+            GEO_TXT,
+            place,
+            crs,
+            position=geographic_position(place, (x, y, z)) if geographic else (x, y, z),
+            sd=usable_deviations(horizontal, horizontal, vertical),
+            angles=None if count < 7 else (yaw, pitch, roll),
         )
-    values = [place.number(word) for word in words[:8]] + [math.nan] * (8 - len(words))
-    x, y, z, yaw, pitch, roll, horizontal, vertical = values
-    position: Triple | None = (x, y, z)
-    if crs in (ELLIPSOIDAL, UNSAID_SYSTEM):
-        position = geographic_position(place, (x, y, z))
-    return Said(
-        GEO_TXT,
-        place,
-        crs,
-        position=position,
-        sd=usable_deviations(horizontal, horizontal, vertical),
-        angles=None if count < 7 else (yaw, pitch, roll),
-    )
+    return found
