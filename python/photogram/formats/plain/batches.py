@@ -121,14 +121,14 @@ class Streamed:
         block, path = self.project.block, self.project.path
         if self.project.options.datum in ("inner", "minimum"):
             raise InputError(phrase("plain.parts-datum"), file=path)
-        for each in block.timed:
+        for moving in block.timed:
             # Its time is the mean of the times of its images.
-            if each.lines is not None and each.time is None:
-                raise InputError(phrase("plain.parts-moving", photo=each.photo), file=path)
+            if moving.lines is not None and moving.time is None:
+                raise InputError(phrase("plain.parts-moving", photo=moving.photo), file=path)
         refuse_passages(block, "blocks in parts", but=Scan)
-        for each in self.project.messages:
-            if each.phrase is not None and each.code == "plain.side-unknown":
-                raise InputError(phrase("plain.parts-film", **each.phrase.fields), file=path)
+        for message in self.project.messages:
+            if message.phrase is not None and message.code == "plain.side-unknown":
+                raise InputError(phrase("plain.parts-film", **message.phrase.fields), file=path)
         known = (block.point_sd, block.photo_position_sd)
         outer = (each for each in block.observations if not isinstance(each, _INNER))
         if not (any(outer) or any(np.isfinite(each).any() for each in known)):
