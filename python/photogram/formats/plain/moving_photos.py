@@ -37,6 +37,8 @@ _MOTION = (*VELOCITY, *RATE)
 _SD = deviation_columns(_MOTION)
 _FIELDS = ("velocity", "rotation_rate", "sd_velocity", "sd_rate")
 """Fields of these columns in moving photos."""
+_OF_UNKNOWNS = (name for each in TABLES["photos"].unknowns for own in each.columns for name in own.names)
+_COLUMNS = frozenset(("trajectory", "rig", "sensor", *_MOTION, *_SD, *_OF_UNKNOWNS))
 
 
 def read_timed(
@@ -47,8 +49,10 @@ def read_timed(
     rigs: Mapping[str, Rig],
 ) -> list[Timed]:
     """Read the motion of photos: on trajectories, or of their own."""
-    table = photos.table
-    on, lines = named_of(table, "trajectory", trajectories, "trajectory"), _line_times(tables, photos)
+    table, lines = photos.table, _line_times(tables, photos)
+    if _COLUMNS.isdisjoint(table.columns) and not any((lines, *cameras.shutters, *cameras.lines)):
+        return []
+    on = named_of(table, "trajectory", trajectories, "trajectory")
     motions = _motions(tables, table)
     clocks, rates = (
         read_unknowns(tables, table, TABLES["photos"].unknown(field), table.texts("photo"))
