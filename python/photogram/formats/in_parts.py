@@ -79,7 +79,7 @@ def adjusted_on_disk(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
-    """Adjust a project with images in Parquet, in parts, in a folder.
+    """Adjust a project in parts in a folder; its images are read in batches.
 
     `change` returns the options for the options of the project.
     """
