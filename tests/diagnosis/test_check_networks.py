@@ -179,7 +179,7 @@ def test_what_is_no_network_is_refused():
 
 
 def test_one_adjustment_serves_for_several_questions(monkeypatch):
-    from photogram.diagnosis import adjusting
+    from photogram.diagnosis import mistakes
 
     calls = []
 
@@ -187,11 +187,11 @@ def test_one_adjustment_serves_for_several_questions(monkeypatch):
         calls.append(block)
         return adjust_block(block, **options)
 
-    adjust_block = adjusting.adjust
-    monkeypatch.setattr(adjusting, "adjust", counted)
+    adjust_block = mistakes.adjust
+    monkeypatch.setattr(mistakes, "adjust", counted)
     assert diagnose(simulate(seed=3, **SIZE).block).grave == []
     assert len(calls) == 1
-    assert "photogram.diagnosis.adjusting" in sys.modules
+    assert "photogram.diagnosis.mistakes" in sys.modules
 
 
 def test_check_points_that_disagree_are_named():

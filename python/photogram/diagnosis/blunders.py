@@ -34,6 +34,7 @@ from photogram.results.result import Result
 from photogram.results.snooping_log import Aside
 from photogram.results.snooping_options import SnoopOptions
 
+DISTORTING = 50.0  # Test value of control whose error distorts the photos
 HOPELESS = 5.0  # Spread of the test values of photos that are removed, if they did not fit before
 
 
@@ -120,11 +121,11 @@ def _adjusted(block: Block, adjusted: Adjuster) -> tuple[Result | None, str]:
 def _wrong_control(block: Block, first: Result | None, adjusted: Adjuster) -> Indices:
     """Return control points without which the control fits, if one of them has the largest test value.
 
-    Control that few observations test affects distant photos, which would be removed instead.
+    Large errors of control that few observations test distort distant photos, which would be removed instead.
     """
     sizes = {} if first is None else sizes_of_tests(first)
     largest = {kind: own.max(initial=0.0) for kind, own in sizes.items()}
-    doubted = bool(largest) and max(largest, key=lambda kind: largest[kind]) == "control"
+    doubted = largest.get("control", 0.0) >= max([DISTORTING, *largest.values()])
     found = without_outliers(block, adjusted) if doubted else None
     return np.empty(0, dtype=np.int64) if found is None else found[1]
 

@@ -32,7 +32,7 @@ FEWEST = 5  # Smallest number of observed positions
 EQUAL = 0.15  # Relative difference within which a lever arm is the given one with other signs or axes
 COORDINATES = {"feet in heights": ([0, 1, 2], 2), "feet": ([0, 1, 2], 0), "X and Y exchanged": ([1, 0, 2], 3)}
 """Order of the axes, and first axis in feet."""
-NEARLY = 0.9  # Log odds of a proposal, as a part of the largest
+NEARLY = 0.5  # Log odds of a proposal, as a part of the largest
 FREE = ("gnss-heights", "gnss-shift", "lever-arm")  # Tried if the block cannot be adjusted
 
 
