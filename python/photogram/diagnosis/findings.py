@@ -133,14 +133,8 @@ def note(
 def note_all(section: Section, kind: str, level: Level, messages: Sequence[Message | Phrase | str]) -> None:
     """Add a finding for each message."""
     for message in messages:
-        own = (
-            message.phrase
-            if isinstance(message, Message)
-            else message
-            if isinstance(message, Phrase)
-            else None
-        )
-        section.findings.append(Finding(kind, level, str(message), phrase=own))
+        own = message if isinstance(message, Message) else Message(message)
+        section.findings.append(Finding(kind, level, str(message), phrase=own.phrase))
 
 
 def likely(causes: Sequence[Phrase], effect: Phrase) -> Phrase:
