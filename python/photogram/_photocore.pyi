@@ -1426,6 +1426,7 @@ class NetworkTrial:
         detection: tuple[float, float],
         limit: float,
         effects: int,
+        observed: _Floats | None = None,
     ) -> dict[str, Any]:
         """Test errors that sets of observations have in common, and errors of groups except images.
 
@@ -1451,6 +1452,8 @@ class NetworkTrial:
             Standard deviations from which on points are counted.
         effects
             Number of groups whose effects are computed: those of the largest bias-to-noise ratios.
+        observed
+            (P, 3) observed positions of photos; NaN if unknown. None: the adjusted ones.
 
         Returns
         -------

@@ -19,7 +19,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
 from photogram.results.tables import Tests
-from photogram.results.type_factors import unchecked_types
+from photogram.results.type_factors import unchecked_control
 from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
@@ -70,24 +70,14 @@ def network_findings(
         robust=result.loss is not None,
         unsupported=[] if lost is None else lost.unsupported,
         remarks=[*unseen(result), *assumptions],
-        unchecked=[] if summary is None else [*summary.hypotheses.unchecked(), *_unchecked_control(result)],
+        unchecked=[]
+        if summary is None
+        else [*summary.hypotheses.unchecked(), *unchecked_control(result, summary.types)],
         common=[] if summary is None else summary.hypotheses.common_errors(rivals),
         of_checks=[] if summary is None else summary.hypotheses.of_checks(),
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )
-
-
-def _unchecked_control(result: AdjustedNetwork) -> list[Phrase]:
-    """Return messages on standard deviations of control that nothing checks."""
-    summary, sd = result.reliability_summary, result.point_given_sd
-    weighted = (sd > 0) & np.isfinite(sd) & result.used_points[:, np.newaxis]
-    if summary is None or not weighted.any() or result.geographic:
-        return []
-    checks = getattr(result, "check_points", None)
-    agreement = None if checks is None else checks.agreement
-    limit = result.max_bias_ratio
-    return unchecked_types(summary.types, limit, float(np.median(sd[weighted])), agreement)
 
 
 def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:

@@ -261,10 +261,8 @@ class Hypotheses:
 
     def of_checks(self) -> list[Phrase]:
         """Return single errors that explain differences of check points best, the most likely first."""
-        odds, n = self.log_odds, math.log(ALTERNATIVES)
-        if np.isnan(odds).all():
-            return []
-        first = int(np.nanargmax(odds))
+        odds, n = np.nan_to_num(self.log_odds, nan=-math.inf), math.log(ALTERNATIVES)
+        first = int(odds.argmax()) if len(odds) else -1
         if first < len(self.sets) or not self.by_checks[first] > n or self.probability[first] > DETECTION[0]:
             return []
         likely = np.flatnonzero(odds > odds[first] - n)

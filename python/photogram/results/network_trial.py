@@ -401,11 +401,18 @@ def block_facts(block: Block, places: Floats) -> Facts:
         return facts
     seconds = np.full(count, math.nan)
     row = {name: k for k, name in enumerate(block.photo_ids)}
+    weighted = np.isfinite(block.photo_position_sd) & (block.photo_position_sd > 0)
+    given = (
+        block.photo_positions if block.photo_positions_observed is None else block.photo_positions_observed
+    )
+    observed = np.where(weighted, given, math.nan)
     for columns in block.observations.columns:
         if columns.kind.KIND == "position":
-            for photos, time in zip(columns.table["photos"], columns.table["time"], strict=True):
+            values = (columns.table[name] for name in ("photos", "time", "position"))
+            for photos, time, position in zip(*values, strict=True):
                 if photos and photos[0] in row:
-                    seconds[row[photos[0]]] = time
+                    seconds[row[photos[0]]], observed[row[photos[0]]] = time, position
+    facts["observed"] = observed
     timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
     times = seconds if timed else np.arange(count, dtype=np.float64)
     velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)

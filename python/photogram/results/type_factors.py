@@ -8,9 +8,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.results.hypotheses import FEWEST, SHARE
+from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial, Tests
 from photogram.statistics.evidence import MEDIAN
-from photogram.statistics.findings import CONTROL_POINTS, LARGEST_FACTOR, NOMINAL, Agreement, Text, TypeFactor
+from photogram.statistics.findings import CONTROL_POINTS, LARGEST_FACTOR, NOMINAL, Text, TypeFactor
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
@@ -45,19 +47,27 @@ def type_factors(
     return [_factor(trial, tests, kind, np.hstack(groups), limit) for kind, groups in found.items()]
 
 
-def unchecked_types(
-    types: Iterable[TypeFactor], limit: float, control_sd: float, checks: Agreement | None
-) -> list[Phrase]:
-    """Return messages on undetected factors of the standard deviations of control beyond a `limit`.
+def unchecked_control(result: AdjustedNetwork, types: Iterable[TypeFactor]) -> list[Phrase]:
+    """Return messages on undetected factors of the standard deviations of control that matter.
 
-    Points near control points would be wrong by such factors. `control_sd` is the given standard deviation;
-    check points detect a factor if it is larger than DETECTED standard deviations of their differences.
+    Other points are wrong by at most the error of control. Check points detect a factor that changes their
+    differences by more than DETECTED standard deviations.
     """
-    detected = math.inf if checks is None else DETECTED * float(np.nanmedian(checks.sd)) / control_sd
+    given, limit = result.point_given_sd, result.max_bias_ratio
+    weighted = (given > 0) & np.isfinite(given) & result.used_points[:, np.newaxis]
+    found = [each for each in types if each.group == CONTROL_POINTS and each.undetected > limit]
+    if not found or not weighted.any(axis=0).all():
+        return []
+    control = np.array([np.median(own[has]) for own, has in zip(given.T, weighted.T, strict=True)])
+    sd = result.point_sd[result.used_points & ~weighted.any(axis=1)]
+    checks = getattr(result, "check_points", None)
+    shown = math.inf if checks is None or checks.agreement is None else np.nanmedian(checks.agreement.sd)
+    fewest = max(FEWEST, math.ceil(SHARE * np.count_nonzero(result.used_points)))
     return [
         phrase("unchecked.sd", kind=each.group, factor=each.undetected)
-        for each in types
-        if each.group == CONTROL_POINTS and limit < each.undetected < detected
+        for each in found
+        if each.undetected * np.median(control) < DETECTED * shown
+        and np.count_nonzero((each.undetected * control > limit * sd).any(axis=1)) >= fewest
     ]
 
 
@@ -77,7 +87,7 @@ def _factor(trial: NetworkTrial, tests: Tests, kind: Text, groups: Indices, limi
     spread, likeliest = math.nan, None
     if len(rows) <= MOST_ROWS and r < max(FEW, WEAK * len(rows)):
         mixed = TypeFactor(kind, squares, r, spread=float(np.square(redundancy).sum()))
-        # The squares of R outside the diagonal increase the sum.
+        # The squares of R outside the diagonal increase s.
         if squares > NOMINAL**2 * r or (is_control and mixed.undetected > limit):
             within = np.flatnonzero(np.isin(np.hstack([*map(suspects.rows, groups.tolist())]), rows))
             found = trial.core.responses(groups.tolist())[within][:, rows]

@@ -243,7 +243,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -260,11 +260,14 @@ impl NetworkTrial {
         detection: (f64, f64),
         limit: f64,
         effects: usize,
+        observed: Option<Array<'_>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let velocities = rows("velocities", &velocities)?;
+        let observed = observed.map_or_else(|| Ok(vec![]), |own| rows("observed", &own))?;
         let facts = Facts {
             velocities,
             times,
+            observed,
             position_sets,
             control_sets,
             readouts,

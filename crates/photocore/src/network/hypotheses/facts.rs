@@ -7,6 +7,8 @@ pub struct Facts {
     pub velocities: Vec<[f64; 3]>,
     /// Time of each photo, for a drift of positions; NaN if unknown.
     pub times: Vec<f64>,
+    /// Observed position of each photo; NaN, or empty, if unknown.
+    pub observed: Vec<[f64; 3]>,
     /// Set of positions (strip, day, receiver) of each photo.
     pub position_sets: Vec<Option<usize>>,
     /// Set of control (file, standard deviation, day) of each point.
