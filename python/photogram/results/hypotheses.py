@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
+from photogram.results.hypothesis_checks import set_with_checks, single_with_checks
 from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
-from photogram.statistics.distributions import log_chi_square
 from photogram.statistics.findings import ALTERNATIVES, Tested
 from photogram.words import Phrase, phrase
 
@@ -44,7 +44,6 @@ ABSURD_PART, UNKNOWN_PART = 0.9, 0.7
 """Least parts of this excess that errors without a plausible size, or with an unknown one, explain."""
 LISTED = 10  # Rows of each table of documents
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
-SINGULAR = 1e-10  # Relative eigenvalue of directions that nothing determines
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 
 DATUM = frozenset(
@@ -395,10 +394,8 @@ def hypotheses(
             continue
         group = int(groups[row])
         if group >= 0:
-            _single_with_checks(
-                found, row, trial.deviations[suspects.rows(group)], of_checks, agreement.joint
-            )
-        elif _with_checks(found, row, checks, agreement.joint):
+            single_with_checks(found, row, trial.deviations[suspects.rows(group)], of_checks, agreement.joint)
+        elif set_with_checks(found, row, checks, agreement.joint):
             relative.add(row)
     statistic, estimate = found["statistic"], found["estimate"]
     kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
@@ -441,59 +438,6 @@ def hypotheses(
         relative=relative,
         single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, checked))),
     )
-
-
-def _with_checks(found: Facts, row: int, checks: int, joint: tuple[Indices, Floats, Floats]) -> bool:
-    """Test a set with check points as further observations; return whether only these test it.
-
-    Differences D of check points with the covariance C are independent of the residuals. If the parameters
-    change them by G, D adds G' C^-1 D to the score and G' C^-1 G to the redundancy.
-    """
-    own, (flat, differences, covariance) = found["sets"][row], joint
-    hidden = bool(found["rank"][row] == 0)
-    k = len(own["parameters"])
-    g = np.reshape(own["at_checks"], (-1, 3, k))[:checks].reshape(-1, k)[flat]
-    if not np.isfinite(g).all() or not g.any():
-        return False
-    weighted = np.linalg.solve(covariance, g)
-    redundancy, score = g.T @ weighted, weighted.T @ differences
-    if not hidden:
-        # Directions without redundancy have no cofactors.
-        own_part = np.linalg.pinv(np.reshape(own["cofactors"], (k, k)), hermitian=True, rcond=SINGULAR)
-        redundancy += own_part
-        score += own_part @ own["estimate"]
-    cofactors = np.linalg.pinv(redundancy, hermitian=True, rcond=SINGULAR)
-    estimate = cofactors @ score
-    statistic = float(score @ estimate)
-    found["statistic"][row], found["rank"][row] = statistic, k
-    found["estimate"][row, :k], found["observations"][row] = estimate, found["observations"][row] + len(flat)
-    found["probability"][row] = math.exp(float(log_chi_square(statistic, float(k))))
-    own["estimate"], own["cofactors"] = estimate.tolist(), cofactors.ravel().tolist()
-    return hidden
-
-
-def _single_with_checks(
-    found: Facts, row: int, sd: Floats, changes: Floats, joint: tuple[Indices, Floats, Floats]
-) -> None:
-    """Test a group with check points as further observations, along its least detectable direction.
-
-    This direction d is an eigenvector of R in unit weight. Check points have the `changes` G by an error d.
-    """
-    flat, differences, covariance = joint
-    g, d = changes.ravel()[flat], found["mdb"][row, : len(sd)]
-    if len(d) != len(sd) or not np.isfinite(g).all() or not g.any():
-        return
-    weighted = np.linalg.solve(covariance, g)
-    redundancy, score, before = float(g @ weighted), float(weighted @ differences), 0.0
-    if np.isfinite(d).all():
-        estimate = found["estimate"][row, : len(sd)]
-        own, part = found["noncentrality"][row], found["redundancy"][row] * float(d @ (estimate / sd**2))
-        redundancy, score, before = redundancy + own, score + part, part**2 / own
-    statistic = float(np.nan_to_num(found["statistic"][row])) - before + score**2 / redundancy
-    rank = max(found["rank"][row] + np.isnan(d[0]), 1)
-    found["statistic"][row], found["rank"][row] = statistic, rank
-    found["probability"][row] = math.exp(float(log_chi_square(statistic, float(rank))))
-    found["observations"][row] += len(flat)
 
 
 def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:
