@@ -257,6 +257,25 @@ def _strip(survey: Survey, size: float) -> np.ndarray:
     return first[:, np.newaxis] * np.array([0.6, 0.6, 0.5]) * size
 
 
+def _by_distance(survey: Survey, size: float, photos: np.ndarray) -> np.ndarray:
+    """Return changes of the images of some photos by another principal distance, `size` pixels."""
+    centred = survey.xy - [WIDTH / 2, HEIGHT / 2]
+    return centred * (size / survey.focal) * photos[survey.photos, np.newaxis]
+
+
+def _next(survey: Survey, _: float) -> np.ndarray:
+    assert survey.gnss is not None
+    return np.vstack([survey.gnss[1:], survey.gnss[-1:]]) - survey.gnss
+
+
+def _bent(survey: Survey, size: float) -> Survey:
+    """Bend the heights of control, `size` at the edge relative to the middle."""
+    plan = survey.coordinates[:, :2] - survey.coordinates[:, :2].mean(axis=0)
+    coordinates = survey.coordinates.copy()
+    coordinates[:, 2] += size * (plan**2).sum(axis=1) / (plan**2).sum(axis=1).max()
+    return replace(survey, coordinates=coordinates)
+
+
 def _radial(survey: Survey, size: float) -> np.ndarray:
     """Return changes of images by k1 r^2, `size` pixels at the corner."""
     centred = survey.xy - [WIDTH / 2, HEIGHT / 2]
@@ -328,6 +347,23 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
     ),
     "radial distortion": ("camera-term", lambda s: True, _images(_radial)),
     "rolling shutter": ("readout-time", lambda s: s.kind == "aerial", _images(_readout)),
+    "affinity": (
+        "camera-affinity",
+        lambda s: True,
+        _images(lambda s, d: (s.xy - [WIDTH / 2, HEIGHT / 2]) * [d, 0.0]),
+    ),
+    "shear": (
+        "camera-affinity",
+        lambda s: True,
+        _images(lambda s, d: (s.xy - [WIDTH / 2, HEIGHT / 2])[:, ::-1] * [d, 0.0]),
+    ),
+    "distance of one strip": (
+        "camera-f-strip",
+        lambda s: s.kind == "aerial" and np.ptp(s.poses[:, 1]) > 15,
+        _images(lambda s, d: _by_distance(s, d, s.poses[:, 1] < s.poses[0, 1] + 15)),
+    ),
+    "GNSS of the next photo": ("gnss-next", lambda s: s.gnss is not None, _gnss(_next)),
+    "control bent": ("bending", lambda s: s.kind == "aerial" and len(s.control) > 4, _bent),
     "one image": ("image X", lambda s: True, _images(_one_image)),
     "GNSS more accurate": (
         "",
@@ -359,6 +395,10 @@ GIVEN = {
     "camera-f": 36.0,
     "camera-point": 20.0,
     "camera-term": 10.0,
+    "camera-affinity": 1e-3,
+    "camera-f-strip": 10.0,
+    "gnss-next": 1.0,
+    "bending": 0.1,
     "readout-time": 0.05,
     "image X": 5.0,
 }

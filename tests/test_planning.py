@@ -423,7 +423,8 @@ def test_a_plan_names_errors_that_would_remain_undetected():
         codes[sentence.fields["pattern"]].add(sentence.code)
     # A time offset moves all stations along the strips like a shift of the network.
     assert {"plan.undetected.strips", "plan.assumed"} <= codes["positions"]
-    assert codes["both"] == {"plan.unchecked", "plan.control"}
+    # A shift or rotation of all control within the accuracy of the positions would move all points.
+    assert codes["both"] == {"plan.unchecked", "plan.control", "plan.undetected.points"}
     (time,) = np.flatnonzero(positions.hypotheses.code == "time-offset")
     assert np.isnan(positions.hypotheses.mdb[time]).all()
     tables = parts_of(made, "undetected")

@@ -308,8 +308,12 @@ def _checks(e: Evidence) -> Phrase | None:
 
 
 def _suspect_checks(e: Evidence) -> Phrase | None:
-    points = [] if "check-points" in e.codes else e.disagreement(e.found.level)
-    return Phrase("verdict.look-at-check-points", {"points": points}) if points else None
+    if "check-points" in e.codes:
+        return None
+    if points := e.disagreement(e.found.level):
+        return Phrase("verdict.look-at-check-points", {"points": points})
+    errors = [] if e.codes else list(e.found.of_checks)
+    return Phrase("verdict.look-at-check-points.named", {"errors": errors}) if errors else None
 
 
 def _model(e: Evidence) -> Phrase | None:
