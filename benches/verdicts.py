@@ -345,7 +345,7 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
         lambda s: True,
         _images(lambda s, d: np.full(s.xy.shape, d * math.sqrt(0.5))),
     ),
-    "radial distortion": ("camera-term", lambda s: True, _images(_radial)),
+    "radial distortion": ("camera-radial", lambda s: True, _images(_radial)),
     "rolling shutter": ("readout-time", lambda s: s.kind == "aerial", _images(_readout)),
     "affinity": (
         "camera-affinity",
@@ -394,7 +394,7 @@ GIVEN = {
     "control-rotation": 0.005,
     "camera-f": 36.0,
     "camera-point": 20.0,
-    "camera-term": 10.0,
+    "camera-radial": 10.0,
     "camera-affinity": 1e-3,
     "camera-f-strip": 10.0,
     "gnss-next": 1.0,
@@ -452,7 +452,7 @@ def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
         return f"control point {point}" in str(fields["suspects"][0])
     if hypothesis.partition(" ")[0] in ("observation", "position", "image", "control-point"):
         return None  # Errors of single observations other than these are not common errors.
-    return None if result.verdict.usable else code == "model" and hypothesis == "camera-term"
+    return None if result.verdict.usable else code == "model" and hypothesis == "camera-radial"
 
 
 def main() -> None:

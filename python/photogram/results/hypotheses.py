@@ -59,9 +59,10 @@ DATUM = frozenset(
         "scale",
     }
 )
-"""Errors that only change the datum: assumptions, unless an independent source tests them.
+"""Errors that only change the datum: assumptions, unless independent observations test them.
 
-Then sizes that it does not detect are graded, whatever their plausible size."""
+Then sizes that these do not detect are graded, whatever their plausible size, unless check points exist: their
+differences show the error of the datum."""
 
 UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
@@ -111,6 +112,7 @@ class Hypotheses:
     times: str  # Unit of errors of times
     relative: Set[int]  # Rows of errors that only check points test
     single_odds: float  # Largest log odds of an error of a single observation, images among them
+    compared: bool  # Whether check points test the datum
     excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
 
     def undetected(self, row: int) -> float:
@@ -125,7 +127,9 @@ class Hypotheses:
         code, effect = self.code[row], self.effects[row]
         if effect.checked or code in UNGRADED:
             return False
-        if np.isnan(self.mdb[row, 0]) if code in DATUM else self.undetected(row) < RARE:
+        if code in DATUM and (self.compared or np.isnan(self.mdb[row, 0])):
+            return False
+        if code not in DATUM and self.undetected(row) < RARE:
             return False
         return effect.others >= max(FEWEST, math.ceil(SHARE * self.points))
 
@@ -436,6 +440,7 @@ def hypotheses(
         times="s" if timed else "exposures",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         relative=relative,
+        compared=agreement is not None,
         single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, checked))),
     )
 
