@@ -61,8 +61,8 @@ DATUM = frozenset(
 )
 """Errors that only change the datum: assumptions, unless independent observations test them.
 
-Then sizes that these do not detect are graded, whatever their plausible size, unless check points exist: their
-differences show the error of the datum."""
+Then sizes that these do not detect are graded, whatever their plausible size, unless check points exist:
+their differences show the error of the datum."""
 
 UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
