@@ -42,8 +42,9 @@ def type_factors(
         if kind != OBSERVATION:
             found[suspects.type(kind, 0)] = [groups]
             continue
-        for group in groups:
-            found.setdefault(suspects.type(kind, int(suspects.subjects[group])), []).append(np.array([group]))
+        for group in groups.tolist():
+            name = suspects.type(kind, int(suspects.subjects[group]))
+            found.setdefault(name, []).append(np.array([group]))
     return [_factor(trial, tests, kind, np.hstack(groups), limit) for kind, groups in found.items()]
 
 
