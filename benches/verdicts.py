@@ -277,10 +277,10 @@ def _bent(survey: Survey, size: float) -> Survey:
 
 
 def _radial(survey: Survey, size: float) -> np.ndarray:
-    """Return changes of images by k1 r^2, `size` pixels at the corner."""
+    """Return changes of images by k1 r^2, r in principal distances; k1 is `size`."""
     centred = survey.xy - [WIDTH / 2, HEIGHT / 2]
     r2 = (centred**2).sum(axis=1, keepdims=True)
-    return centred * r2 / math.hypot(WIDTH / 2, HEIGHT / 2) ** 3 * size
+    return centred * r2 / survey.focal**2 * size
 
 
 def _one_image(survey: Survey, size: float) -> np.ndarray:
@@ -394,7 +394,7 @@ GIVEN = {
     "control-rotation": 0.005,
     "camera-f": 36.0,
     "camera-point": 20.0,
-    "camera-radial": 10.0,
+    "camera-radial": 0.005,
     "camera-affinity": 1e-3,
     "camera-f-strip": 10.0,
     "gnss-next": 1.0,
