@@ -85,7 +85,9 @@ mod _photocore {
     #[pymodule_export]
     use crate::network::steps::{is_chord, judge_full_step, step_rules};
     #[pymodule_export]
-    use crate::network::trial::{NetworkSuspects, NetworkTrial};
+    use crate::network::suspects::NetworkSuspects;
+    #[pymodule_export]
+    use crate::network::trial::NetworkTrial;
     #[pymodule_export]
     use crate::network::{BlockError, CollectionError};
     #[pymodule_export]

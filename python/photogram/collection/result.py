@@ -17,6 +17,8 @@ from photogram.results.network import AdjustedNetwork
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import pandas as pd
+
     from photogram import _photocore
     from photogram.collection import Collection
     from photogram.io.writing import Content
@@ -67,6 +69,11 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.findings import collection_findings
 
         return collection_findings(self)
+
+    def _table(self, what: str) -> pd.DataFrame:
+        from photogram.results.tables import table_frame
+
+        return table_frame(self, what)
 
     def _files(self) -> Mapping[str, Content]:
         from photogram.collection.result_files import collection_files

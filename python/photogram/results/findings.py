@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,13 +14,23 @@ from photogram.arguments.types import Floats, Indices
 from photogram.messages import Undetermined
 from photogram.network.block import Block
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
+from photogram.results.hypotheses import FEWEST as FEWEST_MOVED
+from photogram.results.hypotheses import SHARE as SHARE_MOVED
 from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
 from photogram.results.tables import Tests
-from photogram.results.type_factors import unchecked_control
-from photogram.statistics.findings import IMAGES, Findings, Removed, Systematic, Tested, Text
+from photogram.statistics.findings import (
+    CONTROL_POINTS,
+    IMAGES,
+    Findings,
+    Removed,
+    Systematic,
+    Tested,
+    Text,
+    TypeFactor,
+)
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
@@ -38,6 +48,7 @@ HARMFUL = {
 
 
 DISTANCES = frozenset({"c", "f", "fx", "fy"})  # Names of principal distances
+CHANGED = 2.3  # Factor of standard deviations that differences of three check points detect
 UNKNOWN = 1 / 3  # Largest standard deviation of a determined principal distance, relative to it
 
 
@@ -72,12 +83,36 @@ def network_findings(
         remarks=[*unseen(result), *assumptions],
         unchecked=[]
         if summary is None
-        else [*summary.hypotheses.unchecked(), *unchecked_control(result, summary.types)],
+        else [*summary.hypotheses.unchecked(), *_unchecked_control(result, summary.types)],
         common=[] if summary is None else summary.hypotheses.common_errors(rivals),
         of_checks=[] if summary is None else summary.hypotheses.of_checks(),
         common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )
+
+
+def _unchecked_control(result: AdjustedNetwork, types: Iterable[TypeFactor]) -> list[Phrase]:
+    """Return messages on undetected factors of the standard deviations of control that matter.
+
+    Other points are wrong by at most the error of control. Check points detect a factor that changes their
+    differences by more than CHANGED standard deviations.
+    """
+    given, limit = result.point_given_sd, result.max_bias_ratio
+    weighted = (given > 0) & np.isfinite(given) & result.used_points[:, np.newaxis]
+    found = [each for each in types if each.group == CONTROL_POINTS and each.undetected > limit]
+    if not found or not weighted.any(axis=0).all():
+        return []
+    control = np.array([np.median(own[has]) for own, has in zip(given.T, weighted.T, strict=True)])
+    sd = result.point_sd[result.used_points & ~weighted.any(axis=1)]
+    checks = getattr(result, "check_points", None)
+    shown = math.inf if checks is None or checks.agreement is None else np.nanmedian(checks.agreement.sd)
+    fewest = max(FEWEST_MOVED, math.ceil(SHARE_MOVED * np.count_nonzero(result.used_points)))
+    return [
+        phrase("unchecked.sd", kind=each.group, factor=each.undetected)
+        for each in found
+        if each.undetected * np.median(control) < CHANGED * shown
+        and np.count_nonzero((each.undetected * control > limit * sd).any(axis=1)) >= fewest
+    ]
 
 
 def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:

@@ -444,9 +444,7 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return a table by the type of its items."""
-        from photogram.results.tables import table_frame
-
-        return table_frame(self, what)
+        raise NotImplementedError
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""

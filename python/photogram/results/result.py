@@ -303,7 +303,9 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        table = super()._table(what)
+        from photogram.results.tables import table_frame
+
+        table = table_frame(self, what)
         table.attrs["datum"] = str(self.datum)
         return table
 

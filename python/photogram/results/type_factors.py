@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.results.hypotheses import FEWEST, SHARE
-from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import CONTROL, IMAGE, OBSERVATION, NetworkTrial, Tests
 from photogram.statistics.evidence import MEDIAN
-from photogram.statistics.findings import CONTROL_POINTS, LARGEST_FACTOR, NOMINAL, Text, TypeFactor
+from photogram.statistics.findings import LARGEST_FACTOR, NOMINAL, Text, TypeFactor
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
-from photogram.words import Phrase, phrase
 
 MOST_ROWS = 64  # Largest number of observations with an exact sum of R_ij^2
 VISIBLE = 1e-6  # Least redundancy of a direction
 FACTORS = 100  # Number of examined factors
-DETECTED = 2.3  # Factor that differences of three check points detect
 FEW, WEAK = 20.0, 0.1
 """Redundancy, and mean redundancy, below which chi-square with r degrees of freedom is wrong."""
 
@@ -46,30 +41,6 @@ def type_factors(
             name = suspects.type(kind, int(suspects.subjects[group]))
             found.setdefault(name, []).append(np.array([group]))
     return [_factor(trial, tests, kind, np.hstack(groups), limit) for kind, groups in found.items()]
-
-
-def unchecked_control(result: AdjustedNetwork, types: Iterable[TypeFactor]) -> list[Phrase]:
-    """Return messages on undetected factors of the standard deviations of control that matter.
-
-    Other points are wrong by at most the error of control. Check points detect a factor that changes their
-    differences by more than DETECTED standard deviations.
-    """
-    given, limit = result.point_given_sd, result.max_bias_ratio
-    weighted = (given > 0) & np.isfinite(given) & result.used_points[:, np.newaxis]
-    found = [each for each in types if each.group == CONTROL_POINTS and each.undetected > limit]
-    if not found or not weighted.any(axis=0).all():
-        return []
-    control = np.array([np.median(own[has]) for own, has in zip(given.T, weighted.T, strict=True)])
-    sd = result.point_sd[result.used_points & ~weighted.any(axis=1)]
-    checks = getattr(result, "check_points", None)
-    shown = math.inf if checks is None or checks.agreement is None else np.nanmedian(checks.agreement.sd)
-    fewest = max(FEWEST, math.ceil(SHARE * np.count_nonzero(result.used_points)))
-    return [
-        phrase("unchecked.sd", kind=each.group, factor=each.undetected)
-        for each in found
-        if each.undetected * np.median(control) < DETECTED * shown
-        and np.count_nonzero((each.undetected * control > limit * sd).any(axis=1)) >= fewest
-    ]
 
 
 def _factor(trial: NetworkTrial, tests: Tests, kind: Text, groups: Indices, limit: float) -> TypeFactor:

@@ -10,6 +10,7 @@ pub mod snooping;
 pub mod solution;
 pub mod state;
 pub mod steps;
+pub mod suspects;
 mod tables;
 pub mod trial;
 

@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 use super::super::model::{Bundle, Owner};
 use super::super::stations::Stations;
 use super::super::trial::Trial;
-use super::deformations::Deformations;
 use super::facts::Facts;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Shared};
 use crate::normals::Layout;
@@ -33,6 +32,16 @@ pub(super) enum Seen {
     Positions,
     /// Attitudes of photos.
     Attitudes,
+}
+
+/// Deformations of the images of a photo, relative to its principal point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Deformations {
+    pub principal_point: [f64; 2],
+    pub distance: f64,
+    /// Columns of the scale of the first axis, and of the shear.
+    pub affinity: [usize; 2],
+    pub radial: Option<usize>,
 }
 
 /// All common errors that are possible for a network.

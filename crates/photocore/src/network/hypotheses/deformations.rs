@@ -3,23 +3,13 @@
 
 use super::super::trial::Trial;
 use super::cameras::{MOST_CAMERAS, POINTS, equal_cameras};
-use super::catalogue::{Catalogue, put};
+use super::catalogue::{Catalogue, Deformations, put};
 use crate::adjustment::Equation;
 
 /// Plausible difference of scales, and shear.
 const AFFINITY: f64 = 1e-2;
 /// Plausible radial distortion of the first order, in the unit of the tangent.
 const RADIAL: f64 = 5e-2;
-
-/// Deformations of the images of a photo, relative to its principal point.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Deformations {
-    principal_point: [f64; 2],
-    distance: f64,
-    /// Columns of the scale of the first axis, and of the shear.
-    affinity: [usize; 2],
-    radial: Option<usize>,
-}
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     for photos in equal_cameras(catalogue).into_iter().take(MOST_CAMERAS) {
