@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result, simulate
+from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result, score_test, simulate
 from photogram.network import Attitude, rotation_matrix
 from photogram.results.findings import duplicates
-from photogram.results.model_tests import score_test
 from photogram.statistics.findings import IMAGES, Removed
 from photogram.words import phrase
 

@@ -436,13 +436,15 @@ def test_section_13_a_pattern_of_one_photo():
 
 
 @pytest.mark.giant("13", "6 residual reading: 3-sigma, patterns, heights of two-ray points")
-def test_section_13_a_lens_that_is_not_corrected_shows_in_the_control(block):
+def test_section_13_a_lens_that_is_not_corrected_is_named(block):
     # Radial distortion bends the whole block and leaves hardly a residual.
     radius2 = (block.image_xy**2).sum(axis=1, keepdims=True) / 115**2
     outcome = checked(block.replace(image_xy=block.image_xy + 0.06 * radius2 * block.image_xy / 115))
-    (common,) = found(outcome, "control-system")
+    (common,) = found(outcome, "common-error")
     assert common.level == "grave"
-    assert {finding.level for finding in found(outcome, "control-misfit")} == {"look"}
+    first, second = common.phrase.fields["errors"]
+    assert first.fields["named"].code == "hypothesis.camera-radial"
+    assert second.fields["named"].code == "hypothesis.bending"
 
 
 @pytest.mark.giant("13", "6 residual reading: 3-sigma, patterns, heights of two-ray points")

@@ -307,7 +307,9 @@ def test_without_check_points_control_predicts_and_the_page_says_so(result):
     bare = photogram.adjust(block.replace(point_positions=kept, point_check_sd=None), unit_variance="unity")
     found = bare.statement(classes={"h": 0.05, "v": 0.05, "3d": 0.07})
     assert found.figures is None
-    assert found.headline.startswith("No independent check points")
+    # Positions by GNSS could test the control, but an error of 0.43 m remains undetected.
+    assert bare.verdict.code == "accepted-not-checked"
+    assert found.exit == 4
     keys = [each["key"] for each in found.sentences]
     assert keys[:3] == ["asprs.none.h", "asprs.none.v", "honest.none"]
     assert len(found.leave_one_out) == 8

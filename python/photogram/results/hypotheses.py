@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.hypothesis_checks import set_with_checks, single_with_checks
+from photogram.results.hypothesis_checks import set_with_checks, single_checks, single_with_checks
 from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
@@ -421,6 +421,10 @@ def hypotheses(
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
     checked = -math.inf if agreement is None else largest_odds([agreement.points])
+    if agreement is not None and agreement.joint is not None:
+        of_checks, dimension = single_checks(agreement.joint)
+        by_one = _log_odds(of_checks, dimension, dimension + 1, len(dimension))
+        checked = max(checked, float(by_one.max()))
     sets = len(found["sets"])
     same = ("index", "component", "probability", "estimate", "redundancy", "mdb", "bias_to_noise", "sets")
     return Hypotheses(

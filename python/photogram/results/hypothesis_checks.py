@@ -13,6 +13,19 @@ from photogram.statistics.distributions import log_chi_square
 SINGULAR = 1e-10  # Relative eigenvalue of directions that nothing determines
 
 
+def single_checks(joint: tuple[Indices, Floats, Floats]) -> tuple[Floats, Floats]:
+    """Return T of an error of each single check point, and its dimension.
+
+    With the score s = C^-1 D and the redundancy W = C^-1, T = s' W^-1 s over its coordinates.
+    """
+    flat, differences, covariance = joint
+    inverse = np.linalg.inv(covariance)
+    score = inverse @ differences
+    points = [np.flatnonzero(flat // 3 == point) for point in np.unique(flat // 3)]
+    found = [score[own] @ np.linalg.solve(inverse[np.ix_(own, own)], score[own]) for own in points]
+    return np.array(found), np.array([len(own) for own in points], dtype=float)
+
+
 def set_with_checks(found: Facts, row: int, checks: int, joint: tuple[Indices, Floats, Floats]) -> bool:
     """Test a set with check points as further observations; return whether only these test it.
 

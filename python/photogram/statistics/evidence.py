@@ -36,6 +36,8 @@ WITHHELD = 0.001  # Significance level of check points that forbid the use of th
 
 MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 
+MISSING_LENS = "hypothesis.camera-radial"  # Code of an error that only a wider camera model removes
+
 GLOBAL = Phrase("test.global")  # Type of the test of all residuals together
 
 Beyond = tuple[float, Tested, tuple[int, ...]]
@@ -232,11 +234,20 @@ class Evidence:
         fall, single = self._falls
         if not fall or not self.high or self.test is None or self.found.exchanged:
             return False
-        # An error in common with fewer parameters explains the same residuals better.
-        if fall < 2 * self.found.odds + LENS_PARAMETERS * math.log(max(self.number, 2)):
+        # An error in common with fewer parameters explains the same residuals better, unless it is a lens.
+        rivals = 0.0 if self.common_code == MISSING_LENS else 2 * self.found.odds
+        if fall < rivals + LENS_PARAMETERS * math.log(max(self.number, 2)):
             return False
         too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
         return fall > EXPLAINED * too_much and single < SINGLE * too_much
+
+    @property
+    def common_code(self) -> str:
+        """Code of the likeliest error in common; empty without one."""
+        for each in self.found.common:
+            named = each.fields.get("named") if isinstance(each, Phrase) else None
+            return named.code if isinstance(named, Phrase) else ""
+        return ""
 
     @property
     def lens_first(self) -> bool:

@@ -215,7 +215,9 @@ class TypeFactor:
 
     @property
     def undetected(self) -> float:
-        """The smallest factor that a test of the level 0.001 detects with the power 0.80."""
+        """The smallest factor that a test of the level 0.001 detects with the power 0.80; else infinite."""
+        if not self.redundancy > 0:
+            return math.inf
         limit, least = (critical_chi_square(level, self._freedom) for level in (TYPE_LEVEL, 0.80))
         return math.sqrt(1.0 + (limit / least - 1.0) * self.redundancy / self._spread)
 

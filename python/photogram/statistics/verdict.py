@@ -16,7 +16,7 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics import weight_rules
-from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
+from photogram.statistics.evidence import GLOBAL, MISSING_LENS, WITHHELD, Evidence, Test, part_of
 from photogram.statistics.findings import IMAGES, Findings, Text
 from photogram.words import Phrase
 
@@ -182,6 +182,7 @@ def _next_steps(rule: Rule, e: Evidence, *, usable: bool) -> tuple[Phrase, ...]:
         "take-out": found.take_out if snooping else None,
         "calibrate": calibrate,
         "lens": calibrate if e.lens_first else None,
+        "lens-in-common": calibrate if e.common_code == MISSING_LENS else None,
         "iterate": found.iterate,
     }
     steps: list[Text] = []
@@ -428,7 +429,7 @@ RULES = (
         "common-error",
         _common_error,
         EXIT_NOT_USABLE,
-        ("correct-common",),
+        ("correct-common", "lens-in-common"),
         warning=True,
         grave=_is_grave,
     ),

@@ -15,18 +15,22 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     for photos in equal_cameras(catalogue).into_iter().take(MOST_CAMERAS) {
         let camera = &catalogue.stations.photos[photos[0]].camera;
         let (names, values, distance) = (camera.parameter_names(), camera.parameters(), camera.scale());
+        // Images of cameras without a principal point are measured from it.
         let value = |axis: usize| {
             let named = names.iter().position(|own| [POINTS[axis], POINTS[axis + 2]].contains(&own.0));
-            Some(values[named?])
+            named.map_or(0.0, |place| values[place])
         };
-        let (Some(x), Some(y)) = (value(0), value(1)) else { continue };
         let has_radial = names.iter().any(|own| own.0.starts_with(['k', 'K']));
         let index = Some(trial.camera_of_photo[photos[0]]);
         let columns = catalogue.add(("camera-affinity", index), &["scale", "shear"], &[AFFINITY; 2]);
         let radial = (!has_radial && distance > 0.0)
-            .then(|| catalogue.add(("camera-radial", index), &["radial"], &[RADIAL])[0]);
-        let own =
-            Deformations { principal_point: [x, y], distance, affinity: [columns[0], columns[1]], radial };
+            .then(|| catalogue.add(("camera-radial", index), &["k1"], &[RADIAL])[0]);
+        let own = Deformations {
+            principal_point: [value(0), value(1)],
+            distance,
+            affinity: [columns[0], columns[1]],
+            radial,
+        };
         photos.into_iter().for_each(|photo| catalogue.deformations[photo] = Some(own));
     }
 }
