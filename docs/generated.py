@@ -38,7 +38,8 @@ APPENDED = re.compile(
     r"(?=\{\w+:\+[;&]?\})"
 )  # Before fields that begin with a semicolon if they are not empty
 COMMAND = "\x1f"  # Between the sentences of Python and of the command line
-DECIDED = {"take-out": "snoop", "lens": "calibrate"}  # Usual case of next steps that the program decides
+# Usual case of next steps that the program decides
+DECIDED = {"take-out": "snoop", "lens": "calibrate", "lens-in-common": "calibrate"}
 
 
 def cell(text: str) -> str:
