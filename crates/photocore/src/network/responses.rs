@@ -1,7 +1,5 @@
-//! Effects of single observations: columns of R, effects on chosen parameters, and the parameter that an error changes most. Each requires
-//! a solution of the normal equations.
-//!
-//! Effects of errors of single observations on their own points and photos, and inseparable observations.
+//! Effects of single observations: columns of R, effects on chosen parameters and on own points and photos, the parameter that an error changes
+//! most, and inseparable observations. Those on other parameters require a solution of the normal equations.
 
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
