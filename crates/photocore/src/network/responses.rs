@@ -1,4 +1,4 @@
-//! Effects of single observations: columns of R, effects on chosen parameters and on own points and photos, the parameter that an error changes
+//! Effects of single observations: columns of R, effects on chosen parameters and own points and photos, the parameter that an error changes
 //! most, and inseparable observations. Those on other parameters require a solution of the normal equations.
 
 use std::ops::{ControlFlow, Range};
