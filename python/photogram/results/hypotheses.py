@@ -209,8 +209,10 @@ class Hypotheses:
             and self.undetected(row) >= RARE
             and (not least or (row in self.effects and self.effects[row].points >= least))
         }
+        # If other observations test them weakly, the undetected errors are named.
+        graded = {str(self.code[row]) for row in self.harmful}
         sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
-        codes = [codes[0] for codes in sources if untested.intersection(codes)]
+        codes = [own[0] for own in sources if untested.intersection(own) and not graded.intersection(own)]
         return [phrase(f"datum.{code}") for code in codes]
 
     def common(self, rivals: float = -math.inf) -> list[int]:
@@ -321,7 +323,7 @@ class Hypotheses:
             column("bias_to_noise", self.bias_to_noise[rows], "Moves up to, sd", decimals=1),
             of_each(effects, "points", name="points", head="Points moved", decimals=0),
             of_each(effects, "ratio", name="ratio", head="Largest effect, sd", decimals=1),
-            of_each(effects, "change", name="change", head="Largest effect", decimals=3),
+            of_each(effects, "change", name="change", head="Largest effect", figures=3),
             column("at", np.array([each or "" for each in at], dtype=object), "At", kind="name"),
         ]
         note = (
