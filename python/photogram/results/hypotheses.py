@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.hypothesis_checks import set_with_checks, single_checks, single_with_checks
+from photogram.results.hypothesis_checks import Joint, set_with_checks, single_checks, single_with_checks
 from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
@@ -383,25 +383,28 @@ def hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
+    joint: Joint | None = None
+    if agreement is not None and agreement.joint is not None:
+        flat, differences, covariance = agreement.joint
+        joint = flat, differences, np.linalg.inv(covariance)  # Once for all hypotheses
     groups = _groups(suspects, found["group"], found["index"])
     for row, (*sizes, changes) in found["effects"].items():
         of_checks, of_points = np.split(changes, [checks])
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = np.zeros(0) if agreement is None else np.abs(of_checks) / agreement.sd
-        ratios, joint = np.nan_to_num(ratios, posinf=0.0), agreement and agreement.joint
-        shown = float(np.square(ratios).max(initial=0.0))
+        shown = float(np.square(np.nan_to_num(ratios, posinf=0.0)).max(initial=0.0))
         if joint is not None and np.isfinite(moved := of_checks.ravel()[joint[0]]).all():
-            shown = max(shown, float(moved @ np.linalg.solve(joint[2], moved)))
+            shown = max(shown, float(moved @ joint[2] @ moved))
         # Residuals and check points together detect a smaller error.
         ratio, least = sizes[2], DETECTED**2
         detected = shown > least or ratio < limit * math.sqrt(1.0 + shown / least)
         effects[row] = Effect(detected, of_points, *sizes)
-        if not known or agreement is None or agreement.joint is None:
+        if not known or joint is None:
             continue
         group = int(groups[row])
         if group >= 0:
-            single_with_checks(found, row, trial.deviations[suspects.rows(group)], of_checks, agreement.joint)
-        elif set_with_checks(found, row, checks, agreement.joint):
+            single_with_checks(found, row, trial.deviations[suspects.rows(group)], of_checks, joint)
+        elif set_with_checks(found, row, checks, joint):
             relative.add(row)
     statistic, estimate = found["statistic"], found["estimate"]
     kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
@@ -423,8 +426,8 @@ def hypotheses(
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
     checked = -math.inf if agreement is None else largest_odds([agreement.points])
-    if agreement is not None and agreement.joint is not None:
-        of_checks, dimension = single_checks(agreement.joint)
+    if joint is not None:
+        of_checks, dimension = single_checks(joint)
         by_one = _log_odds(of_checks, dimension, dimension + 1, len(dimension))
         checked = max(checked, float(by_one.max()))
     sets = len(found["sets"])

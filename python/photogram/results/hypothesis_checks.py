@@ -12,33 +12,35 @@ from photogram.statistics.distributions import log_chi_square
 
 SINGULAR = 1e-10  # Relative eigenvalue of directions that nothing determines
 
+Joint = tuple[Indices, Floats, Floats]
+"""Coordinates of check points with differences D, these, and the inverse C^-1 of their covariance."""
 
-def single_checks(joint: tuple[Indices, Floats, Floats]) -> tuple[Floats, Floats]:
+
+def single_checks(joint: Joint) -> tuple[Floats, Floats]:
     """Return T of an error of each single check point, and its dimension.
 
     With the score s = C^-1 D and the redundancy W = C^-1, T = s' W^-1 s over its coordinates.
     """
-    flat, differences, covariance = joint
-    inverse = np.linalg.inv(covariance)
+    flat, differences, inverse = joint
     score = inverse @ differences
     points = [np.flatnonzero(flat // 3 == point) for point in np.unique(flat // 3)]
     found = [score[own] @ np.linalg.solve(inverse[np.ix_(own, own)], score[own]) for own in points]
     return np.array(found), np.array([len(own) for own in points], dtype=float)
 
 
-def set_with_checks(found: Facts, row: int, checks: int, joint: tuple[Indices, Floats, Floats]) -> bool:
+def set_with_checks(found: Facts, row: int, checks: int, joint: Joint) -> bool:
     """Test a set with check points as further observations; return whether only these test it.
 
     Differences D of check points with the covariance C are independent of the residuals. If the parameters
     change them by G, D adds G' C^-1 D to the score and G' C^-1 G to the redundancy.
     """
-    own, (flat, differences, covariance) = found["sets"][row], joint
+    own, (flat, differences, inverse) = found["sets"][row], joint
     hidden = bool(found["rank"][row] == 0)
     k = len(own["parameters"])
     g = np.reshape(own["at_checks"], (-1, 3, k))[:checks].reshape(-1, k)[flat]
     if not np.isfinite(g).all() or not g.any():
         return False
-    weighted = np.linalg.solve(covariance, g)
+    weighted = inverse @ g
     redundancy, score = g.T @ weighted, weighted.T @ differences
     if not hidden:
         # Directions without redundancy have no cofactors.
@@ -55,18 +57,16 @@ def set_with_checks(found: Facts, row: int, checks: int, joint: tuple[Indices, F
     return hidden
 
 
-def single_with_checks(
-    found: Facts, row: int, sd: Floats, changes: Floats, joint: tuple[Indices, Floats, Floats]
-) -> None:
+def single_with_checks(found: Facts, row: int, sd: Floats, changes: Floats, joint: Joint) -> None:
     """Test a group with check points as further observations, along its least detectable direction.
 
     This direction d is an eigenvector of R in unit weight. Check points have the `changes` G by an error d.
     """
-    flat, differences, covariance = joint
+    flat, differences, inverse = joint
     g, d = changes.ravel()[flat], found["mdb"][row, : len(sd)]
     if len(d) != len(sd) or not np.isfinite(g).all() or not g.any():
         return
-    weighted = np.linalg.solve(covariance, g)
+    weighted = inverse @ g
     redundancy, score, before = float(g @ weighted), float(weighted @ differences), 0.0
     if np.isfinite(d).all():
         estimate = found["estimate"][row, : len(sd)]
