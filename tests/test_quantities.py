@@ -155,7 +155,7 @@ def test_a_command_prints_the_first_rows_of_its_tables_also_of_those_in_layers(c
     document = Document("What", "", [], [], [], [Section("section", "Rows", parts)])
     assert len(titled_lines(document, ["section"])[0][1]) > 2 * SHOWN
     print_document(document, "report.txt", "rows")
-    first, title, head, *rows = capsys.readouterr().out.splitlines()
+    first, _, title, head, *rows = capsys.readouterr().out.splitlines()
     assert (first, title, head.strip()) == ("What", "Rows", "Row")
     assert [line.strip() for line in rows[-2:]] == [str(SHOWN - 2), "and 2 more lines in report.txt"]
     assert table not in document.tables()

@@ -223,5 +223,5 @@ def test_fields_that_overflow_are_stars(tmp_path):
 
 def test_the_worked_example_of_the_page_is_what_the_command_prints(run):
     page = (REPOSITORY / "docs" / "perspective-center.md").read_text()
-    printed = run("--example").output.split("\nwritten: ")[0]
+    printed = run("--example").output.split("\n\nwritten: ")[0]
     assert f"```text\n{printed}\n```" in page

@@ -44,8 +44,22 @@ EXTRAS = {
 }
 """The extra that installs a package missing in the core installation."""
 
+
+class Output(Console):
+    """Standard output: blocks of lines with blank lines between them."""
+
+    _stream: object = None  # of the last block; tests run several commands with one stream each
+
+    def print_block(self, *lines: str) -> None:
+        """Print lines below a blank line, unless they are the first."""
+        if self._stream is self.file:
+            self.print()
+        self._stream = self.file
+        self.print(*lines, sep="\n")
+
+
 errors = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
-output = Console(highlight=False, soft_wrap=True, emoji=False)
+output = Output(highlight=False, soft_wrap=True, emoji=False)
 
 
 def print_sections(document: Document, whole: str, keys: Collection[str] | None = None) -> None:
@@ -53,16 +67,15 @@ def print_sections(document: Document, whole: str, keys: Collection[str] | None 
     from photogram.show.forms import titled_lines
 
     for title, lines in titled_lines(document, keys):
-        output.print(f"[bold]{escape(title)}[/]")
-        for line in lines[:SHOWN]:
-            output.print(f"  {escape(line)}")
+        shown = [*lines[:SHOWN]]
         if len(lines) > SHOWN:
-            output.print(f"  and {len(lines) - SHOWN} more lines in {whole}")
+            shown.append(f"and {len(lines) - SHOWN} more lines in {whole}")
+        output.print_block(f"[bold]{escape(title)}[/]", *(f"  {escape(line)}".rstrip() for line in shown))
 
 
 def print_document(document: Document, whole: str, *keys: str, remarks: Iterable[object] = ()) -> None:
     """Print verdict, advice, key figures, some sections and tables of a document, then remarks."""
-    output.print(escape(": ".join(filter(None, (document.what, document.title)))))
+    output.print_block(escape(": ".join(filter(None, (document.what, document.title)))))
     print_sections(document, whole, keys)
     for remark in remarks:
         print_remark(remark)
@@ -72,20 +85,17 @@ def print_text(document: Document) -> None:
     """Print the whole text of a document."""
     from photogram.show.forms import text
 
-    output.print(escape(text(document).removesuffix("\n")))
+    output.print_block(escape(text(document).removesuffix("\n")))
 
 
-def print_written(paths: Iterable[Path], to: Console = output) -> None:
-    """Print the names of written files."""
-    if names := ", ".join(str(path) for path in paths):
-        to.print(f"written: {escape(printable(names))}")
-
-
-def print_report(paths: Iterable[Path], to: Console = output) -> None:
-    """Name the report to open, if one was written: the last line of a command."""
-    pages = [path for path in paths if path.suffix == ".html"]
+def print_written(paths: Iterable[Path]) -> None:
+    """Print the names of written files; the last line of a command is the report to open."""
+    names = [escape(printable(str(path))) for path in paths]
+    pages = [name for name in names if name.endswith(".html")]
+    if names:
+        output.print_block(f"written: {', '.join(names)}")
     if pages:
-        to.print(f"open in a browser: {escape(printable(', '.join(map(str, pages))))}")
+        output.print(f"open in a browser: {', '.join(pages)}")
 
 
 def print_withheld(message: Phrase, paths: Iterable[Path]) -> None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from photogram.cli.console import errors, failures, print_report, print_written
+from photogram.cli.console import errors, failures, print_written
 from photogram.cli.options import (
     Reads,
     Writes,
@@ -172,9 +172,7 @@ class Job:
         if not self.quiet:
             if summary is not None:
                 summary()
-            written = list(written)
             print_written(written)
-            print_report(written)
         if code:
             raise typer.Exit(code)
 
