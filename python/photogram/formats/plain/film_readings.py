@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -282,9 +283,13 @@ class MarkReadings:
         """Return (n, 2) positions of the marks of a photo in the camera frame."""
         return np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
 
+    @cached_property
+    def _sides(self) -> list[str]:
+        return self.seen.photos.table.texts("mirrored")
+
     def given_side(self, photo: ScannedPhoto) -> bool | None:
         """Return whether the table marks a photo as mirrored; None: unknown."""
-        word = self.seen.photos.table.texts("mirrored")[photo.row].lower()
+        word = self._sides[photo.row].lower()
         if word and word not in TRUE | FALSE:
             raise self.seen.photos.table.cell_error(photo.row, "mirrored", "error.flag", value=word)
         return None if not word else word in TRUE

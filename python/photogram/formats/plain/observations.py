@@ -273,7 +273,7 @@ def _named_groups(own: Sequence[Any], groups: dict[int, str]) -> dict[str, dict[
     keys = []
     for each in own:
         group = {field: value for field, _ in each.UNKNOWNS if (value := getattr(each, field)) is not None}
-        if each.moment is not None and each.clock is not None:
+        if each.trajectory is not None and each.clock is not None:
             group["clock"] = each.clock
         for field, value in group.items():
             if not isinstance(value, Unknown):  # Fixed
@@ -308,7 +308,7 @@ def _written(block: Block, name: str, own: Sequence[Any], groups: Mapping[int, s
     found: dict[str, Any] = {}
     for part in TABLES[name].parts:
         if isinstance(part, Parameter):
-            clocks = [None if each.moment is None else each.clock for each in own]
+            clocks = [None if each.trajectory is None else each.clock for each in own]
             found |= unknown_columns(block, part, clocks, [name] * len(own))
         elif part.kind == "subject":
             found |= _subject_columns(own, block)
@@ -330,14 +330,14 @@ def _written(block: Block, name: str, own: Sequence[Any], groups: Mapping[int, s
 
 def _subject_columns(own: Sequence[Any], block: Block) -> dict[str, Any]:
     """Return the columns of the subjects of observations."""
-    moments, photos = [each.moment for each in own], [each.photo for each in own]
-    if not any(moments):
+    trajectories, photos = [each.trajectory for each in own], [each.photo for each in own]
+    if not any(trajectories):
         # If photos have times, the times of drifts are written in addition.
         dated = block.timed and isinstance(own[0], Position)
         return {"photo": photos} | ({"time": [each.time for each in own]} if dated else {})
     return {
         **({"photo": photos} if any(photos) else {}),
-        "trajectory": [None if each is None else each.trajectory.name for each in moments],
+        "trajectory": [None if each is None else each.name for each in trajectories],
         "time": [each.time for each in own],
     }
 

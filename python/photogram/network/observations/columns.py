@@ -91,7 +91,7 @@ class Columns:
         """Type and sizes: observations with the same key share columns."""
         return self.kind, self.label, *(len(self.table[name][0]) for name in _SIZES)
 
-    @property
+    @cached_property
     def moments(self) -> list[Moment | None]:
         """Times on trajectories, instead of photos."""
         none: list[Moment | None] = [None] * len(self.rows)
