@@ -285,10 +285,8 @@ def resect(
     known = np.concatenate(
         [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]
     )
-    limit = number("tolerance", tolerance)
-    if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
-        name, value = ("tolerance", limit) if max_iterations >= 1 else ("max_iterations", max_iterations)
-        raise argument_error(name, "positive", value=value)
+    limit = number("tolerance", tolerance, "positive")
+    number("max_iterations", whole_number("max_iterations", max_iterations), "positive")
     known_sd = np.concatenate(
         [_deviations("position_sd", position_sd, (3,)), _deviations("attitude_sd", attitude_sd, (3,))]
     )
@@ -426,10 +424,7 @@ def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     array = numbers(name, value)
     if len(shape) == 2 and array.shape == shape[1:]:
         array = np.broadcast_to(array, shape)
-    deviations = shaped(name, array, shape)
-    if not (deviations >= 0).all():
-        raise argument_error(name, "not-negative", value=float(deviations[~(deviations >= 0)][0]))
-    return deviations
+    return shaped(name, array, shape, "sd")
 
 
 def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
@@ -438,10 +433,7 @@ def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
         if np.isfinite(numbers(f"{name}_sd", sd)).any():
             raise InputError(phrase("resection.value-missing", name=name))
         return np.full(3, np.nan)
-    values = shaped(name, value, (3,))
-    if not np.isfinite(values).all():
-        raise argument_error(name, "finite", value=values.tolist())
-    return values
+    return shaped(name, value, (3,), "finite")
 
 
 def _messages(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> list[Message]:

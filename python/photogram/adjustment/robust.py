@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.arrays import argument_error, number, one_of
+from photogram.arguments.arrays import number, one_of
 from photogram.messages import Message
 from photogram.words import phrase
 
@@ -26,9 +26,7 @@ def loss_row(loss: Loss | None) -> tuple[str, float] | None:
     if loss is None:
         return None
     if isinstance(loss, tuple) and len(loss) == 2:
-        name, scale = loss[0], number("the scale of the loss", loss[1])
-        if not 0 < scale < np.inf:
-            raise argument_error("scale of the loss", "positive", value=scale)
+        name, scale = loss[0], number("scale of the loss", loss[1], "positive")
         one_of("loss", name, get_args(LossName))
         return (name, scale)
     one_of("loss", loss, get_args(LossName))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from photogram.adjustment.adjustment import at_least
 from photogram.adjustment.components import Weighing
-from photogram.arguments.arrays import argument_error, shaped
+from photogram.arguments.arrays import shaped
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -132,10 +132,7 @@ def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) 
             raise kind_error("of", "`radius` or an array", of)
         middle = shaped("center", center, (2,))
         return np.asarray(np.linalg.norm(focal_images(own.network) - middle, axis=1))
-    values = shaped("of", of, (images,))
-    if not ((values >= 0) & np.isfinite(values)).all():
-        raise argument_error("of", "not-negative", value=values)
-    return np.asarray(values)
+    return shaped("of", of, (images,), "not-negative")
 
 
 def _bins(

@@ -29,22 +29,45 @@ _ROUNDING = 1e-6  # Tolerance for correlations that were written with all digits
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
+RULES: dict[str, Callable[[Any], Any]] = {
+    "finite": np.isfinite,
+    "positive": lambda values: (values > 0) & np.isfinite(values),
+    "not-negative": lambda values: (values >= 0) & np.isfinite(values),
+    "sd": lambda values: values >= 0,  # Infinite if free
+}
+"""Rules of numbers: functions that return which values are valid."""
+
 
 def shaped(
-    name: str, value: ArrayLike, shape: tuple[int, ...], *, missing: bool = False
+    name: str, value: ArrayLike, shape: tuple[int | None, ...], rule: str = "", *, missing: bool = False
 ) -> NDArray[np.float64]:
-    """Return a read-only array of the given shape; a single number is broadcast.
+    """Return a read-only array of the given shape, with values of one of the `RULES`.
 
-    Words, truth values and complex numbers are rejected, even if NumPy would convert them. If `missing` is
-    True, masked values become NaN.
+    A size None is any number of rows; otherwise a single number is broadcast. Words, truth values and complex
+    numbers are rejected, even if NumPy would convert them. If `missing` is True, NaN is valid, and masked
+    values become NaN.
     """
     array = numbers(name, value, missing=missing)
-    if array.ndim == 0:
+    if array.ndim == 0 and None not in shape:
         array = np.full(shape, array)
         array.flags.writeable = False
-    if array.shape != shape:
-        raise InputError(phrase("argument.shape", name=name, shape=str(shape), actual=str(array.shape)))
+    sizes = array.shape if array.ndim == len(shape) else (0,) * len(shape)
+    wanted = tuple(own if size is None else size for own, size in zip(sizes, shape, strict=True))
+    if array.shape != wanted:
+        wanted_text = str(shape).replace("None", "n")
+        raise InputError(phrase("argument.shape", name=name, shape=wanted_text, actual=str(array.shape)))
+    if rule:
+        _require_rule(name, array, RULES[rule](array) | (missing & np.isnan(array)), rule)
     return frozen(array)
+
+
+def _require_rule(name: str, values: Any, good: NDArray[np.bool_], rule: str) -> None:
+    """Reject the first value that does not follow a rule."""
+    if not good.all():
+        first = np.argwhere(~good)[0].tolist()
+        where = f"{name}[{', '.join(map(str, first))}]" if first else name
+        code = "not-negative" if rule == "sd" else rule
+        raise argument_error(where, code, value=float(values[tuple(first)]))
 
 
 def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
@@ -223,16 +246,19 @@ def text(name: str, value: object) -> str:
     return value
 
 
-def number(name: str, value: object) -> float:
-    """Return a number, possibly infinite or NaN."""
+def number(name: str, value: object, rule: str = "") -> float:
+    """Return a number, possibly infinite or NaN if it has no rule."""
     if type(value) is float:  # Nearly all values; ten times faster than the check for a type of number
-        return value
-    if _is_real(value) and value is not None:
+        converted = value
+    else:
         try:
-            return float(value)  # type: ignore[arg-type]
-        except OverflowError:
-            pass
-    raise refused(name, value, "a number")
+            converted = float(value if _is_real(value) else None)  # type: ignore[arg-type]
+        except (TypeError, OverflowError):
+            raise refused(name, value, "a number") from None
+    if rule:
+        values = np.asarray(converted)
+        _require_rule(name, values, np.asarray(RULES[rule](values)), rule)
+    return converted
 
 
 def whole_number(name: str, value: object) -> int:
@@ -286,42 +312,17 @@ def argument_error(name: str, code: str, /, **fields: object) -> InputError:
     return InputError(phrase("error.at", what=name, message=phrase(f"error.{code}", **texts)))
 
 
-def finite(name: str, value: object) -> float:
-    """Return a finite number."""
-    checked = number(name, value)
-    if not math.isfinite(checked):
-        raise argument_error(name, "finite", value=checked)
-    return checked
-
-
-def array_of(
-    shape: tuple[int, ...], rule: str = "", kind: Callable[[Any], Any] | None = None
-) -> Callable[[str, Any], Any]:
-    """Return the check of a field with numbers of a shape that are `finite` or `positive`.
-
-    The check returns an array, or the numbers converted by `kind`.
-    """
-
-    def check(name: str, value: Any) -> Any:
-        values = shaped(name, value, shape)
-        valid = np.isfinite(values) & (values > 0 if rule == "positive" else True)
-        if rule and not valid.all():
-            raise argument_error(name, rule, value=values.tolist())
-        return values if kind is None else kind(values.tolist())
-
-    return check
-
-
 def object_name(name: str, value: object) -> str:
     """Return the name of an object."""
     return names(name, [value])[0]
 
 
-def probability(name: str, value: float) -> float:
+def probability(name: str, value: object) -> float:
     """Return a probability between 0 and 1; reject other numbers."""
-    if not 0 < value < 1:
-        raise argument_error(name, "range", low=0, high=1, value=value)
-    return value
+    checked = number(name, value)
+    if not 0 < checked < 1:
+        raise argument_error(name, "range", low=0, high=1, value=checked)
+    return checked
 
 
 def is_covariance(matrices: NDArray[np.float64], *, singular: bool = False) -> NDArray[np.bool_]:

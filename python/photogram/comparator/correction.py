@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from photogram.arguments.arrays import argument_error, is_covariance, truth_value
+from photogram.arguments.arrays import argument_error, is_covariance, number, truth_value
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats
 from photogram.comparator.polynomial import Frame, Polynomial, design
@@ -142,8 +142,7 @@ class Correction:
     def __post_init__(self) -> None:
         check_fields(self)
         for name in ("scale_x", "scale_y"):
-            if not 0 < (value := getattr(self, name)) < math.inf:
-                raise argument_error(name, "positive", value=value)
+            number(name, getattr(self, name), "positive")
         if not abs(self.nonorthogonality_rad) < math.pi / 2:
             angles = {"low": -math.pi / 2, "high": math.pi / 2}
             raise argument_error("nonorthogonality_rad", "range", value=self.nonorthogonality_rad, **angles)
@@ -152,8 +151,7 @@ class Correction:
                 if not math.isfinite(value):
                     raise argument_error("polynomial", "finite", value=value)
             for half in self.polynomial.frame.half_range_um:
-                if not 0 < half < math.inf:
-                    raise argument_error("half_range_um", "positive", value=half)
+                number("half_range_um", half, "positive")
         if self.covariance.shape != 2 * (PARAMETERS,) or not is_covariance(self.covariance, singular=True):
             raise InputError(phrase("error.covariance-singular"))
 

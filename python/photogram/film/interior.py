@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import frozen, numbers, one_of, shaped
+from photogram.arguments.arrays import frozen, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.lazy_dataclasses import dataclass
@@ -176,7 +176,7 @@ def interior_orientation(
         contradict the given one.
     """
     one_of("model", model, get_args(FilmModel))
-    q = pairs("places", places)
+    q = shaped("places", places, (None, 2))
     xy = shaped("readings", readings, q.shape)
     weights = 1.0 / np.broadcast_to(np.asarray(sd, dtype=float), xy.shape)
     if not (np.isfinite(q).all() and np.isfinite(xy).all() and np.isfinite(weights).all()):
@@ -203,15 +203,6 @@ def interior_orientation(
     values = np.zeros(8 if reseau is None else 8 + 2 * len(reseau.weights))
     values[:4] = conformal(q, true, mirrored=side)
     return fit.adjusted(model, values)
-
-
-def pairs(name: str, value: ArrayLike) -> Floats:
-    """Return an array (n, 2), n at least 1."""
-    found = numbers(name, value)
-    if found.ndim != 2 or found.shape[1] != 2 or not len(found):
-        fields = {"shape": "(n, 2)", "actual": str(found.shape)}
-        raise InputError(phrase("error.at", what=name, message=phrase("error.shape", **fields)))
-    return found
 
 
 def true_places(

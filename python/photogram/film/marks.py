@@ -13,10 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import frozen, number
+from photogram.arguments.arrays import frozen, number, shaped
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.film.interior import pairs
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
@@ -182,11 +181,10 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
     InputError
         If there are fewer than three readings, or if readings fit no marks in all eight orientations.
     """
-    q, p = pairs("places", places), pairs("true", true)
+    q, p = shaped("places", places, (None, 2)), shaped("true", true, (None, 2))
     if len(p) < 3 or len(q) < len(p):
         raise InputError(phrase("films.few-readings", readings=len(p), marks=len(q)))
-    if number("sd", sd) <= 0:
-        raise InputError(phrase("error.at", what="sd", message=phrase("error.positive", value=sd)))
+    number("sd", sd, "positive")
     ways = [_tried(q, p, turns, mirrored=mirrored) for mirrored in (False, True) for turns in range(4)]
     omega = np.array([each[1] for each in ways]) / sd**2
     best = int(np.argmin(omega))

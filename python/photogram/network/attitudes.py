@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import frozen, length, numbers, one_of, shaped
+from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -72,11 +72,10 @@ class Attitudes:
     step_covariances: Floats | None = None
 
     def __post_init__(self) -> None:
-        count = length("matrices", self.matrices)
-        object.__setattr__(self, "matrices", shaped("matrices", self.matrices, (count, 3, 3)))
+        object.__setattr__(self, "matrices", shaped("matrices", self.matrices, (None, 3, 3)))
         _check_orthonormal(self.matrices)
         if self.step_covariances is not None:
-            covariances = shaped("step_covariances", self.step_covariances, (count, 3, 3))
+            covariances = shaped("step_covariances", self.step_covariances, (len(self), 3, 3))
             object.__setattr__(self, "step_covariances", covariances)
 
     def __len__(self) -> int:
@@ -126,7 +125,7 @@ class Attitudes:
         """
         one_of("representation", representation, get_args(Representation))
         if representation.startswith("matrix"):
-            matrices = shaped("values", values, (length("values", values), 3, 3))
+            matrices = shaped("values", values, (None, 3, 3))
             _check_orthonormal(matrices)
             # One Newton step to the nearest orthonormal matrix, because files contain few digits.
             matrices = matrices @ (3.0 * np.eye(3) - matrices.transpose(0, 2, 1) @ matrices) / 2.0

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.arrays import (
+    RULES,
     argument_error,
     frozen,
     indices,
@@ -35,13 +36,11 @@ if TYPE_CHECKING:
     from photogram import Block
 
 _ANGLES = 1e6  # Radians; larger angles do not have the digits that an attitude needs
-RULES: dict[str, Callable[[Floats], Bools]] = {
-    "finite": np.isfinite,
+BLOCK_RULES: dict[str, Callable[[Floats], Bools]] = {
+    **RULES,
     "not-infinite": lambda values: ~np.isinf(values),
     "angle": lambda values: np.isnan(values) | (np.abs(values) <= _ANGLES),
     "not-zero": lambda values: np.isfinite(values) & (values != 0),
-    "positive": lambda values: (values > 0) & np.isfinite(values),
-    "sd": lambda values: values >= 0,
     "check-sd": lambda values: np.isnan(values) | ((values >= 0) & ~np.isinf(values)),
 }
 _WITH_NAN = ("not-infinite", "angle", "check-sd")
@@ -111,13 +110,13 @@ def _check_field(block: Block, declared: Any, counts: Mapping[str, int]) -> None
     if rule == "cameras":
         if block.cameras:
             block._set(name, frozen(photo_indices(value, block.cameras, counts[rows])))
-    elif rule not in RULES:
+    elif rule not in BLOCK_RULES:
         block._set(name, indices(name, value, counts[rows], counts[rule]))
     elif value is not None or declared.default is not None or (rule == "not-zero" and not block.cameras):
         shape = (counts[rows], rules["columns"]) if rules["columns"] else (counts[rows],)
         numbers = shaped(name, value, shape, missing=rule in _WITH_NAN)
         block._set(name, numbers)
-        refuse(block, name, rows, ~RULES[rule](numbers), rule)
+        refuse(block, name, rows, ~BLOCK_RULES[rule](numbers), rule)
 
 
 def refuse(block: Block, name: str, rows: str, bad: Bools, rule: str) -> None:

@@ -315,7 +315,7 @@ class Camera(Valued, Brief):
         InputError
             If the shape is wrong or a value is not a number.
         """
-        given = shaped("u", u, (len(np.atleast_1d(np.asarray(u))), 3), missing=True)
+        given = shaped("u", u, (None, 3), missing=True)
         return _photocore.camera_images(self.model, self.values, given, self.knots)
 
     def rays(self, xy: ArrayLike) -> Floats:
@@ -335,7 +335,7 @@ class Camera(Valued, Brief):
         InputError
             If the shape is wrong or a value is not a number.
         """
-        given = shaped("xy", xy, (len(np.atleast_1d(np.asarray(xy))), 2), missing=True)
+        given = shaped("xy", xy, (None, 2), missing=True)
         return _photocore.camera_rays(self.model, self.values, given, self.knots)
 
     def partials(self, u: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -357,7 +357,7 @@ class Camera(Valued, Brief):
         InputError
             If the shape is wrong or a value is not a number.
         """
-        given = shaped("u", u, (len(np.atleast_1d(np.asarray(u))), 3), missing=True)
+        given = shaped("u", u, (None, 3), missing=True)
         images, by_u, own = _photocore.camera_partials(self.model, self.values, given, self.knots)
         if self.knots is None:
             return images, by_u, own

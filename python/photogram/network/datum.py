@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from photogram.arguments.arrays import argument_error, names, number, text, truth_value
@@ -66,7 +65,7 @@ class InnerConstraints:
                 object.__setattr__(self, name, tuple(names(name, value)))
         truth_value("scale", self.scale)
         if self.radius is not None:
-            require(0 < number("radius", self.radius) < math.inf, "radius", "positive", value=self.radius)
+            number("radius", self.radius, "positive")
 
 
 @dataclass(frozen=True)

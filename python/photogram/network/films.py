@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, array_of, object_name, one_of, shaped
+from photogram.arguments.arrays import argument_error, number, object_name, one_of, shaped
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats, Indices
@@ -99,17 +99,16 @@ class Readings:
         (hx, hy) mm, half ranges of the scanner polynomials.
     """
 
-    pitch: float = field(default=1.0, metadata={"check": array_of((), "positive", float)})
-    origin: tuple[float, float] = field(
-        default=(0.0, 0.0), metadata={"check": array_of((2,), "finite", tuple)}
-    )
+    pitch: float = 1.0
+    origin: tuple[float, float] = (0.0, 0.0)
     down: bool = False
-    half_range: tuple[float, float] = field(
-        default=(1.0, 1.0), metadata={"check": array_of((2,), "positive", tuple)}
-    )
+    half_range: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
         check_fields(self, "readings")
+        number("pitch of readings", self.pitch, "positive")
+        shaped("origin of readings", self.origin, (2,), "finite")
+        shaped("half_range of readings", self.half_range, (2,), "positive")
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,9 +185,8 @@ class Reseau(Pattern):
         nodes = int(np.prod(own[4:]))
         where = f"unknowns of the reseau of photo {photo}"
         require(2 * nodes <= MOST_SHIFTS, where, "most", high=MOST_SHIFTS, value=2 * nodes)
-        deviations = shaped("sd of the reseau", sd, (2,))
-        good = (deviations > 0).all() and np.isfinite(deviations).all() and smooth > 0
-        require(good, "sd and smooth of the reseau", "positive", value=f"{deviations.tolist()}, {smooth}")
+        deviations = shaped("sd of the reseau", sd, (2,), "positive")
+        require(smooth > 0, "smooth of the reseau", "positive", value=smooth)
         object.__setattr__(self, "photo", photo)
         object.__setattr__(self, "sd", deviations)
         object.__setattr__(self, "smooth", float(smooth))

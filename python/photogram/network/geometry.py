@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import length, shaped, truth_value
+from photogram.arguments.arrays import shaped, truth_value
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -168,7 +168,7 @@ def local_frames(positions: ArrayLike) -> Floats:
     InputError
         If the shape is wrong.
     """
-    values = shaped("positions", positions, (length("positions", positions), 3))
+    values = shaped("positions", positions, (None, 3))
     longitude, latitude = values[:, :2].T
     sl, cl, sp, cp = np.sin(longitude), np.cos(longitude), np.sin(latitude), np.cos(latitude)
     rows = [[-sl, cl, np.zeros_like(sl)], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]

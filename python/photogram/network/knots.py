@@ -102,9 +102,7 @@ def checked_knots(
         require(good, f"{name} of camera {title}", "whole-range", low=least, high=MOST, value=count)
     require(0 < fov < 360, f"fov_x_deg of camera {title}", "range", low=0, high=360, value=fov)
     shape = (int(parameters["ny"]), int(parameters["nx"]), 2)
-    checked = shaped(where, 0.0 if knots is None else knots, shape)
-    require(np.isfinite(checked).all(), where, "finite", value="NaN or inf")
-    return checked
+    return shaped(where, 0.0 if knots is None else knots, shape, "finite")
 
 
 def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Floats | None:
@@ -114,8 +112,7 @@ def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Float
     if knots is None:
         require(not sd.any(), where, "requires", name="knot_sd", other="knots")
         return None
-    sd = shaped(where, np.broadcast_to(sd, knots.shape) if sd.shape == (2,) else sd, knots.shape)
-    require((sd >= 0).all(), where, "not-negative", value=float(sd.min()))
+    sd = shaped(where, np.broadcast_to(sd, knots.shape) if sd.shape == (2,) else sd, knots.shape, "sd")
     kinds = np.sign(sd) + np.isinf(sd)
     if (mixed := kinds[..., 0] != kinds[..., 1]).any():
         raise InputError(phrase("block.knot-sd", camera=title, sd=sd[mixed][0].tolist()))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, array_of, finite, number, numbers, object_name, shaped
+from photogram.arguments.arrays import argument_error, number, numbers, object_name, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import instances, kind_error, require
@@ -251,17 +251,17 @@ class Timed:
 
     photo: str
     trajectory: Trajectory | None = None
-    time: float | None = field(default=None, metadata={"check": finite})
+    time: float | None = field(default=None, metadata={"check": partial(number, rule="finite")})
     shutter: Shutter | None = None
     lines: Lines | None = None
     line_sensor: LineSensor | None = None
     sensor: Sensor | None = None
     offset: Clock | None = None
     rate: Readout | None = None
-    velocity: ArrayLike = field(default=0.0, metadata={"check": array_of((3,))})
-    rotation_rate: ArrayLike = field(default=0.0, metadata={"check": array_of((3,))})
-    sd_velocity: ArrayLike = field(default=np.inf, metadata={"check": array_of((3,))})
-    sd_rate: ArrayLike = field(default=np.inf, metadata={"check": array_of((3,))})
+    velocity: ArrayLike = field(default=0.0, metadata={"check": partial(shaped, shape=(3,))})
+    rotation_rate: ArrayLike = field(default=0.0, metadata={"check": partial(shaped, shape=(3,))})
+    sd_velocity: ArrayLike = field(default=np.inf, metadata={"check": partial(shaped, shape=(3,))})
+    sd_rate: ArrayLike = field(default=np.inf, metadata={"check": partial(shaped, shape=(3,))})
 
     def __post_init__(self) -> None:
         vars(self)["photo"] = object_name("photo of a trajectory", self.photo)

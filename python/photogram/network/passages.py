@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, array_of, names
+from photogram.arguments.arrays import argument_error, names, shaped
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import instances, kind_error
 from photogram.arguments.types import Floats
@@ -76,7 +76,7 @@ class Figure(Passage):
     def __post_init__(self) -> None:
         check_fields(self, "a figure")
         points = tuple(names("points of a figure", self.points))
-        shifts = array_of((len(points), 2, 3), "finite")(f"shifts of the {self.title}", self.shifts)
+        shifts = shaped(f"shifts of the {self.title}", self.shifts, (len(points), 2, 3), "finite")
         vars(self).update(points=points, shifts=shifts)
 
     @property

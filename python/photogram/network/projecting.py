@@ -48,7 +48,7 @@ def projected(
     NaN if a point is never seen. InputError if the trajectory of a scanner has one record, or a factor of
     line rates requires a missing reference time.
     """
-    places = shaped("points", points, (len(np.asarray(points)), 3))
+    places = shaped("points", points, (None, 3))
 
     def seen(times: Floats, rows: Indices | slice = slice(None)) -> Floats:
         return standing(own, trajectory, camera, places[rows], times, values=values)

@@ -68,8 +68,8 @@ def with_gnss(
         If an argument is outside its range, or the block has a rig.
     """
     _positive(sd=sd, seconds=seconds)
-    for name, deviation in (("shift_sd", shift_sd), ("drift_sd", drift_sd)):
-        require(0 <= number(name, deviation) < math.inf, name, "not-negative", value=deviation)
+    number("shift_sd", shift_sd, "not-negative")
+    number("drift_sd", drift_sd, "not-negative")
     if simulation.block.mounts:
         raise InputError(phrase("simulation.rig-first"))
     random, truth = np.random.default_rng(seed), simulation.truth
@@ -298,7 +298,7 @@ def with_rig(
 
 def _positive(**values: float) -> None:
     for name, value in values.items():
-        require(0 < number(name, value) < math.inf, name, "positive", value=value)
+        number(name, value, "positive")
 
 
 def _observed(

@@ -7,14 +7,14 @@ values. They are also observations if their standard deviations are neither 0 (f
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, finite, names, number, shaped
+from photogram.arguments.arrays import argument_error, names, number, shaped
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import require
 from photogram.arguments.types import Bools, Floats
@@ -104,10 +104,9 @@ class Unknown:
         object.__setattr__(self, "name", names(f"name of a {self.KIND}", [self.name])[0])
         self._set("position", self._position())
         self._set("attitude", self._attitude())
-        deviations = shaped(f"sd of {self.title}", getattr(self, "sd"), (len(self.components),))  # noqa: B009
-        if not (deviations >= 0).all():
-            raise argument_error(f"sd of {self.title}", "not-negative", value=deviations.tolist())
-        self._set("deviations", deviations)
+        sd: Any = getattr(self, "sd")  # noqa: B009
+        self._set("deviations", shaped(f"sd of {self.title}", sd, (len(self.components),), "sd"))
+        deviations = self.deviations
         if self.is_open and not np.isinf(deviations).all():
             raise InputError(phrase("block.unknown-value", unknown=self.title, names=list(self.GIVEN)))
 
@@ -234,7 +233,7 @@ class Drift(Numbers):
 
     KIND = "drift"
 
-    epoch: float | None = field(default=None, metadata={"check": finite})
+    epoch: float | None = field(default=None, metadata={"check": partial(number, rule="finite")})
 
     def __post_init__(self) -> None:
         super().__post_init__()

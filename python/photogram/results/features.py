@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, probability, value_field
+from photogram.arguments.arrays import number, probability, value_field
 from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, message_of
@@ -348,8 +348,7 @@ def _fitting(
     freedom = result.freedom_of_scale
     if coverage is not None:
         k = critical_student(1.0 - probability("coverage", coverage), freedom)
-    if not 0 < k < math.inf:
-        raise argument_error("k", "positive", value=k)
+    number("k", k, "positive")
     remarks = (str(phrase("fit.scale")),) if result.datum.has_chosen_scale else ()
     covariances = result.covariances()
     return (

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, finite_rows, freeze_fields, number
+from photogram.arguments.arrays import finite_rows, freeze_fields, number
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
@@ -342,9 +342,7 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
         """
         if ratio is None:
             return self
-        if not 0 < number("max_bias_ratio", ratio) < math.inf:
-            raise argument_error("max_bias_ratio", "positive", value=ratio)
-        return replace(self, max_bias_ratio=float(ratio))
+        return replace(self, max_bias_ratio=number("max_bias_ratio", ratio, "positive"))
 
     @property
     def image_points(self) -> Indices:

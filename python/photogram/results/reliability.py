@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.arrays import number, one_of, probability
+from photogram.arguments.arrays import one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results import network_trial
@@ -80,10 +80,7 @@ class Reliability(Tabular):
         unit_weight: str,  # `known`, or `unknown`: lambda0 of the F test
     ) -> None:
         one_of("unit_weight", unit_weight, ("known", "unknown"))
-        self.level, self.power = (
-            probability("level", number("level", level)),
-            probability("power", number("power", power)),
-        )
+        self.level, self.power = probability("level", level), probability("power", power)
         self.trial, self._covariances, self.known = trial, covariances, unit_weight == "known"
         self.downweighted = downweighted
         self.standing: network_trial.Standing = trial.stand()

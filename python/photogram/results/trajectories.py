@@ -178,7 +178,7 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
         camera = result.cameras[int(block.photo_cameras[index])].camera
     else:
         camera = camera_of(block, index)
-    places = shaped("points", points, (len(np.asarray(points)), 3))
+    places = shaped("points", points, (None, 3))
     if block.spheroid is not None:
         places = geographic_to_geocentric(places, block.spheroid)
     own = block.timed[row]

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, numbers, value_field
+from photogram.arguments.arrays import argument_error, numbers, shaped, value_field
 from photogram.arguments.arrays import probability as checked_probability
 from photogram.arguments.types import Bools, Floats
 from photogram.statistics.distributions import critical_normal
@@ -53,7 +53,8 @@ def linear_error(sd: ArrayLike, probability: float) -> Floats:
     InputError
         If `sd` is not such an array, a standard deviation is negative, or the probability is invalid.
     """
-    return critical_normal(1 - checked_probability("probability", probability)) * _deviations(sd)
+    deviations = shaped("sd", sd, (None,), "sd", missing=True)
+    return critical_normal(1 - checked_probability("probability", probability)) * deviations
 
 
 def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLike | None = None) -> Floats:
@@ -144,7 +145,8 @@ def mixture_linear(sd: ArrayLike, probability: float) -> float:
     InputError
         As in :func:`linear_error`.
     """
-    return _mixture(_deviations(sd)[:, np.newaxis], checked_probability("probability", probability))
+    deviations = shaped("sd", sd, (None,), "sd", missing=True)
+    return _mixture(deviations[:, np.newaxis], checked_probability("probability", probability))
 
 
 def sample_radius(values: ArrayLike, probability: float) -> tuple[int, float]:
@@ -207,24 +209,10 @@ def upper_order(count: int, probability: float, confidence: float = 0.95) -> int
     return order if order <= count else None
 
 
-def _deviations(sd: ArrayLike) -> Floats:
-    found = numbers("sd", sd, missing=True)
-    if found.ndim != 1:
-        raise argument_error("sd", "shape", shape="(n,)", actual=found.shape)
-    if (found < 0).any():
-        row = int(np.argmax(found < 0))
-        raise argument_error(f"sd[{row}]", "not-negative", value=float(found[row]))
-    return found
-
-
 def _principal(covariances: ArrayLike, offsets: ArrayLike | None, size: int) -> tuple[Floats, Floats]:
     """Return (n, k) principal standard deviations, largest first, and means along them."""
-    given = numbers("covariances", covariances, missing=True)
-    if given.ndim != 3 or given.shape[1:] != (size, size):
-        raise argument_error("covariances", "shape", shape=f"(n, {size}, {size})", actual=given.shape)
-    means = np.zeros(given.shape[:2]) if offsets is None else numbers("offsets", offsets, missing=True)
-    if means.shape != given.shape[:2]:
-        raise argument_error("offsets", "shape", shape=given.shape[:2], actual=means.shape)
+    given = shaped("covariances", covariances, (None, size, size), missing=True)
+    means = shaped("offsets", 0.0 if offsets is None else offsets, given.shape[:2], missing=True)
     rows = np.column_stack([given.reshape(-1, size * size), means])
     known: Bools = np.logical_and.reduce(np.isfinite(rows), axis=1)
     finite = np.where(known[:, np.newaxis, np.newaxis], given, np.eye(size))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, is_covariance, numbers, truth_value
+from photogram.arguments.arrays import argument_error, is_covariance, number, numbers, shaped, truth_value
 from photogram.arguments.arrays import probability as checked_probability
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -109,9 +109,8 @@ def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
     InputError
         If shapes differ, an uncertainty is negative, or degrees of freedom are not positive.
     """
-    own, dof = _contributions("u", u), numbers("freedom", freedom)
-    if dof.shape != own.shape:
-        raise argument_error("freedom", "shape", shape=own.shape, actual=dof.shape)
+    own = shaped("u", u, (None,), "not-negative")
+    dof = shaped("freedom", freedom, own.shape)
     if not (dof > 0).all():
         row = int(np.argmin(dof > 0))
         raise argument_error(f"freedom[{row}]", "positive", value=float(dof[row]))
@@ -142,14 +141,11 @@ def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike,
     InputError
         If shapes differ, a contribution is negative, or the matrix is not a covariance.
     """
-    c = _contributions("contributions", contributions)
-    matrix = numbers("covariance_of_components", covariance_of_components)
-    if matrix.shape != 2 * c.shape:
-        raise argument_error("covariance_of_components", "shape", shape=2 * c.shape, actual=matrix.shape)
+    c = shaped("contributions", contributions, (None,), "not-negative")
+    matrix = shaped("covariance_of_components", covariance_of_components, 2 * c.shape)
     if not is_covariance(matrix, singular=True):
         raise InputError(phrase("error.covariance-singular"))
-    if not 0 <= given < math.inf:
-        raise argument_error("given", "not-negative", value=given)
+    number("given", given, "not-negative")
     return _freedom(float(np.sum(c)) + given, float(c @ matrix @ c) / 2)
 
 
@@ -180,16 +176,6 @@ def coverage_factor(probability: float, freedom: float, truncated: bool = True) 
         raise argument_error("freedom", "positive", value=freedom)
     whole = truncated and math.isfinite(freedom)
     return critical_student(1 - probability, math.floor(freedom + ROUNDING) if whole else freedom)
-
-
-def _contributions(name: str, values: ArrayLike) -> Floats:
-    found = numbers(name, values)
-    if found.ndim != 1:
-        raise argument_error(name, "shape", shape="(k,)", actual=found.shape)
-    bad = ~(np.isfinite(found) & (found >= 0))
-    if bad.any():
-        raise argument_error(f"{name}[{np.argmax(bad)}]", "not-negative", value=float(found[bad][0]))
-    return found
 
 
 def _freedom(variance: float, half: float) -> float:

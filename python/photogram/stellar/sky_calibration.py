@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import LARGEST_SD, length, shaped, truth_value
+from photogram.arguments.arrays import LARGEST_SD, shaped, truth_value
 from photogram.arguments.fields import Checked
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
@@ -95,7 +95,7 @@ def project_sky(camera: SkyCamera, attitude: Floats, site: Site, places: Floats,
     InputError
         If the attitude does not have three angles, or if positions do not have two coordinates.
     """
-    standard = site.standard_coordinates(shaped("places", places, (length("places", places), 2)), time)
+    standard = site.standard_coordinates(shaped("places", places, (None, 2)), time)
     attitude = shaped("attitude", attitude, (3,))
     pixels = _photocore.plate_images(standard, attitude, camera.common[:-4], camera.kind)
     limit = _photocore.radial_domain(camera.facts.model, camera.model_values)

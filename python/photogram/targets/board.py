@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import (
     argument_error,
     frozen,
-    length,
     names,
     number,
     one_of,
@@ -154,8 +153,8 @@ class Board(Valued, Brief):
             raise argument_error("points", "empty")
         if self.shape == "bend":
             raise InputError(phrase("targets.bend"))
-        count = length("points", self.points)
-        self._set("points", shaped("points", self.points, (count, 3)))
+        self._set("points", shaped("points", self.points, (None, 3)))
+        count = len(np.asarray(self.points))
         beyond = ~(np.abs(np.asarray(self.points)) <= MAX_LENGTH)
         if beyond.any():
             value = float(np.asarray(self.points)[beyond][0])

@@ -64,9 +64,7 @@ def nominal_camera(
     if (field is None) == (focal is None):
         raise InputError(phrase("targets.nominal", count=2 * (field is not None)))
     if field is None:
-        focal = number("focal", focal)
-        if not 0 < focal < math.inf:
-            raise argument_error("focal", "positive", value=focal)
+        focal = number("focal", focal, "positive")
         flat = 2 * math.atan(size[0] / (2 * focal))
         angle = flat if flat < NARROW else size[0] / focal
     else:

@@ -8,7 +8,7 @@ from typing import Any, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, indices, one_of, shaped, value_field
+from photogram.arguments.arrays import argument_error, indices, number, one_of, shaped, value_field
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
@@ -59,8 +59,8 @@ class Start(Valued, Brief):
         one_of("sync", self.sync, get_args(Synchronisation))
         if self.regularise is not None:
             one_of("regularise", self.regularise, get_args(Regularisation))
-        if self.sd0 is not None and not 0 < self.sd0 < np.inf:
-            raise argument_error("sd0", "positive", value=self.sd0)
+        if self.sd0 is not None:
+            number("sd0", self.sd0, "positive")
         count = len(self.corners.camera_names)
         cameras = [each for each in self.cameras if isinstance(each, Camera) and each.unit == "px"]
         if len(cameras) != count or len(self.cameras) != count:

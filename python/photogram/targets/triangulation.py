@@ -17,7 +17,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, length, one_of, shaped
+from photogram.arguments.arrays import number, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -102,9 +102,9 @@ def triangulated(
 def _met(housing: Housing, cameras: Sequence[int], pixels: Floats) -> Floats:
     """Return (n, 3) points nearest to all rays: sum (I - r r') (X - O) = 0."""
     normal, right = np.zeros((len(pixels), 3, 3)), np.zeros((len(pixels), 3))
-    for number, camera in enumerate(cameras):
+    for row, camera in enumerate(cameras):
         turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
-        looking = rays(housing.cameras[camera], pixels[:, number]) @ turn
+        looking = rays(housing.cameras[camera], pixels[:, row]) @ turn
         across = np.eye(3) - looking[:, :, np.newaxis] * looking[:, np.newaxis]
         normal += across
         right -= across @ (turn.T @ shift)
@@ -175,9 +175,8 @@ def triangulate(
         If cameras are not on one rig, are fewer than two, or repeat, or if arrays have other shapes.
     """
     housing, numbers = _of_rig(result, cameras)
-    where = shaped("pixels", pixels, (length("pixels", pixels), len(numbers), 2))
-    if not 0 < pixel_sd < np.inf:
-        raise argument_error("pixel_sd", "positive", value=pixel_sd)
+    where = shaped("pixels", pixels, (None, len(numbers), 2))
+    number("pixel_sd", pixel_sd, "positive")
     one_of("datum", datum, get_args(Axes))
     still = housing_rows(housing) if datum == "corners" else None
     return triangulated(housing, numbers, where, pixel_sd, still)
@@ -210,8 +209,7 @@ def distance_uncertainty(
     InputError
         As in :func:`triangulate`, or if an image size is unknown, or if the depth is not positive.
     """
-    if not 0 < depth < np.inf:
-        raise argument_error("depth", "positive", value=depth)
+    number("depth", depth, "positive")
     housing, numbers = _of_rig(result, cameras)
     sizes = [size_of(result, camera_number(result, each)) for each in cameras]
     pixels = image_grid(sizes[0], grid)[2]

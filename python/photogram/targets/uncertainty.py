@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, length, shaped, truth_value, value_field
+from photogram.arguments.arrays import argument_error, shaped, truth_value, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
@@ -61,7 +61,7 @@ def projection_uncertainty(
         If the camera does not exist, if the distance is not positive, or if arrays have other shapes.
     """
     truth_value("noise_only", noise_only)
-    where = shaped("pixels", pixels, (length("pixels", pixels), 2))
+    where = shaped("pixels", pixels, (None, 2))
     number = camera_number(result, camera)
     housing, own = housing_of(result, number)
     if noise_only:
@@ -155,7 +155,7 @@ def uncertainty_against_distance(
     truth_value("noise_only", noise_only)
     number = camera_number(result, camera)
     place = shaped("pixel", pixel, (2,))
-    away = shaped("distances", distances, (length("distances", distances),))
+    away = shaped("distances", distances, (None,))
     sd = [
         worst(projection_uncertainty(result, number, place[np.newaxis], each, datum, noise_only))[0]
         for each in away.tolist()

@@ -119,8 +119,7 @@ class KnownFilm(Observation):
             raise kind_error(f"known of the film of {self.photo}", f"some of {', '.join(FILM)}", known)
         self._set("known", known)
         super().__post_init__()
-        values = shaped(f"values of {self.name}", self.values, (len(known),))
-        require(np.isfinite(values).all(), f"values of {self.name}", "finite", value=values.tolist())
+        values = shaped(f"values of {self.name}", self.values, (len(known),), "finite")
         self._set("observed", np.concatenate([[FILM.index(name) for name in known], values]))
 
     @property

@@ -198,10 +198,7 @@ def _related(kind: type[Observation], count: int, given: Mapping[str, Sequence[A
     none: Sequence[Any] = [None] * count
     found: dict[str, Any] = {}
     if "time" in given:
-        what = f"time of the {kind.KIND}"
-        times = shaped(what, given["time"], (count,))
-        require(np.isfinite(times).all(), what, "finite", value=times.tolist())
-        found["time"] = times.tolist()
+        found["time"] = shaped(f"time of the {kind.KIND}", given["time"], (count,), "finite").tolist()
     trajectories, clocks = (given.get(name, none) for name in ("trajectory", "clock"))
     for name, column, of in (("trajectory", trajectories, Trajectory), ("clock", clocks, Clock)):
         for value in _distinct(column):

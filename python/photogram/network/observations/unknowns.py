@@ -54,9 +54,9 @@ class Prior(Observation):
         if self.value is None:
             return
         count = len(self.unknown.components)
-        value = shaped(f"value of {self.name}", self.value, (count,))
-        good = np.isfinite(value).all() and count <= 3
-        require(good, f"value of {self.name} (not of rotations)", "finite", value=value.tolist())
+        what = f"value of {self.name} (not of rotations)"
+        value = shaped(what, self.value, (count,), "finite")
+        require(count <= 3, what, "finite", value=value.tolist())
         self._set("value", value)
         self._set("observed", value - self.unknown.position[:count])
 
@@ -151,11 +151,10 @@ class Smoothness(Observation):
         self._set("coefficients", own)
         super().__post_init__()
         self._set("unknowns", own)
-        factors = shaped("factors of a smoothness", self.factors, (len(own),))
+        factors = shaped("factors of a smoothness", self.factors, (len(own),), "finite")
         self._set("factors", factors)
-        observed = np.concatenate([shaped("observed_sum", self.observed_sum, (3,)), factors])
-        require(np.isfinite(observed).all(), f"values of {self.name}", "finite", value=observed.tolist())
-        self._set("observed", observed)
+        total = shaped("observed_sum of a smoothness", self.observed_sum, (3,), "finite")
+        self._set("observed", np.concatenate([total, factors]))
 
     @property
     def label(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,15 +27,12 @@ _UNPAIRED = re.compile("[\ud800-\udfff]")
 _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
 
+POSITIVE = partial(number, rule="positive")
+
+
 def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> InputError:
     """Return the error for an invalid value."""
     return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
-
-
-def _positive(name: str, value: Any) -> float:
-    if not 0 < (found := number(name, value)) < math.inf:
-        raise invalid(name, "error.positive", value)
-    return found
 
 
 def _text(name: str, value: object) -> str:
@@ -88,10 +86,7 @@ def _length(name: str, value: Any) -> dict[str, Any]:
         if key not in row:
             raise invalid(name, "error.missing", name=key)
     line, first, last = names(name, [row[key] for key in ("line", "from", "to")])
-    figures = {key: number(f"{name} {key}", row[key]) for key in ("length", "sd")}
-    for key, value in figures.items():
-        if not 0 <= value < math.inf:
-            raise invalid(f"{name} {key}", "error.not-negative", value)
+    figures = {key: number(f"{name} {key}", row[key], "not-negative") for key in ("length", "sd")}
     if row.get("temperature") is not None:
         figures["temperature"] = number(f"{name} temperature", row["temperature"])
     return {"line": line, "from": first, "to": last, **figures}
@@ -154,8 +149,8 @@ class Asked:
     """
 
     standards: tuple[str, ...] = _option(_several, default=("asprs-2023", "plain"))
-    classes: Mapping[str, float] = _option(_by_name(_positive), default_factory=dict)
-    area: float | None = _option(_positive)
+    classes: Mapping[str, float] = _option(_by_name(POSITIVE), default_factory=dict)
+    area: float | None = _option(POSITIVE)
     sd: tuple[float, ...] | None = _option(_three)
     without: Mapping[str, str] = _option(_by_name(_text), default_factory=dict)
     independent: str | None = None
