@@ -15,6 +15,7 @@ from photogram.arguments.types import FREE, ONE, Array, Floats, IndexArray
 from photogram.collection.parameters import POSE, parameters_of
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
+from photogram.network.block import span
 from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation, Observations
 from photogram.network.tables import numbered
@@ -102,18 +103,11 @@ class Collection(Valued, Brief):
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the collection, as shown by its `repr` and in notebooks."""
-        low, high = self.image_sd.min(initial=np.inf), self.image_sd.max(initial=0.0)
+        fixed, sd = int((self.photo_sd == 0).all(axis=1).sum()), span(self.image_sd)
         return "Collection", [
-            (
-                "photos",
-                f"{len(self.photo_parameters):,}, {int((self.photo_sd == 0).all(axis=1).sum()):,} fixed",
-            ),
-            ("points", f"{len(self.point_positions):,}"),
-            (
-                "images",
-                f"{len(self.image_xy):,}, px, sd "
-                + (f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"),
-            ),
+            ("photos", str(phrase("brief.photos", n=len(self.photo_parameters), fixed=fixed))),
+            ("points", str(phrase("brief.points", n=len(self.point_positions)))),
+            ("images", str(phrase("brief.images", n=len(self.image_xy), unit="px", sd=sd))),
             ("camera", f"{self.camera}: {', '.join(self.parameters[len(POSE) :])}"),
         ]
 

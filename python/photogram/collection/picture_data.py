@@ -14,6 +14,7 @@ from photogram.network.cameras import Camera
 from photogram.plots.picture_data import Correlated, Curve, Curves, Plan
 from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part
 from photogram.results.picture_data import PicturedNetwork
+from photogram.show.page import about
 
 if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
@@ -82,7 +83,7 @@ class PicturedCollection(PicturedNetwork):
         """One common frame for the cameras of all photos."""
         photos = len(self.result.photo_parameters)
         together = np.zeros(photos, dtype=np.int64)
-        return together, [f"cameras of all {photos} photos"], self._camera(0).image_y == "down"
+        return together, [about("cameras.all", n=photos)], self._camera(0).image_y == "down"
 
     @property
     def correlations(self) -> list[Correlated]:
@@ -98,7 +99,7 @@ class PicturedCollection(PicturedNetwork):
         if len(free) < 2 or not good.any():
             return []
         parameters = [result.collection.parameters[k] for k in free]
-        remark = f"medians of the {int(good.sum())} photos"
+        remark = about("cameras.medians", n=int(good.sum()))
         return [Correlated("cameras", parameters, np.median(tables[good], axis=0), remark)]
 
     @property
@@ -126,7 +127,7 @@ class PicturedCollection(PicturedNetwork):
         band = curve_deviations(covariance, terms, partials)
         return [
             Curves(
-                camera=f"{len(chosen)} of {len(used)} photos ({model}); black: photo {photo}, their middle",
+                camera=about("cameras.curves", n=len(chosen), all=len(used), model=model, photo=photo),
                 unit="px",
                 radii=radii,
                 observed=self._reach,

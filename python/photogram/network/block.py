@@ -193,16 +193,16 @@ class Block(Valued, Brief):
         held, known = np.isfinite(self.point_sd).any(axis=1), np.isfinite(self.point_positions).any(axis=1)
         counts = {"control": held.sum(), "with known coordinates": (known & ~held).sum()}
         kinds_of_points = ", ".join(f"{count:,} {name}" for name, count in counts.items())
-        distances = self.principal_distances
-        spheroid = self.spheroid
+        distances, spheroid = self.principal_distances, self.spheroid
+        c, images = None if distances is None else span(distances), span(self.image_sd)
         kinds = {own.label: len(own.rows) for own in self.observations.columns}
         rows = [
             ("photos", few(self.photo_ids)),
             ("points", few(self.point_ids)),
             ("", kinds_of_points),
-            ("images", f"{len(self.image_xy):,}, {self.image_unit}, sd {_span(self.image_sd)}"),
-            ("cameras", few(self.camera_names) if distances is None else f"c {_span(distances)} mm"),
-            ("space", f"geographic, a = {spheroid.a:g}" if spheroid else "rectangular"),
+            ("images", str(phrase("brief.images", n=len(self.image_xy), unit=self.image_unit, sd=images))),
+            ("cameras", few(self.camera_names) if c is None else str(phrase("brief.distances", c=c))),
+            ("space", str(phrase("brief.geographic", a=spheroid.a) if spheroid else "rectangular")),
             ("unit", self.linear_unit),
         ]
         if kinds:
@@ -406,10 +406,10 @@ class Block(Valued, Brief):
         return own
 
 
-def _span(values: Floats) -> str:
-    """Format the range of some values; a single number if they are equal."""
+def span(values: Floats) -> Phrase:
+    """Return the range of some values; a single number if they are equal."""
     low, high = (float(values.min()), float(values.max())) if values.size else (math.nan, math.nan)
-    return f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
+    return phrase(f"brief.span{'.equal' if low == high else ''}", low=low, high=high)
 
 
 def flown_by(block: Block) -> Phrase | None:

@@ -135,13 +135,15 @@ class Camera(Valued, Brief):
         rows = []
         for name, value, sd in zip(self.names, self.values, self.deviations, strict=True):
             if value != 0 or sd > 0 or name in _GIVEN:
-                known = "" if sd == 0 else ", free" if math.isinf(sd) else f", sd {sd:.3g}"
-                rows.append((name, f"{value:.8g} {self.unit_of(name)}".rstrip() + known))
+                code = f"brief.parameter.{'fixed' if sd == 0 else 'free' if math.isinf(sd) else 'weighted'}"
+                unit = f" {self.unit_of(name)}".rstrip()
+                rows.append((name, str(phrase(code, value=float(value), unit=unit, sd=float(sd)))))
         if len(rows) < len(self.names):
-            rows.append(("", f"all {len(self.names) - len(rows)} others are 0 and held"))
+            rows.append(("", str(phrase("brief.zero", n=len(self.names) - len(rows)))))
         if self.knots is not None:
             height, width, _ = self.knots.shape
-            rows.append(("knots", f"{width} x {height}" + ("" if np.any(self.knot_sd) else ", held")))
+            code = f"brief.knots.{'free' if np.any(self.knot_sd) else 'fixed'}"
+            rows.append(("knots", str(phrase(code, width=width, height=height))))
         return f"{title}, {self.unit}", rows
 
     @property

@@ -242,7 +242,7 @@ RADII = 9  # Rows of a distortion curve
 
 def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     found = calibrations(result)
-    shown, note = found[:LISTED], "the table of cameras has all"
+    shown, note = found[:LISTED], about("cameras.others")
     law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
     tables = [parameters_table(each, law) for each in shown]
     groups = [group for each in shown for group in each.groups]
@@ -254,7 +254,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     ]
     parts += [*drawings, Layers("curve-layers", curves)]
     remarks = [
-        f"{each.camera.name}: {sentence}"
+        about("cameras.remark", camera=each.camera.name, sentence=sentence)
         for each in shown
         for sentence in (
             *(about("correlated", **vars(pair)) for pair in each.correlations),
@@ -273,7 +273,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
                 if value != 0
             ),
             each.camera.unit or "",
-            f"{each.photos} photos, {each.images} images",
+            about("camera.used", photos=each.photos, images=each.images),
         )
         for each in held[:LISTED]
     ]
@@ -321,14 +321,9 @@ def parameters_table(found: Calibration, law: str = "") -> Table:
 
 
 def outcome(each: ParameterTest) -> str:
-    words = ["significant" if each.significant else "not significant"]
-    if not each.is_lens:
-        words = ["differs from the given value" if each.significant else "as given"]
-    if not each.separable:
-        words.append("not separable")
-    if each.from_prior:
-        words.append("from its prior")
-    return ", ".join(words)
+    code = "not-" * (not each.significant) + ("significant" if each.is_lens else "different")
+    holds = {code: True, "not-separable": not each.separable, "from-prior": each.from_prior}
+    return ", ".join(about(f"outcome.{code}") for code in holds if holds[code])
 
 
 def _terms_together(groups: Sequence[TermsTest]) -> Table:

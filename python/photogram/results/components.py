@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -34,9 +34,6 @@ from photogram.statistics.components import Component, Estimate
 from photogram.statistics.findings import Findings, GroupFactor
 from photogram.statistics.variance_function import FunctionEstimate
 from photogram.words import Phrase, phrase
-
-if TYPE_CHECKING:
-    pass
 
 INCHES_OF_COMPONENT = 0.32
 MARGIN = 1.1  # Limits relative to the extreme values
@@ -89,7 +86,7 @@ class VarianceComponents(Judged, Tabular, Brief):
         up = (len(self.components) - 0.5, -0.5)
         limits = np.column_stack([(known.min() / MARGIN, known.max() * MARGIN), up])
         given = Line(np.column_stack([[1.0, 1.0], up]), FAINT, 0.8)
-        across = "factor of the given standard deviation, 95 percent; circles: held"
+        across = about("components.factors")
         names = [each.name for each in self.components]
         panel = Panel(limits, [given, *marks], "", across, up_names=names, log_across=True)
         return Plot(6.4, 1.6 + INCHES_OF_COMPONENT * len(self.components), [panel])
@@ -155,9 +152,7 @@ def components_section(found: VarianceComponents) -> Section:
 def components_table(found: VarianceComponents) -> Table:
     rows, reference = found.components, found.estimate.reference
     low, high = np.array([each.interval for each in rows]).reshape(-1, 2).T
-    outcomes = [
-        "held" if each.held else "to be changed" if each.worth_changing else "stands" for each in rows
-    ]
+    codes = ["fixed" if each.held else "to-change" if each.worth_changing else "unchanged" for each in rows]
     held = np.array([bool(each.held) for each in rows], dtype=bool)
     columns = [
         of_each(rows, "name", kind="name", name="group", head="Group"),
@@ -175,7 +170,7 @@ def components_table(found: VarianceComponents) -> Table:
         of_each(rows, "probability", name="probability", head="p", figures=2, seen=~held),
         of_each(rows, "significant", name="significant"),
         of_each(rows, "held", kind="name", name="held"),
-        Quantity(outcomes, kind="name", head="Outcome"),
+        Quantity([about(f"outcome.{code}") for code in codes], kind="name", head="Outcome"),
     ]
     return Table("components", "Components", columns, about("components.interval"))
 

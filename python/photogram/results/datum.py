@@ -209,7 +209,7 @@ class CheckPoints:
     # (k, 3) standard deviations of the given coordinates; assumed values if none were given
     given_sd: Floats
     assumed: Bools  # (k,) whether the given deviations are assumed
-    untested: str  # Reason for a missing test; empty with a test
+    untested: Phrase | None  # Reason for a missing test; None with a test
     agreement: Agreement | None = None  # Tests, if any
 
 
@@ -222,13 +222,13 @@ def check_points(result: Result) -> CheckPoints:
     rows = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
     differences = result.point_differences[rows]
     obstacles = {
-        "there are none": not len(rows),
-        "the datum of the network is chosen, and theirs is another": result.datum.is_chosen,
-        "all photos are fixed, and no standard deviation has their errors": not result.photo_given_sd.any(),
-        "the adjustment has not converged": not result.converged,
-        "covariances were not computed": not np.isfinite(result.point_cofactors[rows]).all(),
+        "none": not len(rows),
+        "datum": result.datum.is_chosen,
+        "fixed": not result.photo_given_sd.any(),
+        "not-converged": not result.converged,
+        "no-covariances": not np.isfinite(result.point_cofactors[rows]).all(),
     }
-    untested = next((reason for reason, holds in obstacles.items() if holds), "")
+    untested = next((Phrase(f"untested.checks-{code}") for code, holds in obstacles.items() if holds), None)
     names, sd = tuple(block.point_ids[row] for row in rows.tolist()), result.point_sd[rows]
     given = np.full((len(rows), 3), math.nan) if block.point_check_sd is None else block.point_check_sd[rows]
     lacking: Bools = np.asarray((np.isnan(given) & np.isfinite(differences)).any(axis=1))

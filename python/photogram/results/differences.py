@@ -10,10 +10,9 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import listed
 from photogram.results.covariance import Things, adjusted
 from photogram.results.result import Result
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 _KINDS = ("photo", "point", "camera", "unknown")
 
@@ -26,9 +25,12 @@ class Largest:
     name: str = ""
     component: str = ""
 
+    @property
+    def phrase(self) -> Phrase:
+        return Phrase(f"differences.size{'.of' if self.kind else ''}", vars(self))
+
     def __str__(self) -> str:
-        of = f" ({self.component} of {self.kind} {self.name})" if self.kind else ""
-        return f"{self.size:.3g}{of}"
+        return str(self.phrase)
 
 
 @dataclass(frozen=True)
@@ -57,14 +59,14 @@ class Differences:
 
     def __str__(self) -> str:
         lines = [
-            f"{self.compared} unknowns compared",
-            f"values differ by at most {self.values} standard deviations",
-            f"standard deviations differ by at most a part of {self.deviations}",
+            phrase("differences.compared", n=self.compared),
+            phrase("differences.values", largest=self.values.phrase),
+            phrase("differences.deviations", largest=self.deviations.phrase),
         ]
         if self.variance is not None:
-            lines.append(f"ratio of the variances of unit weight {self.variance:.9g}")
-        lines += [f"in one only, of the kind {kind}: {listed(names)}" for kind, names in self.alone.items()]
-        return "\n".join(lines)
+            lines.append(phrase("differences.variance", ratio=self.variance))
+        lines += [phrase("differences.alone", kind=kind, names=own) for kind, own in self.alone.items()]
+        return "\n".join(map(str, lines))
 
 
 def differences(first: Result, second: Result) -> Differences:

@@ -84,7 +84,7 @@ def _size_section(result: Result) -> Section:
     variance, more = result.variance_of_unit_weight, list[Fact]()
     if result.dropped:
         reasons = Counter(result.dropped.values()).items()
-        note = ", ".join(f"{count}: {reason}" for reason, count in reasons)
+        note = ", ".join(about("dropped", n=count, reason=reason) for reason, count in reasons)
         more.append(Fact.of("Points left out", len(result.dropped), note=note))
     note = about(f"unit-variance.{result.unit_variance}")
     good = [Fact.of("Variance of unit weight", variance, note=note, decimals=6)]
@@ -149,9 +149,9 @@ def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
     figures = []
     for name, order in (("of the input", None), ("chosen", result.photo_order)):
         found = structure(*images, order)
-        value = f"{found.effective_bandwidth} effective, {found.naive_bandwidth} without sharing"
-        figures.append((f"in the order {name}", value))
-    return "bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)", figures
+        sizes = {"effective": found.effective_bandwidth, "naive": found.naive_bandwidth}
+        figures.append((f"in the order {name}", about("bandwidth.sizes", **sizes)))
+    return about("bandwidth"), figures
 
 
 def _members(result: Result) -> dict[str, Any]:

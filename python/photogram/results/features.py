@@ -95,9 +95,7 @@ class Feature:
         """The result of the test of form; empty without a test."""
         if self.probability is None:
             return ""
-        if self.probability < LEVEL:
-            return "the form deviates: more than standard deviations of points explain"
-        return "no deviation of form is proved: standard deviations of points explain all"
+        return about(f"form.{'deviates' if self.probability < LEVEL else 'agrees'}")
 
 
 @dataclass(frozen=True, eq=False)

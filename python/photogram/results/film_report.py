@@ -76,7 +76,7 @@ def mean_mark_residuals(result: Result) -> list[VectorField]:
         count = np.unique(residuals.photos[own]).size
         found.append(
             VectorField(
-                f"{name}: residuals of marks, mean of {count} photos",
+                about("marks.mean", camera=name, n=count),
                 np.array([marks[mark].position[:2] for mark in names]),
                 np.array([residuals.xy[own & (of_marks == mark)].mean(axis=0) for mark in names]),
                 tuple(mark.removeprefix(f"{name} ") for mark in names),
@@ -100,7 +100,7 @@ def film_patterns(result: Result) -> list[VectorField]:
         still = Film(FilmPlacement("still"), FilmSize("still"), Scanner("still"), Readings(), pattern=pattern)
         vectors = np.array([own.get(id(each), each.position) for each in still.unknowns])
         readings, _ = _photocore.film_readings(still.numbers(), vectors, places)
-        title = f"{pattern.weights[0].name}: pattern {pattern.kind}"
+        title = about("film.pattern", name=pattern.weights[0].name, kind=pattern.kind)
         found.append(VectorField(title, places, readings - places))
     return found
 

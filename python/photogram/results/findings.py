@@ -13,10 +13,8 @@ from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Undetermined
 from photogram.network.block import Block
+from photogram.results import hypotheses
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
-from photogram.results.hypotheses import FEWEST as FEWEST_MOVED
-from photogram.results.hypotheses import SHARE as SHARE_MOVED
-from photogram.results.hypotheses import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
@@ -63,7 +61,7 @@ def network_findings(
     test = _robust_test(result) if result.loss else result.global_test
     assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
-    rivals, known = largest_odds(fixed), result.KNOWN and summary is not None
+    rivals, known = hypotheses.largest_odds(fixed), result.KNOWN and summary is not None
     return Findings(
         status=result.status,
         observations=[
@@ -106,7 +104,7 @@ def _unchecked_control(result: AdjustedNetwork, types: Iterable[TypeFactor]) -> 
     sd = result.point_sd[result.used_points & ~weighted.any(axis=1)]
     checks = getattr(result, "check_points", None)
     shown = math.inf if checks is None or checks.agreement is None else np.nanmedian(checks.agreement.sd)
-    fewest = max(FEWEST_MOVED, math.ceil(SHARE_MOVED * np.count_nonzero(result.used_points)))
+    fewest = max(hypotheses.FEWEST, math.ceil(hypotheses.SHARE * np.count_nonzero(result.used_points)))
     return [
         phrase("unchecked.sd", kind=each.group, factor=each.undetected)
         for each in found
@@ -173,11 +171,11 @@ def block_findings(result: Result) -> Findings:
     )
 
 
-def left_open(result: AdjustedNetwork) -> list[str]:
+def left_open(result: AdjustedNetwork) -> Sequence[Text]:
     """Return the names of undetermined or poorly determined adjusted values."""
     said = [each.what for each in result.messages if isinstance(each, Undetermined)]
     lengths = [
-        f"{name} of {camera.name}, {value:.6g} with a standard deviation of {sd:.3g}"
+        phrase("named.uncertain", name=name, camera=camera.name, value=value, sd=sd)
         for camera in getattr(result, "cameras", ())
         for name, value, sd in zip(camera.names, camera.values, camera.sd, strict=True)
         if name in DISTANCES and sd > UNKNOWN * abs(value)
@@ -193,7 +191,8 @@ def _on_checks(result: Result) -> list[Phrase]:
     if not checks.assumed.any():
         return []
     own = zip(checks.given_sd[checks.assumed][0].tolist(), axes, strict=True)
-    sd = list(dict.fromkeys(f"{value * axis.factor:.2g} {axis.small}" for value, axis in own))
+    sizes = dict.fromkeys((value * axis.factor, axis.small) for value, axis in own)
+    sd = [phrase("part.size", value=value, unit=unit) for value, unit in sizes]
     fields = {"assumed": int(checks.assumed.sum()), "n": len(checks.rows), "sd": sd}
     return [Phrase("line.checks-assumed", {**fields, "how": Phrase("how.checks")})]
 

@@ -81,7 +81,7 @@ class TermsTest:
 
     @property
     def outcome(self) -> str:
-        return "significant" if self.significant else "not significant"
+        return about(f"outcome.{'' if self.significant else 'not-'}significant")
 
     @property
     def worth_keeping(self) -> bool:

@@ -148,29 +148,33 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
 
     def brief(self) -> tuple[str, Rows]:
         """Return a summary of the adjustment for its `repr` and notebooks."""
+        from photogram.show.page import about, significant  # only required for a summary
+
         used = self.used_images
         rms = np.sqrt((self.residuals[used] ** 2).mean(axis=0)) if used.any() else np.zeros(2)
         s0 = self.variance_of_unit_weight
+        x, y = rms.tolist()
+        points = {"n": int(self.used_points.sum()), "all": len(self.point_rays)}
         rows = [
-            ("status", f"{self.status}, {len(self.iterations)} iterations"),
-            ("photos", f"{len(self.photo_cofactors):,}"),
-            ("points", f"{int(self.used_points.sum()):,} of {len(self.point_rays):,} took part"),
-            ("images", f"{int(used.sum()):,} of {len(used):,} took part"),
-            ("residuals", f"rms {rms[0]:.3g}, {rms[1]:.3g} {self.given.image_unit}"),
-            ("freedom", f"{self.degrees_of_freedom:,.6g}"),
-            ("sigma0", "a priori: there are no degrees of freedom" if s0 is None else f"{math.sqrt(s0):.4g}"),
+            ("status", about("brief.status", status=self.status, n=len(self.iterations))),
+            ("photos", about("count", n=len(self.photo_cofactors))),
+            ("points", about("brief.used", **points)),
+            ("images", about("brief.used", n=int(used.sum()), all=len(used))),
+            ("residuals", about("brief.residuals", x=x, y=y, unit=self.given.image_unit)),
+            ("freedom", about("brief.freedom", n=self.degrees_of_freedom)),
+            ("sigma0", about("brief.a-priori") if s0 is None else significant(math.sqrt(s0), 4)),
         ]
         # Tests of many observations require some time.
         if len(used) <= JUDGED:
             rows.insert(0, ("verdict", self.verdict.headline))
         if self.loss is not None:
-            rows.append(("loss", f"{self.loss[0]}, scale {self.loss[1]:g}"))
+            rows.append(("loss", about("loss", name=self.loss[0], scale=self.loss[1])))
         rows += [("remark", str(message).splitlines()[0]) for message in self.messages[:REMARKS]]
         if len(self.messages) > REMARKS:
-            rows.append(("", f"and {len(self.messages) - REMARKS} more remarks"))
+            rows.append(("", about("brief.more-remarks", n=len(self.messages) - REMARKS)))
         rows.append(("see", ".report(), .plot, .photo_table(), .point_table(), .image_table(), .to_json()"))
-        title = getattr(self.given, "title", "")
-        return f"Adjusted {type(self.given).__name__.lower()}{f': {title}' if title else ''}", rows
+        title, kind = getattr(self.given, "title", ""), type(self.given).__name__.lower()
+        return about(f"brief.{kind}", title=f": {title}" if title else ""), rows
 
     @property
     @abstractmethod

@@ -128,9 +128,9 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
     }
 
 
-def used_fact(name: str, used: Bools, of: str = "used of") -> Fact:
+def used_fact(name: str, used: Bools, code: str = "used") -> Fact:
     """Return the number of used items of a type."""
-    return Fact(name, f"{np.count_nonzero(used)} {of} {used.size}")
+    return Fact(name, about(code, n=np.count_nonzero(used), all=used.size))
 
 
 def size_section(
@@ -150,7 +150,7 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     used, (axis, _) = result.used_images, result._terms.image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
     variance, sigma = result.variance_of_unit_weight, math.nan
-    note = "no degrees of freedom: covariances are scaled by 1"
+    note = about("expected.no-freedom")
     if variance is not None:
         sigma, note = math.sqrt(variance), ""
         for test in result.verdict.tests:
@@ -185,7 +185,7 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
         hidden, below = redundancy <= _NOT_CHECKED, about("redundancy-below", limit=_NOT_CHECKED)
         facts += [
             Fact.of("Redundancy numbers of images, mean and least", least, note=note, decimals=3),
-            replace(used_fact("Image coordinates that nothing checks", hidden, "of"), note=below),
+            replace(used_fact("Image coordinates that nothing checks", hidden, "share"), note=below),
         ]
     return facts
 
@@ -221,7 +221,7 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
         *(
             Fact(
                 f"Multiply-adds if eliminated {about(f'ordering.{name}')}",
-                "too large for this ordering" if math.isnan(count) else significant(count, 4),
+                about("ordering.too-large") if math.isnan(count) else significant(count, 4),
             )
             for name, count in result.predictions.items()
             if name != result.ordering

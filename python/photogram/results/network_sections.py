@@ -188,8 +188,7 @@ def stations_section(result: AdjustedNetwork) -> Section:
         ]
         key, title = f"stations-{caption.lower()}", f"{caption} of photos"
         tables.append(component_table(key, title, columns, there[:, of], own.standardized[:, of], sd[:, of]))
-    *others, last = [caption.lower() for caption in layers]
-    intro = f"{', '.join(others).capitalize()} and {last} that were given with standard deviations."
+    intro = about("stations", layers=[caption.lower() for caption in layers])
     return Section("stations", "Observed photos", [Layers("stations-layers", tables)], intro)
 
 

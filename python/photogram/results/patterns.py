@@ -106,7 +106,7 @@ def _cameras(result: Result) -> list[CameraImages]:
     """Return the cameras of a block; one if it has principal distances."""
     block = result.block
     if block.photo_cameras is None:
-        return [CameraImages("the camera", np.ones(len(block.photo_ids), dtype=bool), 0)]
+        return [CameraImages(str(phrase("test.camera")), np.ones(len(block.photo_ids), dtype=bool), 0)]
     return [
         CameraImages(each.name, block.photo_cameras == row, int(np.count_nonzero(each.information)))
         for row, each in enumerate(result.cameras)
@@ -297,7 +297,7 @@ def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
     found: list[_Pattern] = []
     for camera in _cameras(result):
         own = np.flatnonzero(camera.photos[photos] & tested)
-        found.append((f"pattern over the frame of {camera.name}", "B", partial(bins, own)))
-        found.append((f"neighbours in the frame of {camera.name}", "I", partial(alike, own)))
+        found.append((str(phrase("drawn.frame", camera=camera.name)), "B", partial(bins, own)))
+        found.append((str(phrase("drawn.neighbours", camera=camera.name)), "I", partial(alike, own)))
     along = partial(fits.durbin_watson, photos, len(block.photo_ids), redundancy=redundancy)
-    return [*found, ("one photo and the next", "d", along)]
+    return [*found, (str(phrase("drawn.photos")), "d", along)]

@@ -24,6 +24,7 @@ from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
 from photogram.results.tables import Tests
+from photogram.show.page import about
 from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length
@@ -160,13 +161,13 @@ class PicturedBlock(PicturedNetwork):
         names = block.camera_names
         if not names:
             distances = dict.fromkeys(block.known_distances("pictures").tolist())
-            names = [f"c = {distance:g} {block.image_unit}" for distance in distances]
+            names = [about("camera.distance", c=distance, unit=block.image_unit) for distance in distances]
         down = bool(block.cameras) and block.cameras[0].image_y == "down"
         if not self.scanned.any():
             return cameras, names, down
         # Samples and lines are not frame coordinates: they have a separate plot.
         cameras = np.where(self.scanned, cameras + len(names), cameras)
-        return cameras, [*names, *(f"{name}, scanned" for name in names)], down
+        return cameras, [*names, *(about("camera.scanned", name=name) for name in names)], down
 
     @cached_property
     def scanned(self) -> Bools:
@@ -192,7 +193,7 @@ class PicturedBlock(PicturedNetwork):
         found = self.result.features or Features(())
         return [
             plots.Deviations(
-                f"{each.name}: {each.kind} through {len(each.points)} points",
+                about("feature.points", name=each.name, kind=each.kind, n=len(each.points)),
                 self.result.block.linear_unit,
                 each.points,
                 directions(each.kind),
@@ -220,11 +221,9 @@ def _bands(**sds: Floats) -> dict[str, Floats]:
 def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> plots.Curves:
     """Return the plotted distortion of a camera: the curve, and its balanced form."""
     unit = str(camera.camera.unit)
-    balanced = (
-        f"balanced at {curve.balanced_at:.4g} {unit}: principal distance {curve.balanced_distance:.6g} {unit}"
-    )
+    balanced = about("curve.balanced", at=curve.balanced_at, c=curve.balanced_distance, unit=unit)
     return plots.Curves(
-        camera=f"{camera.name} ({camera.camera.model}, {curve.direction})",
+        camera=about("curve.camera", name=camera.name, model=camera.camera.model, direction=curve.direction),
         unit=unit,
         radii=curve.radii,
         observed=curve.observed,
@@ -283,8 +282,6 @@ def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
     ]
     reach = float(semi_axes.max(initial=0.0))
     limits = around(np.vstack([field.positions, ends - reach, ends + reach]), 0.05)
-    title = (
-        f"{', '.join(field.names)} of {camera.name}: a width of the grid is"
-        f" {factor * scale * spacing:.3g} {written}"
-    )
+    size = {"size": factor * scale * spacing, "unit": written}
+    title = about("field.title", names=list(field.names), camera=camera.name, **size)
     return Plot(7.0, 6.0, [Panel(limits, marks, title, f"x, {unit}", f"y, {unit}", equal=True)])

@@ -58,8 +58,12 @@ class Inseparable:
     # in 95 of 100 cases; infinite if they are inseparable
     factor: float
 
+    @property
+    def sentence(self) -> Phrase:
+        return Phrase("inseparable", vars(self))
+
     def __str__(self) -> str:
-        return f"either {self.first} or {self.second} (correlation {self.correlation:.3f})"
+        return str(self.sentence)
 
 
 class Reliability(Tabular):
@@ -259,7 +263,8 @@ class Reliability(Tabular):
             column("group_detectable_sd", self.group_detectable[groups]),
             column("group_external_sd", self.group_external[groups]),
         ]
-        weight = "known" if self.known else f"estimated with {self.standing.degrees_of_freedom} degrees"
+        code = f"reliability-weight.{'known' if self.known else 'freedom'}"
+        weight = about(code, freedom=self.standing.degrees_of_freedom)
         note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
         if count := int(self.untestable.sum()):
             first = names[np.flatnonzero(self.untestable)[:3]].tolist()

@@ -108,7 +108,7 @@ class ReliabilitySummary:
         """Return the declared table of weakest observations in object `unit`."""
         *columns, own_point = self.listed.weakest
         columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
-        weight = "known" if self.known else "estimated"
+        weight = about(f"reliability-weight.{'known' if self.known else 'estimated'}")
         note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
         return Table("reliability.weakest", "Largest undetected errors", columns, note)
 
@@ -116,12 +116,12 @@ class ReliabilitySummary:
         """Return the parts of a section; `unit` is the unit of the object space."""
         listed, sentences = self.listed, list[str]()
         if listed.two_rays:
-            sentences.append(f"{listed.two_rays} points have two images: a wrong one cannot be identified")
+            sentences.append(about("reliability-two-rays", n=listed.two_rays))
         if listed.pairs:
-            more = listed.pairs_found - len(listed.pairs)
-            sentences.append("on other points cannot be told apart:")
-            sentences += [*map(str, listed.pairs), *([f"and {more} more"] if more > 0 else [])]
-        sentences = sentences or ["all observations of a point can be told apart"]
+            sentences += [about("reliability-pairs"), *map(str, listed.pairs)]
+        if (more := listed.pairs_found - len(listed.pairs)) > 0:
+            sentences.append(about("reliability-more", n=more))
+        sentences = sentences or [about("reliability-separable")]
         found = self.hypotheses
         errors = [found.tests(found.likely), found.external_reliability(found.effective)]
         shown = [replace(table, columns=for_people(table.columns)) for table in errors]

@@ -57,10 +57,11 @@ class Snooped(Brief, Documented):
         title, rows = self.result.brief()
         own = [
             ("verdict", self.verdict.headline),
-            ("tests", f"{self.outcome.tests:,}"),
+            ("tests", about("count", n=self.outcome.tests)),
             ("removed", few([entry.name for entry in self.removed])),
         ]
-        return f"{title}, without gross errors", [*own, *(row for row in rows if row[0] != "verdict")]
+        others = [row for row in rows if row[0] != "verdict"]
+        return about("brief.without-errors", title=title), [*own, *others]
 
     @property
     def verdict(self) -> Verdict:
@@ -119,7 +120,7 @@ class Snooped(Brief, Documented):
         """Return the network's document without removed observations, with the log."""
         network, log, count = self.result.document(), self.log, len(self.removed)
         remarks = [
-            *([] if log else ["Nothing was taken out."]),
+            *([] if log else [about("removed.nothing")]),
             *map(str, self.outcome.remarks),
             *(f"{each.sentence}: {each.reason}" for each in self.exchanged),
             *(f"{each.name}: {line}" for each in log for line in each.consequences),
@@ -128,8 +129,8 @@ class Snooped(Brief, Documented):
         parts += [log_table(log), _tests_table(log)]
         parts += [Remarks(remarks)] if remarks else []
         section = Section("removed", "What was taken out", parts, about("removed"))
-        removed = Fact.of("Taken out", count, note=f"of {len(self.suspects)} groups of observations")
-        highlights = [removed, *network.highlights]
+        note = about("removed.groups", n=len(self.suspects))
+        highlights = [Fact.of("Taken out", count, note=note), *network.highlights]
         return replace(
             network.with_members(lambda: {"snooping": self._members()}),
             highlights=highlights,
@@ -143,16 +144,15 @@ class Snooped(Brief, Documented):
         name, level = (
             ("Family level", options.level) if options.fdr is None else ("False discovery rate", options.fdr)
         )
-        tests = f"over {outcome.tests} tests, kept in all rounds"
-        biased = f"holds after removal of {len(self.removed)} groups: it is biased low by little"
-        taken_out = f"returned {returned}, suspect but kept {suspect}"
+        count = len(self.removed)
+        biased = about("removed.biased", n=count) if count else ""
         return [
-            Fact("Unit weight", "known: chi-square tests" if options.is_known else "unknown: F tests"),
-            Fact.of(name, level, note=tests),
+            Fact("Unit weight", about(f"unit-weight.{'known' if options.is_known else 'unknown'}")),
+            Fact.of(name, level, note=about("removed.tests", n=outcome.tests)),
             Fact("Unit variance before", _variance(outcome.before)),
-            Fact("Unit variance after", _variance(outcome.standing), note=biased if self.removed else ""),
+            Fact("Unit variance after", _variance(outcome.standing), note=biased),
             Fact.of("Rounds", len(outcome.rounds)),
-            Fact.of("Taken out", len(self.removed), note=taken_out),
+            Fact.of("Taken out", count, note=about("removed.others", returned=returned, kept=suspect)),
         ]
 
 
@@ -203,8 +203,8 @@ def log_table(log: Sequence[Removal]) -> Table:
         [members(one, "name", T="statistic") | members(one, "dimension", "odds") for one in each.rivals]
         for each in log
     ]
-    states = ["out" if each.returned is None else f"back in round {each.returned}" for each in log]
-    states = [f"kept: {each.kept}" if each.kept else state for each, state in zip(log, states, strict=True)]
+    codes = ["kept" if each.kept else "out" if each.returned is None else "back" for each in log]
+    states = [about(f"removed.{code}", **vars(each)) for code, each in zip(codes, log, strict=True)]
     columns = [
         of_each(log, "round", head="Round", decimals=0),
         of_each(log, "name", kind="name", head="What"),
@@ -260,13 +260,14 @@ def _variance(standing: Standing) -> str:
 
 def rivals_of(rivals: Iterable[Rival], figures: int) -> str:
     """Return alternatives to a removed group, with significant figures of their odds."""
-    return "; ".join(f"{rival.name} ({rival.odds:.{figures}g} : 1)" for rival in rivals)
+    code = f"rival.{figures}"
+    return "; ".join(about(code, name=rival.name, odds=rival.odds) for rival in rivals)
 
 
 def estimated_errors(entry: Removal) -> str:
     """Return the estimated errors of the components of a removed group."""
     rows = zip(entry.components, entry.error, entry.units, entry.error_sd, strict=True)
     return ", ".join(
-        f"{component} {error:.4g} {unit} (sd {sd:.2g})".replace("  ", " ")
+        about("estimated-error", component=component, error=error, unit=f" {unit}".rstrip(), sd=sd)
         for component, error, unit, sd in rows
     )

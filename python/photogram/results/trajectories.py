@@ -305,8 +305,8 @@ def _correction(
     worst = int(np.argmax(np.nan_to_num(sizes, nan=-1.0)))
     tests = np.abs(np.concatenate([each.standardized for each in own]))
     largest = float(np.nanmax(tests)) if np.isfinite(tests).any() else float("nan")
-    name = f"{type(basis).__name__.lower()} of degree {basis.degree}"
-    return name, len(own), first, last, float(sizes[worst]), float(times[worst]), largest
+    name = phrase(f"about.basis.{type(basis).__name__.lower()}", degree=basis.degree)
+    return str(name), len(own), first, last, float(sizes[worst]), float(times[worst]), largest
 
 
 def _times(basis: Basis, first: float, last: float) -> Floats:
@@ -331,8 +331,7 @@ def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], st
     order = np.argsort(-sizes, kind="stable")[:LISTED]
     kept = {id(own[row]) for row in order.tolist() if sizes[row] > NOTABLE}
     shown = [each for each in every if not isinstance(each.given, _MANY) or id(each) in kept]
-    both = {isinstance(each.given, Knot): None for each in own}
-    kinds = " and ".join("knots of lenses" if knot else "coefficients of trajectories" for knot in both)
-    which = f"{len(kept)} of " if kept else ""
-    what = f"with |test value| > {NOTABLE:g}, are" if kept else "are not"
-    return shown, f"{which}{len(own)} {kinds} {what} listed: the table of unknowns has all."
+    both = dict.fromkeys("knots" if isinstance(each.given, Knot) else "coefficients" for each in own)
+    kinds = [phrase(f"about.unknowns.{kind}") for kind in both]
+    code = f"about.unknowns.{'notable' if kept else 'unlisted'}"
+    return shown, str(phrase(code, n=len(kept), all=len(own), kinds=kinds, limit=NOTABLE))

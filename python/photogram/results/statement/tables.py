@@ -19,7 +19,7 @@ from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import lengths_in
 from photogram.results.statement.standards import MEASURES
 from photogram.results.statement.texts import Texts
-from photogram.show.page import Part, Section, decimals_of
+from photogram.show.page import Part, Section, about, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, column, frame, members, members_of_each
 from photogram.statistics.freedom import coverage_factor
 
@@ -185,16 +185,13 @@ def files_of_statement(statement: Statement) -> dict[str, bytes]:
     for name, reason in statement.compared.not_usable:
         values = {"point": name, "used": "no", "reason": reason, "cover": ""}
         columns = {key: [*column, values.get(key, math.nan)] for key, column in columns.items()}
-    about = f"lengths in {unit}; d: adjusted minus given, to the east, north and up"
     files = {
-        "check_points.csv": csv_text(columns, [about]),
+        "check_points.csv": csv_text(columns, [about("statement.check-points", unit=unit)]),
         "budget.csv": _budget_file(statement.taken_apart),
     }
     if statement.left_out:
-        about = f"lengths in {unit}; d: predicted by all others minus survey; no independent check"
-        files["leave_one_out.csv"] = csv_text(
-            frame(left_out_points(statement.texts, statement.left_out).columns), [about]
-        )
+        left_out = frame(left_out_points(statement.texts, statement.left_out).columns)
+        files["leave_one_out.csv"] = csv_text(left_out, [about("statement.leave-one-out", unit=unit)])
     if statement.removed:
         files["removed.csv"] = removed_observations(statement).csv()
     return files
