@@ -72,11 +72,13 @@ def remarks(result: Result) -> list[Message]:
     from photogram.diagnosis.film_lenses import lens_hints
     from photogram.diagnosis.film_marks import axis_hints, mark_hints
     from photogram.diagnosis.film_scans import line_hints, seam_hints
+    from photogram.diagnosis.mistakes import Adjuster
     from photogram.diagnosis.shutters import backward_readouts
 
     # A film in two pieces, or one that has changed along one axis, also makes marks fail.
-    films = seam_hints(result) or axis_hints(result) or mark_hints(result)
-    films += [*lens_hints(result), *line_hints(result)]
+    adjusted = Adjuster({}, (result.block, result))
+    films = seam_hints(result) or axis_hints(result, adjusted) or mark_hints(result)
+    films += [*lens_hints(result, adjusted), *line_hints(result)]
     return [*backward_readouts(result), *known_offsets(result), *films]
 
 

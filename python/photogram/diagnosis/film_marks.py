@@ -1,29 +1,28 @@
 """Misfitting fiducial marks of all photos, a photo, or a reading, with the cause.
 
-Films that have changed along one axis but are modelled as conformal leave a pattern at the marks. Let d be
-the mark readings of a photo, transformed to the camera frame, minus their certificate positions, with the
-covariance of both. d is fitted by a shift, a rotation and a scale, and then also by
-
-    d = (b1 x + b2 y, b2 x - b1 y)
-
-Along the axis at atan2(b2, b1)/2 the film is longer by h = sqrt(b1^2 + b2^2), and shorter across. The
-decrease of the weighted sum of squares is chi-square (2) if there is no such change.
+Films that have changed along one axis but are modelled as conformal leave a pattern at the marks. If the sum
+of squares of marks is too large, the block is adjusted with free b1 and b2 of these films. Along the axis at
+atan2(b2, b1)/2 a film is longer by 2 sqrt(b1^2 + b2^2) than across.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram import _photocore
+from photogram.diagnosis.mistakes import Adjuster, Proposal, explain_test
 from photogram.diagnosis.robust import critical
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
+from photogram.network.block import Block
 from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
-from photogram.network.unknowns import Unknown
-from photogram.results.film_report import mark_residuals
 from photogram.results.parts import ObservedKind
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
@@ -120,97 +119,62 @@ def _rows(kind: ObservedKind | None) -> Iterator[tuple[int, np.ndarray]]:
 
 FEWEST = 4  # Marks of a photo: three fit any axis
 CHANCE = 1e-3  # Probability of a hint in correct data
-EXPLAINED = 0.7  # Least explained part of the weighted sum of squares of a photo
-ALONE = 1e-6  # Least part of the largest column that is independent of the others
+DOUBTFUL = 0.05  # Level of the test of the marks of any photo
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """Relative film elongation of a photo along an axis, and its angle, degrees."""
-
-    photo: str
-    longer: float
-    angle: float
-    far: float
-
-
-def axis_hints(result: Result) -> list[Message]:
+def axis_hints(result: Result, adjusted: Adjuster) -> list[Message]:
     """Report photos with unmodelled film changes along one axis."""
-    held = {
+    read = result.block.observations.of_type(Fiducial)
+    count = Counter(each.photo for each in read)
+    names = result.block.photo_ids
+    conformal = {
         row: film
         for row, film in result.films
-        if not film.placement.is_held and (film.size.deviations[1:] == 0).all()
+        if not (film.placement.is_held or film.size.deviations[1:].any()) and count[names[row]] >= FEWEST
     }
-    found = list(_axes(result, held))
+    excess = _excess(result) if conformal else 0.0
+    proposal = Proposal("axis", phrase("film-check.axis"), partial(_freed, films=conformal))
+    meant = explain_test(result, [proposal], adjusted, excess) if excess else None
+    if meant is None:
+        return []
+    limit, changes, found = critical_chi_square(CHANCE / len(conformal), 2), meant[1].film[:, 4:], []
+    for row in conformal:
+        b = changes[row]
+        if b @ np.linalg.solve(meant[1].film_cofactors[row, 4:, 4:], b) > limit:
+            found.append((2.0 * float(np.hypot(*b)), names[row], np.degrees(np.arctan2(b[1], b[0]) / 2)))
     if not found:
         return []
-    found.sort(key=lambda each: -each.longer)
-    most = found[0]
-    message = phrase(
-        "film-check.axis",
-        photos=[each.photo for each in found],
-        photo=most.photo,
-        longer=most.longer,
-        angle=most.angle,
-        at_marks=1e3 * most.far,
-    )
-    return [Message(message)]
+    found.sort(reverse=True)
+    longer, photo, angle = found[0]
+    far = max(float(np.linalg.norm(each.mark.position[:2])) for each in read if each.photo == photo)
+    fields = {"longer": longer, "angle": float(angle), "at_marks": 1e3 * longer * far}
+    return [Message(phrase("film-check.axis", photos=[name for _, name, _ in found], photo=photo, **fields))]
 
 
-def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
-    """Yield photos with significant elongations that explain most of their misfit."""
-    if not films:
-        return
-    residuals, marks = mark_residuals(result), result.fiducials
-    kind = result.kinds.get(Fiducial.KIND)
-    read = [] if kind is None else [result.block.observations[row] for row in kind.rows.tolist()]
-    every = result.block.observations.of_type(KnownTogether)
-    known = [each for each in every if all(isinstance(own, Mark) for own in each.joined)]
-    limit = critical_chi_square(CHANCE / len(films), 2)
-    for photo, film in films.items():
-        own = np.flatnonzero(residuals.photos == photo).tolist()
-        if len(own) < FEWEST:
-            continue
-        adjusted = [marks[residuals.marks[k]] for k in own]
-        variances = film.readings.pitch**2 * np.concatenate([np.diag(read[k].precision) for k in own])
-        covariance = _certificate(known, [each.given for each in adjusted]) + np.diag(variances)
-        places = np.array([each.given.position[:2] for each in adjusted])
-        away = residuals.xy[own] + np.array([each.position[:2] for each in adjusted]) - places
-        whole, gain, b = _fitted(places, away.ravel(), covariance)
-        if gain > limit and gain > EXPLAINED * whole:
-            longer, far = 2.0 * float(np.hypot(*b)), float(np.linalg.norm(places, axis=1).max())
-            angle = float(np.degrees(np.arctan2(b[1], b[0]) / 2))
-            yield _Axis(result.block.photo_ids[photo], longer, angle, longer * far)
+def _excess(result: Result) -> float:
+    """Return the excess of the sum of squares; 0 unless the marks of a photo, or of a certificate, fail."""
+    squares, redundancy = Counter[str](), Counter[str]()
+    for kind in (result.kinds[name] for name in (Fiducial.KIND, CERTIFICATE) if name in result.kinds):
+        of_rows = (kind.redundancy * np.nan_to_num(kind.standardized) ** 2).sum(axis=1)
+        for row, own, r in zip(kind.rows.tolist(), of_rows, kind.redundancy.sum(axis=1), strict=True):
+            name = result.block.observations[row].of[0]
+            squares[name] += float(own)
+            redundancy[name] += float(r)
+    fails = (_photocore.chi_square(squares[name], redundancy[name]) for name in squares)
+    omega, freedom = result.sum_and_freedom
+    return omega - freedom if min(fails, default=1.0) * len(squares) < DOUBTFUL else 0.0
 
 
-def _certificate(known: list[KnownTogether], marks: list[Unknown]) -> Floats:
-    """Return the (2 n, 2 n) prior covariance of marks; 0 for errorless marks."""
-    first = {id(mark): 2 * k for k, mark in enumerate(marks)}
-    found = np.zeros((2 * len(marks),) * 2)
-    for each in known:
-        rows = [(k, first[id(mark)]) for k, mark in enumerate(each.joined) if id(mark) in first]
-        here = [at + axis for _, at in rows for axis in (0, 1)]
-        there = [2 * k + axis for k, _ in rows for axis in (0, 1)]
-        found[np.ix_(here, here)] = each.precision[np.ix_(there, there)]
-    return found
+def _freed(block: Block, films: Mapping[int, Film]) -> Block:
+    """Return a block with free b1 and b2 of some films."""
+    meant: dict[int, object] = {}
+    for film in films.values():
+        size = film.size.replace(sd=[film.size.deviations[0], np.inf, np.inf])
+        meant |= {id(film.size): size, id(film): replace(film, size=size)}
 
+    def freed(item: Any) -> Any:
+        changes = {name: meant[id(own)] for name, own in vars(item).items() if id(own) in meant}
+        return replace(item, **changes) if changes else item
 
-def _fitted(places: Floats, away: Floats, covariance: Floats) -> tuple[float, float, Floats]:
-    """Return the sum of squares of a conformal fit, its decrease by b1 and b2, and these.
-
-    Marks in one line cannot determine b1 and b2, which are then 0.
-    """
-    x, y = places.T
-    one, none = np.ones_like(x), np.zeros_like(x)
-    columns = [(one, none), (none, one), (x, y), (-y, x), (x, -y), (y, x)]
-    design = np.array([np.column_stack(each).ravel() for each in columns]).T
-    root = np.linalg.cholesky(covariance)
-    basis, triangle = np.linalg.qr(np.linalg.solve(root, design))
-    right = np.linalg.solve(root, away)
-    parts = basis.T @ right
-    size = np.abs(np.diag(triangle))
-    if size.min() < ALONE * size.max():
-        return 0.0, 0.0, np.zeros(2)
-    whole = float(right @ right - parts[:4] @ parts[:4])
-    b: Floats = np.linalg.solve(triangle[4:, 4:], parts[4:])
-    return whole, float(parts[4:] @ parts[4:]), b
+    observations, passages = ([*map(freed, own)] for own in (block.observations, block.passages))
+    return block.replace(observations=observations, passages=passages)

@@ -19,7 +19,7 @@ from photogram.results.result import Result
 from photogram.statistics.evidence import Evidence
 from photogram.words import Phrase, phrase
 
-RADIAL = re.compile(r"[Kk]([1-6])")
+RADIAL = re.compile(r"[AKk]([1-6])")
 SIGNIFICANT = 5.0
 PITCH = (1e-3, 3e-2)  # Range of pixel sizes of cameras, millimetres
 HALF, NEARLY = 0.5, 0.1  # Pixels
@@ -90,14 +90,17 @@ def _proposals(block: Block, adjusted: Adjuster) -> Iterator[Proposal]:
 
 
 def _scaled(block: Block, factors: list[float], power: int) -> Block:
+    """Multiply the radial terms of all cameras; see :func:`radial_scaled`."""
+    pairs = zip(block.cameras, factors, strict=True)
+    return block.replace(cameras=[radial_scaled(camera, factor, power) for camera, factor in pairs])
+
+
+def radial_scaled(camera: Camera, factor: float, power: int = 0) -> Camera:
     """Multiply radial terms by factor^(power number), or the factor if `power` is 0."""
-    cameras = []
-    for camera, factor in zip(block.cameras, factors, strict=True):
-        changed = dict(camera.parameters)
-        for name, number in _given_terms(camera).items():
-            changed[name] *= factor ** (power * number) if power else factor
-        cameras.append(replace(camera, parameters=changed))
-    return block.replace(cameras=cameras)
+    changed = dict(camera.parameters)
+    for name, number in _given_terms(camera).items():
+        changed[name] *= factor ** (power * number) if power else factor
+    return replace(camera, parameters=changed)
 
 
 def _free_ratio(block: Block, adjusted: Adjuster) -> float:
