@@ -1427,6 +1427,8 @@ class NetworkTrial:
         limit: float,
         effects: int,
         observed: _Floats | None = None,
+        check_sd: _Floats | None = None,
+        check_weights: _Floats | None = None,
     ) -> dict[str, Any]:
         """Test errors that sets of observations have in common, and errors of groups except images.
 
@@ -1454,15 +1456,19 @@ class NetworkTrial:
             Number of groups whose effects are computed: those of the largest bias-to-noise ratios.
         observed
             (P, 3) observed positions of photos; NaN if unknown. None: the adjusted ones.
+        check_sd, check_weights
+            (c, 3) standard deviations of the differences of the first c `checks`, and the inverse covariance
+            of all differences, row by row, zero for missing ones; None if only single points are tested.
 
         Returns
         -------
         Columns of the h hypotheses, those of s sets first: `code`, `group` (type as in `suspects`), `index`,
         `component` (-1 if a hypothesis has none), `observations`, `rank`, `statistic` T, `probability`,
         `redundancy` r, `noncentrality`, `bias_to_noise`; `estimate`, `plausible` (sizes) and `mdb`: (h, k)
-        with NaN for missing values. `effects` by row: points beyond the limit, the same without points of
-        the group, the largest change in standard deviations, its point and coordinate, the largest change,
-        and the changes of `checks`. `sets`: dictionaries with `parameters`, `plausible`, `estimate`, its
+        with NaN for missing values. `effects` by row: whether the check points detect the error, points
+        beyond the limit, points other than those of the group that the largest undetected error moves so far,
+        the largest change in standard deviations, its point and coordinate, the largest change, and the
+        changes of `checks`. `sets`: dictionaries with `parameters`, `plausible`, `estimate`, its
         `cofactors`, `error`, and the changes of `checks` by each parameter, (c, 3, k) row by row.
         `correlations`: (s, s), of the scores of sets.
         """

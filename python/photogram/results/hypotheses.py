@@ -29,7 +29,6 @@ FEWEST = 2  # Smallest number of other points that it moves
 EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise ratios
 DRAWN = 300  # Largest number of points whose changes are stored for plots
 RARE = 0.1  # Plausible errors of a set that may remain undetected
-DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
 OF_CAMERAS = frozenset(
     {
         *("camera-f", "camera-f-single", "camera-point", "camera-term", "readout-time"),
@@ -74,12 +73,13 @@ class Effect:
     """Effects of an undetected error on points, by the most changed coordinates."""
 
     checked: bool  # Whether check points detect it
-    changes: Floats  # (d, 3) changes of the `drawn` points
     points: int  # beyond the limit
-    others: int  # the same without the points that the error belongs to
+    # Points without those that the error belongs to, beyond the limit although check points exist
+    others: int
     ratio: float  # largest change, standard deviations
     at: tuple[int, int] | None  # point and coordinate of this change
     change: float  # largest change in the linear unit
+    changes: Floats  # (d, 3) changes of the `drawn` points
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,7 +312,7 @@ class Hypotheses:
     def external_reliability(self, rows: Indices | None = None) -> Table:
         """Return the declared table of undetected errors and their effects, of all hypotheses or of some."""
         rows = np.arange(len(self.code)) if rows is None else rows
-        none = Effect(False, np.empty((0, 3)), 0, 0, math.nan, None, math.nan)
+        none = Effect(False, 0, 0, math.nan, None, math.nan, np.empty((0, 3)))
         effects = [self.effects.get(row, none) for row in rows.tolist()]
         ids = self.suspects.given.point_ids
         at = [each.at and f"{self.axes[each.at[1]].name} of {ids[each.at[0]]}" for each in effects]
@@ -379,26 +379,23 @@ def hypotheses(
     timed, agreement = (core.pop(name, None) for name in ("timed", "agreement"))
     checks = len(core["checks"])
     core["checks"] = [*core["checks"], *drawn.tolist()]
+    joint: Joint | None = None
+    if agreement is not None:
+        core["check_sd"] = agreement.sd
+        if agreement.joint is not None:
+            flat, differences, covariance = agreement.joint
+            joint = flat, differences, np.linalg.inv(covariance)  # Once for all hypotheses
+            weights = np.zeros((3 * checks, 3 * checks))
+            weights[np.ix_(flat, flat)] = joint[2]
+            core["check_weights"] = weights.ravel()
     found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
-    joint: Joint | None = None
-    if agreement is not None and agreement.joint is not None:
-        flat, differences, covariance = agreement.joint
-        joint = flat, differences, np.linalg.inv(covariance)  # Once for all hypotheses
     groups = _groups(suspects, found["group"], found["index"])
     for row, (*sizes, changes) in found["effects"].items():
         of_checks, of_points = np.split(changes, [checks])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = np.zeros(0) if agreement is None else np.abs(of_checks) / agreement.sd
-        shown = float(np.square(np.nan_to_num(ratios, posinf=0.0)).max(initial=0.0))
-        if joint is not None and np.isfinite(moved := of_checks.ravel()[joint[0]]).all():
-            shown = max(shown, float(moved @ joint[2] @ moved))
-        # Residuals and check points together detect a smaller error.
-        ratio, least = sizes[2], DETECTED**2
-        detected = shown > least or ratio < limit * math.sqrt(1.0 + shown / least)
-        effects[row] = Effect(detected, of_points, *sizes)
+        effects[row] = Effect(*sizes, of_points)
         if not known or joint is None:
             continue
         group = int(groups[row])

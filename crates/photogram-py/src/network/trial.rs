@@ -76,7 +76,8 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
     let effects = PyDict::new(py);
     for (row, own) in all.iter_mut().enumerate() {
         if let Some(own) = own.effect.take() {
-            let effect = (own.points, own.others, own.ratio, own.at, own.change, table(py, own.checks)?);
+            let effect =
+                (own.checked, own.points, own.others, own.ratio, own.at, own.change, table(py, own.checks)?);
             effects.set_item(row, effect)?;
         }
     }
@@ -201,7 +202,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, check_sd=None, check_weights=None))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -219,9 +220,12 @@ impl NetworkTrial {
         limit: f64,
         effects: usize,
         observed: Option<Array<'_>>,
+        check_sd: Option<Array<'_>>,
+        check_weights: Option<PyReadonlyArray1<'_, f64>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let velocities = rows("velocities", &velocities)?;
         let observed = observed.map_or_else(|| Ok(vec![]), |own| rows("observed", &own))?;
+        let check_sd = check_sd.map_or_else(|| Ok(vec![]), |own| rows("check_sd", &own))?;
         let facts = Facts {
             velocities,
             times,
@@ -231,6 +235,8 @@ impl NetworkTrial {
             readouts,
             widths,
             checks,
+            check_sd,
+            check_weights: check_weights.map_or(vec![], |own| own.as_array().iter().copied().collect()),
             centre,
             estimated,
             detection,

@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::super::suspects::Home;
 use super::super::trial::Trial;
+use super::facts::Facts;
 use crate::Threads;
-use crate::adjustment::{AdditionalParameters, Leverages, Linearized};
+use crate::adjustment::{AdditionalParameters, Leverages, Linearized, detectable_noncentrality};
 use crate::geometry::ObjectSpace;
 
 /// Local points whose changes are computed; of more points, those at equal intervals.
@@ -16,8 +17,11 @@ const SAMPLE: usize = 2000;
 pub struct Effect {
     /// Points that change by more standard deviations than the limit; of large networks estimated from 2,000 points.
     pub points: usize,
-    /// The same without the points that the error belongs to.
+    /// Points that the error does not belong to, and that the largest error changes beyond the limit which neither residuals nor check
+    /// points detect.
     pub others: usize,
+    /// Whether the check points detect the error.
+    pub checked: bool,
     /// The largest change in standard deviations.
     pub ratio: f64,
     /// The point and the coordinate of this change; None if nothing changes.
@@ -41,6 +45,9 @@ pub(super) struct Sample<'a> {
     points: Vec<(usize, Vector3<f64>)>,
     /// Where the check points are among these.
     checks: Vec<Option<usize>>,
+    facts: &'a Facts,
+    /// lambda0 of a test of one parameter.
+    noncentrality: f64,
 }
 
 /// Changes of unknowns by errors, a column per error.
@@ -50,12 +57,12 @@ pub(super) struct Changes {
 }
 
 impl<'a> Sample<'a> {
-    pub fn new(trial: &'a Trial, found: &Leverages, linearized: &'a Linearized, checks: &[usize]) -> Self {
+    pub fn new(trial: &'a Trial, found: &Leverages, linearized: &'a Linearized, facts: &'a Facts) -> Self {
         let (model, points) = (&trial.assembled.problem.model, &trial.assembled.points);
         let stride = model.locals.div_ceil(SAMPLE).max(1);
         let mut locals: Vec<usize> = (0..model.locals).step_by(stride).collect();
         let interval = locals.len().max(1);
-        let places = checks.iter().map(|&point| trial.place.get(point).copied().flatten());
+        let places = facts.checks.iter().map(|&point| trial.place.get(point).copied().flatten());
         let places: Vec<Option<usize>> = places.collect();
         // Behind the others, which alone are counted.
         locals.extend(places.iter().flatten().filter(|&&place| place < model.locals));
@@ -71,7 +78,9 @@ impl<'a> Sample<'a> {
         };
         let checks = places.into_iter().map(find).collect();
         let points = locals.iter().copied().chain(model.locals..points.len()).map(of).collect();
-        Self { trial, linearized, locals, counted: interval, share, points, checks }
+        let (level, power) = facts.detection;
+        let noncentrality = detectable_noncentrality(level, power, 1.0, f64::INFINITY);
+        Self { trial, linearized, locals, counted: interval, share, points, checks, facts, noncentrality }
     }
 
     /// Changes by errors of parameters whose effects on unknowns that are not local are known.
@@ -123,8 +132,24 @@ impl<'a> Sample<'a> {
         found
     }
 
+    /// Noncentrality of the tests of the check points if they change: of all together, or of the worst coordinate.
+    fn shown(&self, changes: &[[f64; 3]]) -> f64 {
+        let ratios = changes.iter().flatten().zip(self.facts.check_sd.iter().flatten());
+        let single = ratios.map(|(change, sd)| (change / sd).powi(2)).filter(|own| own.is_finite());
+        let all: Vec<f64> = changes.iter().flatten().take(3 * self.facts.check_sd.len()).copied().collect();
+        // Missing differences have no weights.
+        let weighted = |row: &[f64]| {
+            row.iter().zip(&all).filter(|own| *own.0 != 0.0).map(|(w, own)| w * own).sum::<f64>()
+        };
+        let rows = self.facts.check_weights.chunks_exact(all.len().max(1)).zip(&all);
+        let rows = rows.filter(|(row, _)| row.iter().any(|w| *w != 0.0));
+        let together: f64 = rows.map(|(row, own)| own * weighted(row)).sum();
+        single.fold(if together.is_finite() { together } else { 0.0 }, f64::max)
+    }
+
     /// The effect of one of these errors; `own` are points that it belongs to.
-    pub fn effect(&self, changes: &Changes, error: usize, own: &[usize], limit: f64) -> Effect {
+    pub fn effect(&self, changes: &Changes, error: usize, own: &[usize]) -> Effect {
+        let limit = self.facts.limit;
         let model = &self.trial.assembled.problem.model;
         let is_geographic = matches!(model.space, ObjectSpace::Geographic(_));
         let first_other = 3 * model.locals;
@@ -138,8 +163,12 @@ impl<'a> Sample<'a> {
         let at_check = |at: &Option<usize>| {
             at.map_or([f64::NAN; 3], |index| std::array::from_fn(|axis| change(index, axis)))
         };
-        let checks = self.checks.iter().map(at_check).collect();
-        let mut effect = Effect { points: 0, others: 0, ratio: 0.0, at: None, change: 0.0, checks };
+        let checks: Vec<[f64; 3]> = self.checks.iter().map(at_check).collect();
+        let shown = self.shown(&checks);
+        // Residuals and check points together detect an error that is smaller by this factor.
+        let smaller = (1.0 + shown / self.noncentrality).sqrt();
+        let checked = shown > self.noncentrality;
+        let mut effect = Effect { points: 0, others: 0, checked, ratio: 0.0, at: None, change: 0.0, checks };
         let (mut points, mut others) = (0.0, 0.0);
         let retained = self.locals.len()..self.points.len();
         for index in (0..self.counted).chain(retained) {
@@ -159,7 +188,7 @@ impl<'a> Sample<'a> {
             if largest > limit {
                 let share = if index < self.counted { self.share } else { 1.0 };
                 points += share;
-                others += if own.contains(&point) { 0.0 } else { share };
+                others += if largest <= limit * smaller || own.contains(&point) { 0.0 } else { share };
             }
         }
         (effect.points, effect.others) = (points.round() as usize, others.round() as usize);

@@ -48,7 +48,7 @@ impl Trial {
         let failed = |error| NetworkError::new(error, &self.assembled);
         let linearized = found.linearized(problem, threads).map_err(failed)?;
         let criteria = Criteria::new(facts);
-        let sample = Sample::new(self, found, &linearized, &facts.checks);
+        let sample = Sample::new(self, found, &linearized, facts);
         let mut singles = single_errors(self, found, &criteria, threads);
         let worst = worst(&singles, facts);
 
@@ -97,7 +97,7 @@ impl Trial {
         let effect = |error: usize| {
             let single = error.checked_sub(sets).map(|k| &singles[worst[k]]);
             let own = single.map_or(vec![], |single| self.points_of(single.suspect));
-            sample.effect(&changes, error, &own, facts.limit)
+            sample.effect(&changes, error, &own)
         };
         let effects = threads.install(|| parallel::map(errors.len(), 1, effect));
         for (error, effect) in effects.into_iter().enumerate() {

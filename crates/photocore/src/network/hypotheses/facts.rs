@@ -17,8 +17,12 @@ pub struct Facts {
     pub readouts: Vec<Option<[f64; 3]>>,
     /// Width of the image of each camera, in its unit; NaN if unknown.
     pub widths: Vec<f64>,
-    /// Check points: their changes are reported.
+    /// Check points, and other points whose changes are reported.
     pub checks: Vec<usize>,
+    /// Standard deviations of the differences of the check points, which are the first of these.
+    pub check_sd: Vec<[f64; 3]>,
+    /// Inverse covariance of all these differences, row by row, zero for missing ones; empty if only single points are tested.
+    pub check_weights: Vec<f64>,
     /// Centre of scale, rotation and bending; the middle of the network if None.
     pub centre: Option<[f64; 3]>,
     /// Sum of squares and degrees of freedom if the unit weight is estimated; None if it is known.
