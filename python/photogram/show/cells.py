@@ -37,13 +37,25 @@ def unit_written(unit: str) -> str:
 
 
 def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Document:
-    """Return the visible parts of a document with formatted tables and drawn plots."""
+    """Return the visible parts of a document with full sentences, formatted tables and drawn plots."""
 
     def visible(sections: Sequence[Section]) -> list[Section]:
         whole = [replace(each, parts=_written(each.parts, document.words, draw)) for each in sections]
         return [section for section in whole if section.parts]
 
-    return replace(document, sections=visible(document.sections), details=visible(document.details))
+    return replace(
+        document,
+        judgements=[replace(one, lines=[*map(sentence, one.lines)]) for one in document.judgements],
+        advice=[*map(sentence, document.advice)],
+        sections=visible(document.sections),
+        details=visible(document.details),
+    )
+
+
+def sentence(text: object) -> str:
+    """Return a sentence with a full stop, and a capital letter unless it begins with the name of a file."""
+    line = str(text).removesuffix(".")
+    return f"{line if '.' in line.partition(' ')[0][:-1] else line[:1].upper() + line[1:]}."
 
 
 def _written(parts: Sequence[Part], words: Words, draw: Draw) -> list[Any]:
@@ -57,24 +69,24 @@ def _written(parts: Sequence[Part], words: Words, draw: Draw) -> list[Any]:
                 found += [drawing] if (drawing := draw(part)) else []
             case quantity.Table(visible=False) | Facts(facts=[]) | Remarks(sentences=[]) | Text(text=""):
                 continue
-            case _:
+            case quantity.Table():
                 found.append(written(part, words.numeral if words.language != "en" else str))
+            case _:
+                found.append(part)
     return found
 
 
-def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
-    """Return a part of a document; a declared table becomes a formatted one.
+def written(table: quantity.Table, numeral: Callable[[str], str] = str) -> page.Table:
+    """Return a declared table with formatted cells.
 
     Columns without a head or content are omitted. The standard deviations of a table define the decimals of
     its components: two digits of the median. `numeral` converts numbers to the format of a language.
     """
-    if not isinstance(part, quantity.Table):
-        return part
-    columns = part.columns
-    if part.shown is not None:
-        columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
-    written = [column for each in columns if each.head for column in _columns(each, part.deviations, numeral)]
-    return page.Table(part.title, [each for each in written if {*each.cells} - {"", "–"}], part.note)
+    columns = table.columns
+    if table.shown is not None:
+        columns = (chosen if table.shown.ndim == 1 else long)(columns, table.shown)
+    found = [column for each in columns if each.head for column in _columns(each, table.deviations, numeral)]
+    return page.Table(table.title, [each for each in found if {*each.cells} - {"", "–"}], table.note)
 
 
 def _columns(each: Quantity, by: Floats | None, numeral: Callable[[str], str]) -> Iterator[Column]:

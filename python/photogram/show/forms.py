@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import replace
 from photogram.show import quantity
-from photogram.show.cells import formatted, written
+from photogram.show.cells import formatted, sentence
 from photogram.show.page import (
     Document,
     Fact,
@@ -85,18 +85,20 @@ def titled_lines(
     With `keys`, only the sections and tables with these keys are returned, without introduction. `width` is
     the maximum number of characters of a line of the verdict.
     """
-    sentences: list[tuple[str, Sequence[object]]] = [
-        (f"{document.first}, {one.on}".removesuffix(", "), [one.headline, *one.lines])
-        for one in document.judgements
-    ]
-    titled: list[TitledLines] = []
-    for title, lines in [*sentences, ("What to do next", document.advice)]:
-        titled.append((title, [textwrap.fill(_ended(str(line)), width) for line in lines]))
-    titled.append(("Key figures", fact_lines([*document.head, *document.highlights])))
     sections = [*document.sections, *document.details]
     if keys is not None:
         sections = [replace(each, intro="", parts=_chosen(each, keys)) for each in sections]
-    for section in formatted(replace(document, sections=sections, details=())).sections:
+    made = formatted(replace(document, sections=sections, details=()))
+    sentences = [
+        (f"{made.first}, {one.on}".removesuffix(", "), [sentence(one.headline), *one.lines])
+        for one in made.judgements
+    ]
+    titled: list[TitledLines] = [
+        (title, [textwrap.fill(str(line), width) for line in lines])
+        for title, lines in [*sentences, (made.words("page.advice"), made.advice)]
+    ]
+    titled.append(("Key figures", fact_lines([*made.head, *made.highlights])))
+    for section in made.sections:
         parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
         intro = textwrap.wrap(section.intro, WIDTH)
         titled.append((section.title, _spaced([intro, *parts]) if parts else []))
@@ -105,12 +107,6 @@ def titled_lines(
         for title, lines in titled
         if lines
     ]
-
-
-def _ended(sentence: str) -> str:
-    """Return a sentence with a full stop, and a capital letter unless it begins with the name of a file."""
-    begins = sentence if "." in sentence.partition(" ")[0][:-1] else sentence[:1].upper() + sentence[1:]
-    return begins.removesuffix(".") + "."
 
 
 def _chosen(section: Section, keys: Collection[str]) -> Sequence[Part]:
@@ -126,20 +122,19 @@ def _spaced(parts: Iterable[list[str]]) -> list[str]:
 
 
 def part_lines(part: Part, title: str = "") -> list[str]:
-    """Return the lines of a part with a title; empty for plots."""
-    match written(part):
+    """Return the lines of a formatted part of a section with a title; empty for plots."""
+    match part:
         case Table() as table if any(column.cells for column in table.columns):
             head = [table.title] if table.title not in ("", title) else []
             return [*head, *table_text(table), *textwrap.wrap(table.note, WIDTH)]
-        case Facts(caption=caption, facts=facts) if facts:
+        case Facts(caption=caption, facts=facts):
             return [*([caption] if caption not in ("", title) else []), *fact_lines(facts)]
         case Layers(parts=layers):
-            below = [lines for layer in layers if (lines := part_lines(layer, title))]
-            return _spaced(below) if below else []
+            return _spaced([part_lines(layer, title) for layer in layers])
         case Text(text=paragraph):
             return textwrap.wrap(paragraph, WIDTH)
         case Remarks(sentences=sentences):
-            return [textwrap.fill(sentence, WIDTH, subsequent_indent="  ") for sentence in sentences]
+            return [textwrap.fill(each, WIDTH, subsequent_indent="  ") for each in sentences]
     return []
 
 

@@ -78,13 +78,14 @@ def _facts(kind: str, facts: Iterable[Fact], value: str = "", caption: str = "")
 def _judgement(one: Judgement) -> str:
     on = " " + element("span", escape(one.on)) if one.on else ""
     mark = element("p", escape(one.mark) + on, class_="mark")
-    lines = _list("ul", (escape(line[:1].upper() + line[1:]) for line in one.lines))
+    lines = _list("ul", map(escape, one.lines))
     return element("div", mark + element("h2", escape(one.headline)) + lines, class_=f"verdict {one.tone}")
 
 
 def _advice(page: Document) -> str:
     steps = _list("ol", (_coded(str(sentence)) for sentence in page.advice))
-    return element("div", element("h3", "What to do next") + steps, class_="advice") if steps else ""
+    heading = element("h3", escape(page.words("page.advice")))
+    return element("div", heading + steps, class_="advice") if steps else ""
 
 
 def _section(section: Section, known: Set[str], words: Words) -> str:

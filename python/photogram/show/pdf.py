@@ -19,7 +19,6 @@ from photogram.show.html import inlined
 from photogram.show.page import Column, Document, Drawing, Table
 from photogram.show.sketch.letters import width
 from photogram.show.sketch.svg import LETTERS
-from photogram.words import Phrase
 
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts included in the library; for other letters it uses fonts of the machine."""
@@ -35,10 +34,13 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
     """
     titled = formatted(replace(page, title=page.title or page.what, details=()), inlined)
     footer = f"{page.what} – {page.title}" if page.title else page.what
-    numbers = page.words("page.numbers", number="{number}", total="{total}")
+    texts = {
+        "advice_heading": page.words("page.advice"),
+        "numbers": page.words("page.numbers", number="{number}", total="{total}"),
+        "language": page.words.language,
+    }
     record = _record(titled) | {"author": author or [], "footer": footer, "fonts": FONTS, "longest": LONGEST}
-    record |= {"language": page.words.language, "numbers": numbers}
-    data = json.dumps(record, default=_record, ensure_ascii=False)
+    data = json.dumps(record | texts, default=_record, ensure_ascii=False)
     data = data.encode(errors="replace").decode()  # Names of files may contain bytes that are not UTF-8.
     template = files("photogram.show").joinpath("templates", "page.typ").read_bytes()
     content: bytes = typst.compile(template, sys_inputs={"document": data})
@@ -47,8 +49,6 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
 
 def _record(part: Any) -> Any:
     """Return the fields of a part of a document."""
-    if isinstance(part, Phrase):
-        return str(part)
     names = (each.name for each in fields(part) if each.name not in OMITTED)
     record: dict[str, Any] = {name: getattr(part, name) for name in names} | {"kind": type(part).__name__}
     if isinstance(part, Drawing):
