@@ -440,5 +440,5 @@ def test_paths_may_be_strings(tmp_path):
     example = Path(photogram.__file__).parent / "examples" / "absolute_orientation" / "stations.csv"
     assert len(photogram.absolute_orientation.read_csv(str(example)).ids) > 3
     for wrong in (None, 3, b"x", "a\0b", "\ud800"):
-        with pytest.raises(InputError, match="directory must be a path"):
+        with pytest.raises(InputError, match="directory: must be a path"):
             read_project(wrong)

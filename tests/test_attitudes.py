@@ -154,13 +154,13 @@ def test_refusals() -> None:
         (lambda: Attitudes.of("quaternion", [[1, 0, 0, 0], [0, 0, 0, 0]]), "attitude.quaternion"),
         (lambda: Attitudes.of("omega_phi_kappa", [[0, 0, math.inf]]), "error.finite"),
         (lambda: Attitudes.of("quaternion", [[1, 0, 0]]), r"\(n, 4\)"),
-        (lambda: Attitudes.of("gon", [[1, 0, 0]]), "representation must be one of omega_phi_kappa"),
+        (lambda: Attitudes.of("gon", [[1, 0, 0]]), "representation: must be one of omega_phi_kappa"),
         (
             lambda: Attitudes.of("yaw_pitch_roll", [[1, 0, 0]], mounting="up"),
-            "mounting must be one of top forward",
+            "mounting: must be one of top forward",
         ),
         (lambda: Attitudes(right).covariances("matrix"), "attitude.no-covariances"),
-        (lambda: Attitudes.of("omega_phi_kappa", [[1, 0, 0]], np.eye(3)), "covariances must have the shape"),
+        (lambda: Attitudes.of("omega_phi_kappa", [[1, 0, 0]], np.eye(3)), "covariances: must have the shape"),
     ]
     for attempt, message in refused:
         with raises(photogram.InputError, message):

@@ -107,5 +107,5 @@ def test_forward_cameras_have_no_such_weights():
         Camera("opencv", {"fx": 1000.0, "fy": 1000.0, "cx": 0.0, "cy": 0.0}, weights="measured")
     with pytest.raises(InputError, match="weights"):
         Camera("brown", {"c": -20.0}, weights="both")
-    with raises(InputError, "model must be one of|error.choice"):
+    with raises(InputError, "model: must be one of|error.choice"):
         Camera("brown_measured", {"c": -20.0})

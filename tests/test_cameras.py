@@ -209,8 +209,8 @@ def test_tables_name_cameras(block):
 @pytest.mark.parametrize(
     ("given", "match"),
     [
-        ({"model": "barrel"}, "model must be one of|error.choice"),
-        ({"model": 5}, "model must be one of|error.choice"),
+        ({"model": "barrel"}, "model: must be one of|error.choice"),
+        ({"model": 5}, "model: must be one of|error.choice"),
         ({"parameters": {}}, "error.missing"),
         ({"parameters": {"c": 0.0}}, "block.not-zero"),
         ({"parameters": {"c": -24.0, "k1": 0.0}}, "error.unknown"),
@@ -280,7 +280,7 @@ def test_cameras_are_copied_pickled_and_used_alone():
     ideal = project(u, np.zeros((2, 3)), np.zeros((2, 3)), [-24.0, -24.0])
     r2 = (xy**2).sum(axis=1, keepdims=True)
     np.testing.assert_allclose(xy * (1 - 1e-4 * r2), ideal, atol=1e-12)
-    with pytest.raises(InputError, match="u must have the shape"):
+    with pytest.raises(InputError, match="u: must have the shape"):
         camera.project(np.zeros((2, 2)))
 
 

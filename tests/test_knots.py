@@ -109,7 +109,7 @@ def test_cameras_with_knots_are_values(camera, knots):
         ({"nx": 3}, "error.whole-range"),
         ({"ny": 8.5}, "error.whole-range"),
         ({"fov_x_deg": 360.0}, "error.range"),
-        ({"nx": 12}, r"knots of camera .* must have the shape \(8, 12, 2\), got \(8, 11, 2\)"),
+        ({"nx": 12}, r"knots of camera .*: must have the shape \(8, 12, 2\), got \(8, 11, 2\)"),
     ],
 )
 def test_constants_that_are_none_of_a_spline_are_refused(knots, changes, message):

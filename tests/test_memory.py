@@ -163,7 +163,7 @@ def test_absurd_numbers_of_threads(small_block):
         with raises(InputError, "error.least"):
             adjust(small_block, threads=threads)
     for threads in (2.5, 2**70):
-        with pytest.raises(InputError, match="threads must be a whole number"):
+        with pytest.raises(InputError, match="threads: must be an integer"):
             adjust(small_block, threads=threads)
 
 

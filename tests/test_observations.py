@@ -367,9 +367,9 @@ def test_a_block_adjusts_columns_as_objects(example):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"position": np.zeros((3, 3))}, "argument.shape"),
+        ({"position": np.zeros((3, 3))}, "error.shape"),
         ({"position": np.full((2, 3), np.nan)}, "error.finite"),
-        ({"photo": ["a", ""]}, "argument.empty-name"),
+        ({"photo": ["a", ""]}, "error.no-name"),
         ({"sd": [[0.1] * 3, [0.1, 0.0, 0.1]]}, "position b"),
         ({"covariance": np.eye(3)}, "error.exclusive"),
         ({"lever": 1.0}, "error.unknown"),
@@ -422,10 +422,10 @@ def test_a_block_checks_the_changed_fields(example):
     fewer = {name: getattr(block, name)[1:] for name in ("image_photos", "image_points", "image_xy")}
     for change, code in (
         ({"image_points": np.zeros(len(block.image_xy), dtype=int)}, "block.repeated-image"),
-        (fewer, "argument.shape"),
+        (fewer, "error.shape"),
         ({"photo_cameras": [0]}, "error.requires"),
         ({"point_sd": -1.0}, "block.value.sd"),
-        ({"title": 1}, "argument.kind"),
+        ({"title": 1}, "error.text"),
         ({"frame": None}, "error.kind"),
         ({"observations": [Distance("P0", "unknown", 1.0, sd=1.0)]}, "error.absent"),
     ):

@@ -99,7 +99,7 @@ def test_plots_without_data_are_refused(galveston):
         with pytest.raises(InputError) as error:
             getattr(galveston.plot, name)()
         assert error.value.code == f"plot.{name}"
-    with pytest.raises(InputError, match="plane must be one of XY, XZ, YZ"):
+    with pytest.raises(InputError, match="plane: must be one of XY, XZ, YZ"):
         galveston.plot.network(plane="up")
     bare = adjust(galveston.block, covariance=False)
     assert set(bare.plot.available()) == {"network", "residuals"}

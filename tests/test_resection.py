@@ -224,29 +224,29 @@ def test_images_that_no_position_explains():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"object_points": GROUND[:3]}, r"object_points must have the shape .*, got \(3, 3\)"),
+        ({"object_points": GROUND[:3]}, r"object_points: must have the shape .*, got \(3, 3\)"),
         ({"object_points": GROUND * np.nan}, "error.finite"),
         ({"image_sd": 0.0}, "error.positive"),
         ({"image_sd": -1.0}, "error.not-negative"),
         ({"object_sd": np.inf}, "error.finite"),
         ({"principal_distance": 0.0}, "block.not-zero"),
-        ({"position": [1.0, 2.0]}, r"position must have the shape"),
+        ({"position": [1.0, 2.0]}, r"position: must have the shape"),
         ({"position": [1.0, 2.0, np.nan]}, "error.finite"),
         ({"position_sd": 1.0}, "resection.value-missing"),
         ({"point_ids": ["A"]}, "error.count"),
         ({"max_iterations": 0}, "error.positive"),
-        ({"max_iterations": 2**64}, "max_iterations must be a whole number"),
-        ({"max_iterations": "9"}, "max_iterations must be a whole number"),
-        ({"tolerance": None}, "tolerance must be a number"),
+        ({"max_iterations": 2**64}, "max_iterations: must be an integer"),
+        ({"max_iterations": "9"}, "max_iterations: must be an integer"),
+        ({"tolerance": None}, "tolerance: must be a number"),
         ({"tolerance": np.nan}, "error.positive"),
-        ({"principal_distance": "150"}, "principal_distance must be a number"),
-        ({"principal_distance": 10**400}, "principal_distance must be a number"),
+        ({"principal_distance": "150"}, "principal_distance: must be a number"),
+        ({"principal_distance": 10**400}, "principal_distance: must be a number"),
         ({"attitude": [0.0, np.nan, 0.0]}, "error.finite"),
-        ({"attitude": "north"}, "attitude must be an array of numbers"),
-        ({"image_xy": None}, "image_xy must be an array"),
-        ({"image_xy": np.ma.masked_all((7, 2))}, "image_xy must not have masked values"),
-        ({"object_sd": 1j}, "object_sd must be an array of numbers"),
-        ({"point_ids": 7}, "point_ids must be a list of names"),
+        ({"attitude": "north"}, "attitude: must be an array of numbers"),
+        ({"image_xy": None}, "image_xy: must be an array"),
+        ({"image_xy": np.ma.masked_all((7, 2))}, "image_xy: must not have masked values"),
+        ({"object_sd": 1j}, "object_sd: must be an array of numbers"),
+        ({"point_ids": 7}, "point_ids: must be a list of names"),
     ],
 )
 def test_wrong_input_is_named(change, message):
@@ -283,5 +283,5 @@ def test_arguments_of_another_type(argument, value):
 def test_masks_of_a_resection_are_not_ignored():
     ground = np.ma.array(np.arange(15.0).reshape(5, 3))
     ground[2, 1] = np.ma.masked
-    with pytest.raises(InputError, match="object_points must not have masked values"):
+    with pytest.raises(InputError, match="object_points: must not have masked values"):
         resect(ground, np.ones((5, 2)), -152.0)

@@ -348,7 +348,7 @@ def test_unknowns_in_every_space(spheroid):
         (lambda: Sensor("s", [0, 0, 0], -np.eye(3)), "error.kind"),
         (lambda: Plane("p", [0, 0, 0], [0, 0, 0]), "error.kind"),
         (lambda: Line("l", [0, np.inf, 0], [0, 0, 0]), "direction of line l"),
-        (lambda: Level("h", "high"), "height of level h must be a number"),
+        (lambda: Level("h", "high"), "height of level h: must be a number"),
         (lambda: Instrument("i", np.nan), "error.finite"),
         (lambda: OnPlane("1", Level("h", 0.0), 1.0), "error.kind"),
         (lambda: OnLevel("1", None, 1.0), "error.kind"),

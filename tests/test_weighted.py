@@ -143,7 +143,7 @@ def test_observed_values_that_cannot_be(weighted):
     observed[1, 2] = np.inf
     with raises(InputError, "block.value.not-infinite"):
         weighted.replace(photo_positions_observed=observed)
-    with pytest.raises(InputError, match=r"photo_attitudes_observed must have the shape .*, got \(3, 3\)"):
+    with pytest.raises(InputError, match=r"photo_attitudes_observed: must have the shape .*, got \(3, 3\)"):
         weighted.replace(photo_attitudes_observed=np.zeros((3, 3)))
     with raises(InputError, "block.value.fixed"):
         weighted.replace(photo_position_sd=0.0)

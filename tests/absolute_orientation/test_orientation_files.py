@@ -5,6 +5,7 @@ import pytest
 from orientation_golden import cards_of, cases, csv_of, stations
 from orientation_models import simulate
 
+from message_codes import coded
 from photogram import AdjustmentError, InputError, RankError, orient
 from photogram.absolute_orientation import Similarity, Stations, read_cards, read_csv
 from photogram.absolute_orientation.cards import read_transformation, restart_record, transformation_records
@@ -202,11 +203,14 @@ def full(count=6):
         ({"control_sd": -1.0, "model_sd": 1.0}, "standard deviations of control must be"),
         ({"control_sd": 0.1}, "requires standard deviations of the model"),
         ({"model_sd": -1.0}, "standard deviations of the model must be finite"),
-        ({"model": "text"}, "model must be an array of numbers"),
-        ({"control": None}, "control must be an array"),
-        ({"ids": 6}, "ids must be a list of names"),
+        ({"model": "text"}, "model: must be an array of numbers"),
+        ({"control": None}, "control: must be an array"),
+        ({"ids": 6}, "ids: must be a list of names"),
         ({"ids": ["\ud800", *"bcdef"]}, "must contain printable characters only"),
-        ({"model": np.ma.masked_less(np.arange(18.0).reshape(6, 3), 2)}, "model must not have masked values"),
+        (
+            {"model": np.ma.masked_less(np.arange(18.0).reshape(6, 3), 2)},
+            "model: must not have masked values",
+        ),
         ({"model": 10**400}, "model"),
         ({"control": np.inf}, "control coordinates must be finite"),
         ({"model": np.nan}, "model coordinates must be finite"),
@@ -223,22 +227,22 @@ def test_arrays_that_cannot_be(change, message):
 @pytest.mark.parametrize(
     ("options", "code"),
     [
-        ({"method": "fast"}, "argument.choice"),
-        ({"start": "best"}, "argument.choice"),
+        ({"method": "fast"}, "error.choice"),
+        ({"start": "best"}, "error.choice"),
         ({"reject": ["nobody"]}, "orientation.no-station"),
         ({"max_iterations": 0}, "orientation.positive"),
-        ({"max_iterations": 2**64}, "argument.kind"),
-        ({"max_iterations": None}, "argument.kind"),
-        ({"reject": 5}, "argument.kind"),
+        ({"max_iterations": 2**64}, "error.kind"),
+        ({"max_iterations": None}, "error.kind"),
+        ({"reject": 5}, "error.kind"),
         ({"tolerance": np.nan}, "orientation.positive"),
-        ({"tolerance": "1"}, "argument.kind"),
+        ({"tolerance": "1"}, "error.number"),
         ({"trace": True}, "orientation.trace"),
         ({"tolerance": 0.0}, "orientation.positive"),
         ({"unit_variance": "unity"}, "orientation.unity"),
     ],
 )
 def test_options_that_cannot_be(options, code):
-    with pytest.raises(InputError, check=lambda error: error.code == code):
+    with pytest.raises(InputError, check=coded(code)):
         orient(full(), **options)
 
 

@@ -98,7 +98,7 @@ def test_every_model_of_the_crate_can_be_named():
 def test_models_that_cannot_be_are_refused_by_name():
     with pytest.raises(InputError, check=lambda error: error.code == "collection.camera"):
         MADE.collection.replace(camera="x")
-    with pytest.raises(InputError, match=r"photo_parameters must have the shape \(8, 11\), got \(8, 9\)"):
+    with pytest.raises(InputError, match=r"photo_parameters: must have the shape \(8, 11\), got \(8, 9\)"):
         MADE.collection.replace(camera="radial")
     with pytest.raises(ValueError, match="camera cannot be"):
         _photocore.radial_domain("x", np.zeros(1))

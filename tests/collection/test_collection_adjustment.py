@@ -248,12 +248,12 @@ def test_a_start_in_the_plane_of_the_projection_centre_is_an_error():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"ordering": "none"}, "ordering must be one of"),
+        ({"ordering": "none"}, "ordering: must be one of"),
         ({"max_iterations": 0}, "error.least"),
         ({"tolerance": 0.0}, "error.positive"),
         ({"tolerance": float("nan")}, "error.positive"),
         ({"threads": 0}, "error.least"),
-        ({"loss": "tukey"}, "loss must be one of huber, cauchy"),
+        ({"loss": "tukey"}, "loss: must be one of huber, cauchy"),
         ({"loss": ("huber", -1.0)}, "error.positive"),
         ({"loss": ("huber", float("inf"))}, "error.positive"),
     ],

@@ -309,7 +309,7 @@ def test_lines_that_the_tables_do_not_reach_are_named(tmp_path):
 
 def test_ways_to_count_and_to_join_have_names(tmp_path):
     for name, value in (("pixels", "corner"), ("interpolation", "cubic")):
-        with rejected(f"argument.choice {name} isis,csm '{value}'"):
+        with rejected(f"error.at {name}: error.choice isis,csm {value}"):
             image(tmp_path, document(), **{name: value})
     with rejected("format.shape lines (2,) (1,)"):
         image(tmp_path, document()).coordinates([1.0, 2.0], [1.0])

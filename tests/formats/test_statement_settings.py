@@ -174,7 +174,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
             "error.key check survey_common_sd: error.count 2: toml.or 1,3",
         ),
         ("in_control = true", "in_control = 1", "error.key check survey_common_in_control: error.flag 1"),
-        ('"same-base"', '"perhaps"', "error.key check independent: argument.choice independent"),
+        ('"same-base"', '"perhaps"', "error.key check independent: error.at independent: error.choice"),
         (
             'independent = "same-base"',
             "independent = true",
@@ -227,7 +227,11 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
             '{ midle = "moved" }',
             "error.at without: error.unknown.close point midle middle",
         ),
-        ('language = "de"', 'language = "fr"', "error.key statement language: argument.choice language"),
+        (
+            'language = "de"',
+            'language = "fr"',
+            "error.key statement language: error.at language: error.choice",
+        ),
         ('text = "firm.toml"', 'text = "film.toml"', "error.key statement text: error.absent file"),
         ('text = "firm.toml"', f'text = "{"x" * 300}"', "error.key statement text: error.absent file"),
         (

@@ -64,15 +64,15 @@ def test_without_redundancy_nothing_is_tested(make_grid):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"ids": 8}, "ids must be a list of names, got 8"),
-        ({"principal_distance": "150"}, "principal_distance must be a number"),
+        ({"ids": 8}, "ids: must be a list of names, got 8"),
+        ({"principal_distance": "150"}, "principal_distance: must be a number"),
         ({"principal_distance": np.nan}, "principal distance must be positive"),
-        ({"principal_distance": None}, "principal_distance must be a number"),
-        ({"readings": np.nan}, "readings .* whole number"),
-        ({"readings": 2**64}, "readings .* whole number"),
-        ({"readings": 1.5}, "readings .* whole number"),
-        ({"plate_xy": np.ma.masked_all((8, 2))}, "plate_xy must not have masked values"),
-        ({"model": None}, "model must be an array of numbers, got None"),
+        ({"principal_distance": None}, "principal_distance: must be a number"),
+        ({"readings": np.nan}, "readings: .* whole number"),
+        ({"readings": 2**64}, "readings: .* whole number"),
+        ({"readings": 1.5}, "readings: .* whole number"),
+        ({"plate_xy": np.ma.masked_all((8, 2))}, "plate_xy: must not have masked values"),
+        ({"model": None}, "model: must be an array of numbers, got None"),
     ],
 )
 def test_grids_that_cannot_be(eight, change, message):

@@ -118,11 +118,11 @@ def test_weights_that_cannot_be_formed(make_grid):
         InputError, match="points 1, 2", check=lambda error: error.code == "projector.no-weight"
     ):
         determine(grid, weights="deviations")
-    with pytest.raises(InputError, match="weights must be one of"):
+    with pytest.raises(InputError, match="weights: must be one of"):
         determine(grid, weights="best")
     with pytest.raises(InputError, match="points 1, 2"):
         determine(grid, model_sd=0.0)
-    with pytest.raises(InputError, match="model_sd must have the shape"):
+    with pytest.raises(InputError, match="model_sd: must have the shape"):
         determine(grid, model_sd=[1.0, 2.0])
 
 
@@ -187,7 +187,7 @@ def test_points_on_one_line_are_singular(make_grid):
 
 def test_grids_that_contradict_themselves_are_refused(make_grid):
     grid = make_grid()
-    with pytest.raises(InputError, match=r"model must have the shape .*, got \(3, 3\)"):
+    with pytest.raises(InputError, match=r"model: must have the shape .*, got \(3, 3\)"):
         Grid(grid.ids, grid.plate_xy, grid.model[:3], 150.0)
     with pytest.raises(InputError, check=lambda error: error.code == "projector.finite"):
         Grid(grid.ids, grid.plate_xy * np.nan, grid.model, 150.0)

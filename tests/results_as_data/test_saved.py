@@ -387,7 +387,7 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
         (lambda document: document["kept"]["result"].update(cameras=["x"]), "error.kind kind=AdjustedCamera"),
         (
             lambda document: document["kept"]["block"].update(point_ids="x"),
-            "argument.kind name=point_ids",
+            "point_ids: error.kind kind=a list of names",
         ),
         (lambda document: document["kept"]["block"].update(other=1), "results.contradiction .*'other'"),
         (
@@ -426,5 +426,5 @@ def test_damage_anywhere_is_refused_or_does_no_harm(folder, name):
 
 
 def test_a_number_does_not_stand_for_an_array():
-    with pytest.raises(InputError, match="redundancy must be an array of numbers, got 3"):
+    with pytest.raises(InputError, match="redundancy: must be an array of numbers, got 3"):
         check_members(AdjustedCamera, {"redundancy": 3})

@@ -369,7 +369,7 @@ def test_a_statement_of_what_has_not_converged_is_refused(result):
         ({"standards": ("asprs",)}, "error.unknown.close"),
         ({"classes": {"x": 1.0}}, "a class"),
         ({"classes": {"h": -1.0}}, "error.positive"),
-        ({"independent": "maybe"}, "independent must be one of"),
+        ({"independent": "maybe"}, "independent: must be one of"),
         ({"coverage": 1.5}, "error.range"),
         ({"language": "fr"}, "language"),
         ({"text": {"asprs.tested.x": ""}}, "error.unknown.close"),

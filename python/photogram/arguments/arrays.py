@@ -48,14 +48,13 @@ def shaped(
     values become NaN.
     """
     array = numbers(name, value, missing=missing)
-    if array.ndim == 0 and None not in shape:
-        array = np.full(shape, array)
-        array.flags.writeable = False
-    sizes = array.shape if array.ndim == len(shape) else (0,) * len(shape)
+    sizes = array.shape if array.ndim == len(shape) else (-1,) * len(shape)
     wanted = tuple(own if size is None else size for own, size in zip(sizes, shape, strict=True))
+    if array.ndim == 0 and -1 not in wanted:
+        array = np.full(wanted, array)
+        array.flags.writeable = False
     if array.shape != wanted:
-        wanted_text = str(shape).replace("None", "n")
-        raise InputError(phrase("argument.shape", name=name, shape=wanted_text, actual=str(array.shape)))
+        raise argument_error(name, "shape", shape=str(shape).replace("None", "n"), actual=array.shape)
     if rule:
         _require_rule(name, array, RULES[rule](array) | (missing & np.isnan(array)), rule)
     return frozen(array)
@@ -72,31 +71,29 @@ def _require_rule(name: str, values: Any, good: NDArray[np.bool_], rule: str) ->
 
 def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
     """Return an array of numbers of any shape, possibly the caller's array."""
-    array = _plain(name, value, "numbers")
-    kind = array.dtype.kind
+    array = _array(name, value, "numbers")
+    kind, wrong = array.dtype.kind, None
     if kind == "O":
-        bad = next((each for each in array.flat if not _is_real(each)), None)
-        if bad is not None:
-            raise _no_array(name, "numbers", phrase("argument.element", value=shown(bad)))
-    elif kind not in "fiu":
-        raise _no_array(name, "numbers", phrase("argument.type", type=str(array.dtype)))
+        wrong = next((each for each in array.flat if not _is_real(each)), None)
+    if kind not in "fiuO" or wrong is not None:
+        raise _no_array(name, "numbers", value if wrong is None else wrong)
     try:
         with np.errstate(over="ignore"):  # Infinite values are left to the caller
             found: NDArray[np.float64] = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
-        raise _no_array(name, "numbers", shown(value)) from None
+        raise _no_array(name, "numbers", value) from None
     if is_masked(value):
         if not missing:
-            raise InputError(phrase("argument.masked", name=name))
+            raise argument_error(name, "masked")
         found = np.where(np.ma.getmaskarray(np.ma.asarray(value)), math.nan, found)
     return found
 
 
-def whole_numbers(name: str, value: ArrayLike) -> NDArray[np.int64]:
+def whole_numbers(name: str, value: ArrayLike, of: str = "whole numbers") -> NDArray[np.int64]:
     """Return an array of integers of any shape, possibly the caller's array."""
-    array = _of_kind(name, value, "iu", "whole numbers")
+    array = _of_kind(name, value, "iu", of)
     if array.dtype.kind == "u" and array.size and array.max() >= 2**63:
-        raise refused(name, value, "an array of whole numbers of 64 bits")
+        raise _no_array(name, "whole numbers of 64 bits", value)
     return array.astype(np.int64, copy=False)
 
 
@@ -106,26 +103,38 @@ def truth_values(name: str, value: ArrayLike) -> NDArray[np.bool_]:
 
 
 def _of_kind(name: str, value: ArrayLike, kinds: str, of: str) -> NDArray[Any]:
-    array = _plain(name, value, of)
+    array = _array(name, value, of)
     if array.size and array.dtype.kind not in kinds:
-        raise refused(name, value, f"an array of {of}")
+        raise _no_array(name, of, value)
     if is_masked(value):
-        raise InputError(phrase("argument.masked", name=name))
+        raise argument_error(name, "masked")
     return array
+
+
+def _array(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
+    """Convert an argument to a NumPy array of any type."""
+    try:
+        if value is not None:
+            return np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise _no_array(name, of, value)
+
+
+def _no_array(name: str, of: str, value: object) -> InputError:
+    if isinstance(value, np.ndarray) and value.ndim:
+        value = phrase("error.object", type=f"array of {value.dtype}")
+    return argument_error(name, "array", of=of, value=value)
 
 
 def elements(name: str, value: object, count: int | None = None) -> list[Any]:
     """Return the elements of a sequence, possibly of a required number."""
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-        raise refused(name, value, "a sequence")
+        raise argument_error(name, "list", value=value)
     found = np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else list(value)
     if count is not None and len(found) != count:
-        raise refused(name, value, f"a sequence of {count}")
+        raise argument_error(name, "count", count=count, actual=len(found))
     return found
-
-
-def _no_array(name: str, of: str, reason: str | Phrase) -> InputError:
-    return InputError(phrase("argument.array", name=name, of=of, reason=reason))
 
 
 def _is_real(value: object) -> bool:
@@ -144,16 +153,6 @@ def is_masked(value: object) -> bool:
         and isinstance(value, masked.MaskedArray)
         and bool(masked.getmaskarray(value).any())
     )
-
-
-def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
-    """Convert an argument to a NumPy array of any type."""
-    if value is None:
-        raise _no_array(name, of, "None")
-    try:
-        return np.asarray(value)
-    except (TypeError, ValueError, OverflowError):
-        raise _no_array(name, of, shown(value)) from None
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
@@ -187,26 +186,22 @@ def repeated_pairs(first: NDArray[np.int64], second: NDArray[np.int64], count: i
 
 def length(name: str, value: ArrayLike) -> int:
     """Return the number of rows of an array; reject a single value."""
-    array = _plain(name, value, "values")
+    array = _array(name, value, "values")
     if array.ndim == 0:
-        raise refused(name, value, "an array")
+        raise _no_array(name, "values", value)
     return len(array)
 
 
 def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.int64]:
     """Return a read-only array of `length` integers from 0 to `count` - 1."""
-    array = _plain(name, value, f"{length} whole numbers")
-    if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
-        fields = {"length": length, "shape": str(array.shape), "type": str(array.dtype)}
-        raise InputError(phrase("argument.indices", name=name, **fields))
-    if is_masked(value):
-        raise InputError(phrase("argument.masked", name=name))
+    array = whole_numbers(name, value, f"{length} whole numbers")
+    if array.shape != (length,):
+        raise argument_error(name, "shape", shape=(length,), actual=array.shape)
     bad = np.flatnonzero((array < 0) | (array >= count))
     if bad.size:
         row = int(bad[0])
-        fields = {"name": f"{name}[{row}]", "value": int(array[row]), "most": count - 1}
-        raise InputError(phrase("argument.index", **fields))
-    return frozen(array.astype(np.int64, copy=False))
+        raise argument_error(f"{name}[{row}]", "whole-range", low=0, high=count - 1, value=int(array[row]))
+    return frozen(array)
 
 
 def names(name: str, values: Iterable[object]) -> list[str]:
@@ -217,32 +212,29 @@ def names(name: str, values: Iterable[object]) -> list[str]:
     """
     no_row = isinstance(values, np.ndarray) and values.ndim != 1
     if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):
-        raise refused(name, values, "a list of names")
+        raise argument_error(name, "kind", kind="a list of names", value=values)
     found: list[Any] = values.tolist() if isinstance(values, np.ndarray) else list(values)
     if {str} != set(map(type, found)):
-        found = [_name(name, row, value) for row, value in enumerate(found)]
+        found = [_name(f"{name}[{row}]", value) for row, value in enumerate(found)]
     if not ("".join(found).isprintable() and all(map(str.strip, found))):
         for row, each in enumerate(found):
-            if not each.strip():
-                raise InputError(phrase("argument.empty-name", name=f"{name}[{row}]"))
-            text(f"{name}[{row}]", each)
+            if not text(f"{name}[{row}]", each).strip():
+                raise argument_error(f"{name}[{row}]", "no-name", value=each)
     return found
 
 
-def _name(name: str, row: int, value: object) -> str:
+def _name(name: str, value: object) -> str:
     if isinstance(value, str) or (isinstance(value, Integral) and not isinstance(value, bool)):
         return str(value)
-    if value is None or (isinstance(value, Real) and value != value):
-        raise InputError(phrase("argument.no-name", name=f"{name}[{row}]", value=shown(value)))
-    raise InputError(phrase("argument.name", name=f"{name}[{row}]", value=shown(value)))
+    is_missing = value is None or (isinstance(value, Real) and value != value)
+    raise argument_error(name, "no-name" if is_missing else "name", value=value)
 
 
 def text(name: str, value: object) -> str:
     """Return a line of printable text; line ends and lone surrogates are rejected."""
-    if not isinstance(value, str):
-        raise refused(name, value, "a string")
-    if not value.isprintable():
-        raise InputError(phrase("argument.unprintable", name=name, value=shown(value)))
+    if not isinstance(value, str) or not value.isprintable():
+        code = "unprintable" if isinstance(value, str) else "text"
+        raise argument_error(name, code, value=value)
     return value
 
 
@@ -254,7 +246,7 @@ def number(name: str, value: object, rule: str = "") -> float:
         try:
             converted = float(value if _is_real(value) else None)  # type: ignore[arg-type]
         except (TypeError, OverflowError):
-            raise refused(name, value, "a number") from None
+            raise argument_error(name, "number", value=value) from None
     if rule:
         values = np.asarray(converted)
         _require_rule(name, values, np.asarray(RULES[rule](values)), rule)
@@ -264,26 +256,21 @@ def number(name: str, value: object, rule: str = "") -> float:
 def whole_number(name: str, value: object) -> int:
     """Return an integer of 64 bits."""
     if not isinstance(value, Integral) or isinstance(value, bool) or not -(2**63) <= int(value) < 2**63:
-        raise refused(name, value, "a whole number of 64 bits")
+        raise argument_error(name, "kind", kind="an integer of 64 bits", value=value)
     return int(value)
 
 
 def truth_value(name: str, value: object) -> bool:
     """Return True or False."""
     if not isinstance(value, bool | np.bool_):
-        raise InputError(phrase("argument.flag", name=name, value=shown(value)))
+        raise argument_error(name, "flag", value=value)
     return bool(value)
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> None:
     """Reject values that are not among some words."""
     if not (isinstance(value, str) and value in choices):
-        raise InputError(phrase("argument.choice", name=name, names=list(choices), value=shown(value)))
-
-
-def refused(name: str, value: object, what: str) -> InputError:
-    """Return the error of an argument of a wrong type."""
-    return InputError(phrase("argument.kind", name=name, what=what, value=shown(value)))
+        raise argument_error(name, "choice", names=list(choices), value=value)
 
 
 def value_field(value: object) -> str | float | Phrase:
@@ -296,12 +283,6 @@ def value_field(value: object) -> str | float | Phrase:
         return phrase("error.value", value=" ".join(ascii(value).split())[:80])
     except Exception:  # A foreign object may raise any error, a deeply nested one a RecursionError
         return phrase("error.object", type=type(value).__name__)
-
-
-def shown(value: object) -> str:
-    """Return a value as text for a message without fields."""
-    field = value_field(value)
-    return ascii(field)[:80] if isinstance(field, str) else str(field)
 
 
 def argument_error(name: str, code: str, /, **fields: object) -> InputError:

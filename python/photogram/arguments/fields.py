@@ -77,16 +77,16 @@ def check_fields(made: Any, title: str = "") -> None:
 def check_members(kind: type, members: Mapping[str, Any]) -> None:
     """Reject members of a saved object of a class with wrong types."""
     if hasattr(kind, "__dataclass_fields__"):
-        from photogram.arguments.arrays import refused
+        from photogram.arguments.objects import kind_error
 
         for name, check in checks_of(kind).items():
             if name in members:
                 converted = check(name, members[name])
                 if hasattr(converted, "dtype") and not hasattr(members[name], "dtype"):
-                    raise refused(name, members[name], "an array of numbers")
+                    raise kind_error(name, "an array of numbers", members[name])
         for each in fields(kind):
             if each.type == "Names" and isinstance(members.get(each.name), str):
-                raise refused(each.name, members[each.name], "a list of names")
+                raise kind_error(each.name, "a list of names", members[each.name])
 
 
 @cache
@@ -153,7 +153,7 @@ def _named(text: str, names: Mapping[str, Any]) -> Any:
 
 def _text(name: str, value: Any) -> str:
     """Return a text; titles of files may have control characters, but no lone surrogates."""
-    from photogram.arguments.arrays import refused
+    from photogram.arguments.arrays import argument_error
 
     try:
         if isinstance(value, str):
@@ -161,7 +161,7 @@ def _text(name: str, value: Any) -> str:
             return value
     except UnicodeEncodeError:
         pass
-    raise refused(name, value, "a text")
+    raise argument_error(name, "text", value=value)
 
 
 def _word(words: Sequence[str], name: str, value: Any) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from photogram.arguments.arrays import argument_error, refused
+from photogram.arguments.arrays import argument_error
 from photogram.errors import InputError
 from photogram.messages import unknown_name
 from photogram.words import Phrase
@@ -42,9 +42,9 @@ def path_of(name: str, value: object) -> Path:
         text = os.fspath(value)  # type: ignore[call-overload]
         os.fsencode(text)
     except (TypeError, UnicodeEncodeError):
-        raise refused(name, value, "a path") from None
+        raise kind_error(name, "a path", value) from None
     if not isinstance(text, str) or not text or "\0" in text:
-        raise refused(name, value, "a path without NUL characters" if text else "a path")
+        raise kind_error(name, "a path without NUL characters" if text else "a path", value)
     return value if isinstance(value, Path) else Path(text)
 
 

@@ -20,18 +20,18 @@ UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12, "ki": 2**10, "m
 
 def bytes_of(memory: int | str) -> int:
     """Convert a memory size to bytes: `4GB` (10^9), `1.5GiB` (2^30), or a number."""
-    from photogram.arguments.arrays import shown, whole_number
+    from photogram.arguments.arrays import value_field, whole_number
 
     size: float
     if isinstance(memory, str):
         match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kmgt]?i?)b?\s*", memory.lower(), re.ASCII)
         if match is None or match[2] not in UNITS:
-            raise InputError(phrase("parts.memory", value=shown(memory)))
+            raise InputError(phrase("parts.memory", value=value_field(memory)))
         size = float(match[1]) * UNITS[match[2]]
     else:
         size = whole_number("memory", memory)
     if not 1 <= size < MOST_BYTES:
-        raise InputError(phrase("parts.memory-range", value=shown(memory)))
+        raise InputError(phrase("parts.memory-range", value=value_field(memory)))
     return int(size)
 
 

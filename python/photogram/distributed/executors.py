@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from photogram import _photocore
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import value_field
 from photogram.distributed.shelf import shelf
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import resident_memory
@@ -211,7 +211,7 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
         with client:
             yield client
     else:
-        raise InputError(phrase("parts.cluster", value=shown(cluster)))
+        raise InputError(phrase("parts.cluster", value=value_field(cluster)))
 
 
 def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
