@@ -57,7 +57,7 @@ def modules():
 
 
 COMPOSED = {
-    *("document", "statement", "_findings", "_files", "_members", "_table", "_terms"),
+    *("document", "statement", "reliability_summary", "_findings", "_files", "_members", "_table", "_terms"),
     *("_plot_data", "_observables", "_scaled", "_adjust", "_adjust_again", "_snoop", "_check"),
 }
 """Methods of results whose definitions are in the files above that read the results."""

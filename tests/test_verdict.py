@@ -328,9 +328,9 @@ def test_reliability_stands_in_report_and_document(simulated):
     assert all(0.9 < pair.correlation <= 1 for pair in summary.listed.pairs)
     weakest = result.document().table("reliability.weakest")
     assert images[0]["name"] in weakest.frame()["name"].tolist()
-    frame = summary.weakest_table().frame()
+    frame = summary.listed.weakest.frame()
     assert list(frame["name"]) == [each["name"] for each in document["weakest"]]
-    assert pickle.loads(pickle.dumps(result)).reliability_summary.weakest_table().frame().equals(frame)
+    assert pickle.loads(pickle.dumps(result)).reliability_summary.listed.weakest.frame().equals(frame)
 
 
 def test_a_lens_that_is_not_modelled(simulated):

@@ -24,6 +24,7 @@ from photogram.network.hull import hull
 from photogram.network.motion import on_shared, timed_images
 from photogram.network.rays import local_axes
 from photogram.network.trajectories import Readout
+from photogram.results.evaluation import evaluated
 from photogram.results.hypotheses import Hypotheses
 from photogram.results.network_trial import block_facts
 from photogram.results.result import Result
@@ -254,7 +255,7 @@ class Pattern:
             return None
         # In a plan, all points have given coordinates, but these check nothing.
         facts = block_facts(self.block, self.result.photo_positions)
-        return self.result._evaluated(self.result.reliability(), facts)[0]
+        return evaluated(self.result, self.result.reliability(), facts)[0]
 
     @property
     def known_rms_sd(self) -> tuple[float, float, float] | None:

@@ -89,15 +89,7 @@ def block_files(result: Result) -> dict[str, Content]:
         "degrees_of_freedom": result.degrees_of_freedom,
     }
     declared = parts_of_block(
-        geographic=block.geographic,
-        unit=block.linear_unit,
-        image_unit=block.image_unit,
-        distances=block.principal_distances is not None,
-        observed=[
-            name
-            for name in ("positions", "attitudes")
-            if getattr(block, f"photo_{name}_observed") is not None
-        ],
+        geographic=block.geographic, unit=block.linear_unit, image_unit=block.image_unit
     )
     scanned, images = scanners(block)[block.image_photos], declared["images"]
     if scanned.any():
@@ -108,9 +100,8 @@ def block_files(result: Result) -> dict[str, Content]:
     return written(result, KIND, "block", declared, leading, tables, block.frame, summary)
 
 
-def parts_of_block(
-    *, geographic: bool, unit: str, image_unit: str, distances: bool, observed: list[str]
-) -> dict[str, list[Part]]:
+def parts_of_block(*, geographic: bool, unit: str, image_unit: str) -> dict[str, list[Part]]:
+    """Return the stored arrays of a block; the columns of those that are None do not exist."""
     places = ("longitude", "latitude", "height") if geographic else ("x", "y", "z")
     lengths = ("rad", "rad", unit) if geographic else (unit,) * 3
     turns = ("rad",) * 3
@@ -125,15 +116,9 @@ def parts_of_block(
         Part("block.photo_attitudes", _ANGLES, turns, "initial {}", prefix="initial_"),
         Part("block.photo_position_sd", places, lengths, GIVEN_SD, prefix="given_sd_"),
         Part("block.photo_attitude_sd", _ANGLES, turns, GIVEN_SD, prefix="given_sd_"),
-    ]
-    for name, own, of_own in (("positions", places, lengths), ("attitudes", _ANGLES, turns)):
-        if name in observed:
-            field = f"block.photo_{name}_observed"
-            photos.append(Part(field, own, of_own, "observed {}", prefix="observed_"))
-    if distances:
-        field = "block.principal_distances"
-        photos.append(Part(field, ("principal_distance",), (image_unit,), "signed as it was given"))
-    photos += [
+        Part("block.photo_positions_observed", places, lengths, "observed {}", prefix="observed_"),
+        Part("block.photo_attitudes_observed", _ANGLES, turns, "observed {}", prefix="observed_"),
+        Part("block.principal_distances", ("principal_distance",), (image_unit,), "signed as it was given"),
         Part("photo_order", ("elimination",), ("1",), "row of the photo that is eliminated in this place"),
         Part("photo_corrections", both, units, "corrections, iteration by iteration", "list", "corrections"),
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from numbers import Integral
@@ -11,13 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, names, standard_deviations, truth_value, value_field
+from photogram.arguments.arrays import argument_error, names, truth_value, value_field
 from photogram.arguments.objects import require_name
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
-from photogram.network.core_arrays import CoreNetwork
 from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.words import phrase
 
@@ -419,85 +417,3 @@ def _bias(function: Callable[..., Any], selected: Selected, value: Floats, covar
         ends = [_evaluated(function, selected, selected.values + sign * step).ravel() for sign in (1, -1)]
         total += (ends[0] - 2 * value.ravel() + ends[1]) / SPREAD**2
     return np.asarray(0.5 * total.reshape(np.shape(value)))
-
-
-class Covarying(ABC):
-    """Covariances of the unknowns of P photos and n points of an adjusted network."""
-
-    photo_cofactors: Floats
-    point_cofactors: Floats
-    variance_of_unit_weight: float | None
-    state: _photocore.BlockState
-
-    @abstractmethod
-    def _core_network(self) -> CoreNetwork: ...
-
-    def _factor(self) -> _photocore.BlockCovariances:
-        return self._core_network().covariances(self.state, threads=0, progress=None)
-
-    @property
-    def covariance_scale(self) -> float:
-        """The scale of covariances: the variance of unit weight, or 1 without one."""
-        return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
-
-    @property
-    def photo_covariances(self) -> Floats:
-        """(P, k, k) covariances of photo unknowns, scaled by the unit weight variance.
-
-        Blocks have k = 6: X, Y, Z in the linear unit (longitude and latitude in radians, height), then omega,
-        phi, kappa in radians. These angles are the numbers of `photo_attitudes` with the definition by
-        `block.photo_to_ground`; `Result.photo_rotation_covariances` uses rotation vectors. Collections have
-        the parameters `collection.parameters`, in their order.
-        """
-        return self.photo_cofactors * self.covariance_scale
-
-    @property
-    def point_covariances(self) -> Floats:
-        """(n, 3, 3) covariances, scaled by the variance of unit weight."""
-        return self.point_cofactors * self.covariance_scale
-
-    @property
-    def photo_sd(self) -> Floats:
-        """(P, k) standard deviations of the unknowns of photos."""
-        return standard_deviations(self.photo_cofactors, self.covariance_scale)
-
-    @property
-    def point_sd(self) -> Floats:
-        """(n, 3) standard deviations."""
-        return standard_deviations(self.point_cofactors, self.covariance_scale)
-
-    @abstractmethod
-    def _adjusted(self) -> Adjusted: ...
-
-    @abstractmethod
-    def _refused(self, error: Failure) -> Exception: ...
-
-    def covariances(self) -> Covariances:
-        """Return an object that computes covariances between any unknowns from one factor.
-
-        The normal equations are formed and factored once, at the adjusted values. The object contains the
-        factor, and deleting the object releases its memory.
-
-        Raises
-        ------
-        AdjustmentError
-            If unknowns are not determined.
-        OutOfMemoryError
-            If the memory is not sufficient for the factor.
-        KeyboardInterrupt
-            If the user presses Ctrl-C.
-        """
-        return Covariances(self._adjusted(), self._factor, self._refused, self.covariance_scale)
-
-    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
-        """Return the covariance matrix of a selection, or between two selections.
-
-        For several selections use one object of :meth:`covariances`, which describes selections and errors.
-        """
-        return self.covariances().covariance(a, b)
-
-    def propagate(
-        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
-    ) -> Propagated:
-        """Return a function of unknowns with covariance; see `Covariances.propagate`."""
-        return self.covariances().propagate(function, unknowns, bias=bias)

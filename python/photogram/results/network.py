@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING
 from functools import cached_property
 from os import PathLike
@@ -16,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import finite_rows, freeze_fields, number
+from photogram.arguments.arrays import finite_rows, freeze_fields, number, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, fields, replace
 from photogram.messages import Message
-from photogram.network.core_arrays import CoreOptions
+from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
-from photogram.results.covariance import Covarying
+from photogram.results.covariance import Adjusted, Covariances, Failure, Propagated, Selection
 from photogram.results.parts import Iteration, Observed
 from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.statistics.limits import GlobalTest, global_test
@@ -38,11 +37,11 @@ if TYPE_CHECKING:
     from photogram.plots import Plots
     from photogram.plots.picture_data import Pictured
     from photogram.results.hypotheses import Hypotheses
-    from photogram.results.network_trial import Facts, NetworkTrial
+    from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
-    from photogram.statistics.findings import Removed, TypeFactor
+    from photogram.statistics.findings import Removed
 
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
 REMARKS = 5  # Number of messages of a `repr`
@@ -53,7 +52,7 @@ MAX_BIAS_RATIO = 6.0  # Permitted effect of undetected errors on points, in stan
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
+class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     """An adjusted network of P photos with k unknowns, n points and m image points.
 
     All arrays are in the order of the input. Values that were excluded from the adjustment are NaN. Residuals
@@ -212,6 +211,79 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
     @abstractmethod
     def _trial(self) -> NetworkTrial: ...
 
+    @abstractmethod
+    def _core_network(self) -> CoreNetwork: ...
+
+    def _factor(self) -> _photocore.BlockCovariances:
+        return self._core_network().covariances(self.state, threads=0, progress=None)
+
+    @property
+    def covariance_scale(self) -> float:
+        """The scale of covariances: the variance of unit weight, or 1 without one."""
+        return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
+
+    @property
+    def photo_covariances(self) -> Floats:
+        """(P, k, k) covariances of photo unknowns, scaled by the unit weight variance.
+
+        Blocks have k = 6: X, Y, Z in the linear unit (longitude and latitude in radians, height), then omega,
+        phi, kappa in radians. These angles are the numbers of `photo_attitudes` with the definition by
+        `block.photo_to_ground`; `Result.photo_rotation_covariances` uses rotation vectors. Collections have
+        the parameters `collection.parameters`, in their order.
+        """
+        return self.photo_cofactors * self.covariance_scale
+
+    @property
+    def point_covariances(self) -> Floats:
+        """(n, 3, 3) covariances, scaled by the variance of unit weight."""
+        return self.point_cofactors * self.covariance_scale
+
+    @property
+    def photo_sd(self) -> Floats:
+        """(P, k) standard deviations of the unknowns of photos."""
+        return standard_deviations(self.photo_cofactors, self.covariance_scale)
+
+    @property
+    def point_sd(self) -> Floats:
+        """(n, 3) standard deviations."""
+        return standard_deviations(self.point_cofactors, self.covariance_scale)
+
+    @abstractmethod
+    def _adjusted(self) -> Adjusted: ...
+
+    @abstractmethod
+    def _refused(self, error: Failure) -> Exception: ...
+
+    def covariances(self) -> Covariances:
+        """Return an object that computes covariances between any unknowns from one factor.
+
+        The normal equations are formed and factored once, at the adjusted values. The object contains the
+        factor, and deleting the object releases its memory.
+
+        Raises
+        ------
+        AdjustmentError
+            If unknowns are not determined.
+        OutOfMemoryError
+            If the memory is not sufficient for the factor.
+        KeyboardInterrupt
+            If the user presses Ctrl-C.
+        """
+        return Covariances(self._adjusted(), self._factor, self._refused, self.covariance_scale)
+
+    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
+        """Return the covariance matrix of a selection, or between two selections.
+
+        For several selections use one object of :meth:`covariances`, which describes selections and errors.
+        """
+        return self.covariances().covariance(a, b)
+
+    def propagate(
+        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
+    ) -> Propagated:
+        """Return a function of unknowns with covariance; see `Covariances.propagate`."""
+        return self.covariances().propagate(function, unknowns, bias=bias)
+
     def reliability(
         self, *, level: float = LEVEL, power: float = POWER, unit_weight: str = "known"
     ) -> Reliability:
@@ -248,50 +320,9 @@ class AdjustedNetwork(Covarying, Valued, Brief, Judged, Documented, ABC):
 
         None without redundancy numbers or convergence.
         """
-        computed = bool(finite_rows(self.redundancy)[self.used_images].all())
-        if not (computed and self.converged and self.degrees_of_freedom > 0):
-            return None
-        from photogram.results.network_trial import LostSupportError, Out
-        from photogram.results.reliability import Reliability, downweighted
-        from photogram.results.reliability_summary import reliability_summary
-        from photogram.statistics.weight_rules import wrong_types
+        from photogram.results.evaluation import reliability_summary
 
-        refused = LostSupportError, _photocore.BlockError, _photocore.CollectionError
-        facts, weight = self._hypothesis_facts(), "known" if self.KNOWN else "unknown"
-        found = evaluated = lost = None
-        # Other results remain valid; a network that is singular by rounding has a message already.
-        with suppress(*refused):
-            found = self.reliability(unit_weight=weight)
-        if found is not None:
-            evaluated, lost = self._evaluated(found, facts), found.downweighted
-        elif self.loss is not None:
-            lost = downweighted(self._trial(), self._terms, self.image_weights, self.used_images)
-        if lost is not None and (found is None or lost.removed.excessive or lost.unsupported):
-            # A common error may be the reason: the loss removes observations that have it.
-            trial = self._trial()
-            trial.out = Out(np.zeros(len(trial.deviations), dtype=bool))
-            with suppress(*refused):
-                whole = Reliability(
-                    trial, self.covariances, lost, level=LEVEL, power=POWER, unit_weight=weight
-                )
-                # Check points were compared with the robust solution.
-                errors, types = self._evaluated(whole, facts | {"agreement": None})
-                if errors.common() or wrong_types(types, errors.odds()):
-                    found, evaluated = found or whole, (errors, types)
-        if found is None or evaluated is None:
-            return None
-        return reliability_summary(found, *evaluated, heights=self.geographic)
-
-    def _evaluated(self, found: Reliability, facts: Facts) -> tuple[Hypotheses, list[TypeFactor]]:
-        """Evaluate the hypotheses of the catalogue with some facts, and standard deviations by type."""
-        from photogram.results.hypotheses import hypotheses
-        from photogram.results.type_factors import type_factors
-
-        axes = self._terms.point_axes
-        standing = found.standing.sum_and_freedom if self.KNOWN else self.sum_and_freedom
-        parts = found.trial, found.tests, facts, axes, standing, self.max_bias_ratio
-        types = type_factors(found.trial, found.tests, self.max_bias_ratio, standing) if self.KNOWN else []
-        return hypotheses(*parts, known=self.KNOWN), types
+        return reliability_summary(self)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""

@@ -68,7 +68,7 @@ def network_document(
     if result.loss is not None:
         course.append(Fact("Robust loss", about("loss", name=result.loss[0], scale=result.loss[1])))
     summary = result.reliability_summary
-    reliability = [] if summary is None else summary.parts(result._terms.linear_unit)
+    reliability = [] if summary is None else summary.parts()
     return verdict_document(
         result.verdict,
         what,

@@ -7,7 +7,7 @@ and selected inverse at the adjusted values.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any, cast
 
@@ -19,7 +19,7 @@ from photogram.results.hypotheses import Hypotheses
 from photogram.results.network_trial import NamedSuspects, Standing, Tests
 from photogram.results.reliability import Downweighted, Inseparable, Reliability
 from photogram.show.page import Part, Remarks, about
-from photogram.show.quantity import Quantities, Quantity, Table, column, for_people, members
+from photogram.show.quantity import Quantity, Table, column, for_people, members
 from photogram.statistics.findings import TypeFactor
 from photogram.statistics.reliability import TESTABLE
 
@@ -29,16 +29,14 @@ LOOKED_INTO = 2_000  # Number of points with examined pairs: those with the leas
 LIMIT = 0.9  # Largest correlation of separable tests (Foerstner 1983)
 APART = 1 / (1 + LIMIT)
 """Smallest redundancy that excludes this correlation of a pair: rho^2 <= (1 - r)(1 - s) / (r s)."""
-MOST_WAITING = 1_000_000  # Groups of a network whose factor and inverse wait for a report
-
-_SHARED = ("level", "power", "known", "suspects", "tests", "standing", "downweighted")
 
 
 @dataclass(frozen=True, eq=False)
 class Listed:
     """Groups of observations that reports list."""
 
-    weakest: Quantities  # of each type the groups with the largest undetected effect
+    kinds: Table  # number, redundancy and checks of groups by type of observation
+    weakest: Table  # of each type the groups with the largest undetected effect
     two_rays: int  # points on two photos: the wrong image cannot be identified
     # Inseparable pairs of observations on other points, the most correlated first
     pairs: tuple[Inseparable, ...]
@@ -78,42 +76,8 @@ class ReliabilitySummary:
         """(G,) groups with a direction of sufficient redundancy."""
         return self.tests.testable(self.suspects.row_starts)
 
-    def kinds_table(self) -> Table:
-        """Return the declared table of number, redundancy and checks of groups by type of observation."""
-        suspects, active, redundancy = self.suspects, self.tests.active, self.tests.redundancy
-        sizes = np.diff(suspects.row_starts)
-        of_rows, known = np.repeat(suspects.kinds, sizes), ~np.isnan(redundancy)
-        untestable = active & ~(self.tests.least > TESTABLE)
-        invisible = active & (self.tests.rank < sizes) & ~untestable
-        count = partial(np.bincount, minlength=len(suspects.kind_names))
-        there = np.flatnonzero(count(suspects.kinds[active]))
-        components, sums = (count(of_rows[known], own)[there] for own in (None, redundancy[known]))
-        groups, unchecked, one_sided = (
-            count(suspects.kinds[own])[there] for own in (active, untestable, invisible)
-        )
-        names = [suspects.kind_names[k] for k in there.tolist()]
-        columns = [
-            Quantity(names, kind="name", member="kind", head="Kind"),
-            Quantity(groups, member="groups", head="Groups", decimals=0),
-            Quantity(components, member="components", head="Components", decimals=0),
-            Quantity(sums, member="redundancy", head="Redundancy", decimals=3),
-            Quantity(sums / np.maximum(components, 1), head="Mean", decimals=3),
-            Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
-            Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
-        ]
-        note = about("reliability-kinds")
-        return Table("reliability.kinds", "Redundancy of groups of observations", columns, note)
-
-    def weakest_table(self, unit: str = "") -> Table:
-        """Return the declared table of weakest observations in object `unit`."""
-        *columns, own_point = self.listed.weakest
-        columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
-        weight = about(f"reliability-weight.{'known' if self.known else 'estimated'}")
-        note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
-        return Table("reliability.weakest", "Largest undetected errors", columns, note)
-
-    def parts(self, unit: str) -> list[Part]:
-        """Return the parts of a section; `unit` is the unit of the object space."""
+    def parts(self) -> list[Part]:
+        """Return the parts of a section."""
         listed, sentences = self.listed, list[str]()
         if listed.two_rays:
             sentences.append(about("reliability-two-rays", n=listed.two_rays))
@@ -125,7 +89,7 @@ class ReliabilitySummary:
         found = self.hypotheses
         errors = [found.tests(found.likely), found.external_reliability(found.effective)]
         shown = [replace(table, columns=for_people(table.columns)) for table in errors]
-        return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences), *shown]
+        return [listed.kinds, listed.weakest, Remarks(sentences), *shown]
 
     def document(self) -> dict[str, Any]:
         return {
@@ -138,26 +102,7 @@ class ReliabilitySummary:
         }
 
 
-def reliability_summary(
-    found: Reliability, hypotheses: Hypotheses, types: Sequence[TypeFactor], *, heights: bool
-) -> ReliabilitySummary:
-    """Return the summary of the reliability of a network.
-
-    `hypotheses` are errors of sets and single observations, `types` the agreement of standard deviations;
-    `heights` restricts effects on own points to heights, because plan coordinates are angles.
-    """
-    summary = ReliabilitySummary(
-        **{name: getattr(found, name) for name in _SHARED},
-        list_groups=partial(_listed, found, heights=heights),
-        hypotheses=hypotheses,
-        types=tuple(types),
-    )
-    if len(found.suspects) > MOST_WAITING:
-        summary.listed  # noqa: B018
-    return summary
-
-
-def _listed(found: Reliability, *, heights: bool) -> Listed:
+def listed(found: Reliability, unit: str, *, heights: bool) -> Listed:
     tests = found.tests
     two, points = _points(found.suspects, tests)
     checked = tests.least > TESTABLE
@@ -167,7 +112,8 @@ def _listed(found: Reliability, *, heights: bool) -> Listed:
     order = np.lexsort((second, first, -np.round(rho, 9)))[:PAIRS]
     named = zip(*(each[order].tolist() for each in (first, second, rho)), strict=True)
     return Listed(
-        weakest=_weakest(found, heights=heights),
+        kinds=_kinds(found),
+        weakest=_weakest(found, unit, heights=heights),
         two_rays=two,
         pairs=tuple(found.named(*pair) for pair in named),
         pairs_found=len(rho),
@@ -175,7 +121,28 @@ def _listed(found: Reliability, *, heights: bool) -> Listed:
     )
 
 
-def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
+def _kinds(found: Reliability) -> Table:
+    suspects, tests, redundancy = found.suspects, found.tests, found.redundancy
+    of_rows, known = suspects.kinds[found.row_groups()], ~np.isnan(redundancy)
+    count = partial(np.bincount, minlength=len(suspects.kind_names))
+    there = np.flatnonzero(count(suspects.kinds[tests.active]))
+    components, sums = (count(of_rows[known], own)[there] for own in (None, redundancy[known]))
+    masks = tests.active, found.untestable, found.invisible & ~found.untestable
+    groups, unchecked, one_sided = (count(suspects.kinds[own])[there] for own in masks)
+    columns = [
+        Quantity([suspects.kind_names[k] for k in there.tolist()], kind="name", member="kind", head="Kind"),
+        Quantity(groups, member="groups", head="Groups", decimals=0),
+        Quantity(components, member="components", head="Components", decimals=0),
+        Quantity(sums, member="redundancy", head="Redundancy", decimals=3),
+        Quantity(sums / np.maximum(components, 1), head="Mean", decimals=3),
+        Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
+        Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
+    ]
+    title, note = "Redundancy of groups of observations", about("reliability-kinds")
+    return Table("reliability.kinds", title, columns, note)
+
+
+def _weakest(found: Reliability, unit: str, *, heights: bool) -> Table:
     suspects, tests = found.suspects, found.tests
     external = found.group_external
     checked = np.flatnonzero(tests.active & (tests.least > TESTABLE) & np.isfinite(external))
@@ -189,14 +156,17 @@ def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
             own = own[external[own] >= least]
         groups += own[np.argsort(-external[own], kind="stable")[:LISTED]].tolist()
     own_points = np.array(found.own_points(groups, heights=heights))
-    return [
+    weight = about(f"reliability-weight.{'known' if found.known else 'estimated'}")
+    note = about("reliability-weakest", level=found.level, percent=100 * found.power, weight=weight)
+    columns = [
         column("kind", [suspects.kind(group) for group in groups], kind="name"),
         column("name", [str(suspects.name(group)) for group in groups], "Group", kind="name"),
         column("redundancy", tests.least[groups], "Least redundancy", decimals=3),
         column("detectable_sd", found.group_detectable[groups], "Detectable error, sd", decimals=2),
         column("external_sd", external[groups], "Moves up to, sd", decimals=2),
-        column("own_point", own_points, "Own point", decimals=4),
+        column("own_point", own_points, f"Own point {unit}".rstrip(), decimals=4),
     ]
+    return Table("reliability.weakest", "Largest undetected errors", columns, note)
 
 
 def _points(suspects: NamedSuspects, tests: Tests) -> tuple[int, list[int]]:

@@ -271,9 +271,9 @@ def _digest(result: AdjustedNetwork, given: str, parts: Mapping[str, Sequence[Pa
     adjusted = getattr(result, given)
     own = [each.field for one in parts.values() for each in one if each.field.startswith(f"{given}.")]
     for name in (*_ROWS, *(each.removeprefix(f"{given}.") for each in own)):
-        values = getattr(adjusted, name, None)
-        texts = isinstance(values, list)
-        digest.update(orjson.dumps(values) if texts else np.ascontiguousarray(values).tobytes())
+        if (values := getattr(adjusted, name, None)) is not None:
+            texts = isinstance(values, list)
+            digest.update(orjson.dumps(values) if texts else np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()
 
 

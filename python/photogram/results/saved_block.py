@@ -28,17 +28,10 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
         )
         given[f"{kind}_ids"] = names[kind]
         given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
-    columns = saved.sheets["photos"].columns
-    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
-    parts = parts_of_block(
-        geographic=given["spheroid"] is not None,
-        unit=given["linear_unit"],
-        image_unit=str(document["image_unit"]),
-        distances="principal_distance" in columns,
-        observed=[name for name, own in first.items() if any(each in columns for each in own)],
-    )
+    units = {"unit": given["linear_unit"], "image_unit": str(document["image_unit"])}
+    parts = parts_of_block(geographic=given["spheroid"] is not None, **units)
     own_arrays, block_arrays = saved.arrays(parts, "block")
-    block = Block(**given, **block_arrays)
+    block = Block(**given | block_arrays)
     members = saved.members("result", Result)
     if block.timed or any(each.knot_unknowns for each in block.cameras):
         # Coefficients of photos with their own trajectories, and knots, are created with their block.
