@@ -295,7 +295,7 @@ KINDS: dict[str, Plant] = {
     "kappa of a photo 180 deg": of_block(planted.turned_photo),
     "y of all images down": of_all(
         "mirrored",
-        "all photos are mirrored: y has the wrong sign",
+        "y of the images has the wrong sign",
         lambda block: {"image_xy": block.image_xy * [1, -1]},
     ),
     "pixels from the corner, y down": of_all(

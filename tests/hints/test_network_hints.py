@@ -273,7 +273,7 @@ def test_adjustments_that_fail_are_explained_when_asked():
     with pytest.raises(RankError) as raised, errors_explained(sign):
         adjust(sign)
     assert f"\n  hint: probably {Phrase('mistake.c or kappa')}" in str(raised.value)
-    assert any(each.phrase.code == "check.sign-of-principal-distance" for each in diagnose(sign).grave)
+    assert any(each.kind == "sign-of-principal-distance" for each in diagnose(sign).grave)
 
 
 def test_the_command_line_tells_them(run, tmp_path):

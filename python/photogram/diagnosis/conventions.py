@@ -76,7 +76,6 @@ class Verdict:
         best = list({str(each.message): each for each in reversed(best)}.values())[::-1]
         self.names = [each.name for each in best]
         self.change, self.exact = best[0].change, best[0].exact
-        self.rivals = [each.message for each in best[1:]]
         self.photos, self.distance = photos, distance
         self.before, self.after = given, least
         self.message = phrase(
@@ -131,7 +130,9 @@ def _of_groups(block: Block, photos: Indices) -> list[Verdict]:
         looked = view(block, own)
         given = misfits(looked, own)
         if len(own) and np.median(given) > SUSPICION:
-            fitting = passing(turns(distances == distance), looked, given, partial(misfits, photos=own))
+            fitting = passing(
+                turns(block, distances == distance), looked, given, partial(misfits, photos=own)
+            )
             names = [block.photo_ids[photo] for photo in np.flatnonzero(distances == distance).tolist()]
             if fitting:
                 found.append(Verdict(fitting, float(np.median(given)), names, distance=float(distance)))
@@ -177,20 +178,22 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
 
 def _single(block: Block, photos: Indices) -> list[Verdict]:
     """Try photos one by one, with the other photos unchanged."""
-    by_names: dict[tuple[str, ...], tuple[list[tuple[float, Proposal]], float, list[str]]] = {}
+    by_names: dict[tuple[str, ...], tuple[dict[str, float], float, list[int]]] = {}
     for photo in photos.tolist():
         own = np.array([photo])
         looked = view(block, own)
         given = float(misfits(looked, own)[0])
-        left = [
-            (float(misfits(each.change(looked), own)[0]), each)
-            for each in turns(np.arange(len(block.photo_ids)) == photo)
-        ]
-        fitting = [each for each in left if each[0] < min(PASSES * given, SUSPICION)]
+        tried = turns(block, np.arange(len(block.photo_ids)) == photo)
+        left = {each.name: float(misfits(each.change(looked), own)[0]) for each in tried}
+        fitting = {name: misfit for name, misfit in left.items() if misfit < min(PASSES * given, SUSPICION)}
         if fitting:
-            names = tuple(sorted(each.name for _, each in fitting))
-            by_names.setdefault(names, (fitting, given, []))[2].append(block.photo_ids[photo])
-    return [Verdict(*each) for each in by_names.values()]
+            by_names.setdefault(tuple(sorted(fitting)), (fitting, given, []))[2].append(photo)
+    found = []
+    for fitting, given, alike in by_names.values():
+        tried = turns(block, np.isin(np.arange(len(block.photo_ids)), alike))
+        best = [(fitting[each.name], each) for each in tried if each.name in fitting]
+        found.append(Verdict(best, given, [block.photo_ids[photo] for photo in alike]))
+    return found
 
 
 def latitudes(block: Block) -> list[Message]:

@@ -7,7 +7,7 @@ atan2(b2, b1)/2 a film is longer by 2 sqrt(b1^2 + b2^2) than across.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -153,7 +153,7 @@ def axis_hints(result: Result, adjusted: Adjuster) -> list[Message]:
 
 def _excess(result: Result) -> float:
     """Return the excess of the sum of squares; 0 unless the marks of a photo, or of a certificate, fail."""
-    squares, redundancy = Counter[str](), Counter[str]()
+    squares, redundancy = defaultdict[str, float](float), defaultdict[str, float](float)
     for kind in (result.kinds[name] for name in (Fiducial.KIND, CERTIFICATE) if name in result.kinds):
         of_rows = (kind.redundancy * np.nan_to_num(kind.standardized) ** 2).sum(axis=1)
         for row, own, r in zip(kind.rows.tolist(), of_rows, kind.redundancy.sum(axis=1), strict=True):

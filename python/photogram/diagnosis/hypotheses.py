@@ -17,6 +17,7 @@ from photogram.words import Phrase, phrase
 FOOT = 0.3048  # Metres; the survey foot differs by two millionths
 _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
 _HALF_TURN = np.pi / 2
+_OPPOSITE = str.maketrans("+-", "-+")
 _BEYOND = 1e4  # Radians: no intended angle is larger after a second conversion to degrees
 
 TURNS: dict[str, list[list[float]]] = {
@@ -29,6 +30,9 @@ TURNS: dict[str, list[list[float]]] = {
     "kappa - 90": [[0, 1], [-1, 0]],
 }
 """V, with observed = V predicted, by the name of the mistake."""
+
+KAPPA = {"c or kappa": 180.0, "kappa + 90": -90.0, "kappa - 90": 90.0}
+"""Degrees by which kappa (ground-to-photo) is to be rotated."""
 
 PIXELS = 8.0  # Scale of image coordinates that indicates another unit; a smaller one, a principal distance
 _SCALED, _SHIFTED = 0.15, 0.25
@@ -56,7 +60,7 @@ def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Proposal]:
     """Yield possible mistakes of a block; `seen` compares it with predictions."""
-    yield from turns(np.ones(len(block.photo_ids), dtype=bool))
+    yield from turns(block, np.ones(len(block.photo_ids), dtype=bool))
     composed = None if seen is None else image_hypothesis(block, seen)
     if composed is not None:
         yield composed
@@ -67,11 +71,22 @@ def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Proposa
     yield from _positions(block)
 
 
-def turns(photos: Bools) -> Iterator[Proposal]:
-    """Yield reflections and rotations of the images of (P,) photos."""
+def turns(block: Block, photos: Bools) -> Iterator[Proposal]:
+    """Yield reflections of the images of (P,) photos, and rotations of their kappa, which preserve lenses."""
     for name in TURNS:
+        code, degrees = name, KAPPA.get(name)
         change = partial(images_turned, photos=photos, turn=turn_of(name))
-        yield Proposal(name, phrase(f"mistake.{name}"), change)
+        if degrees is not None:
+            if block.photo_to_ground and abs(degrees) < 180.0:
+                degrees, code = -degrees, name.translate(_OPPOSITE)
+            change = partial(_kappa_turned, photos=photos, degrees=degrees)
+        yield Proposal(name, phrase(f"mistake.{code}"), change)
+
+
+def _kappa_turned(block: Block, photos: Bools, degrees: float) -> Block:
+    attitudes = block.photo_attitudes.copy()
+    attitudes[photos, 2] += np.radians(degrees)
+    return block.replace(photo_attitudes=attitudes)
 
 
 def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:
@@ -175,6 +190,8 @@ def quaternion_readings(matrices: Floats) -> dict[str, tuple[Phrase, Floats]]:
 
 def read_as(block: Block, name: str) -> Block:
     """Return a block with another angle definition; see :func:`attitude_readings`."""
+    if name == "sense":
+        return block.replace(photo_to_ground=not block.photo_to_ground)
     _, matrices = attitude_readings(block)[name]
     return block.replace(photo_attitudes=Attitudes(matrices).values(angles_form(block.photo_to_ground)))
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.conventions import Verdict, distances_in_millimetres, latitudes, readings, verdicts
 from photogram.diagnosis.findings import Finding, Section, Words, finding, note, note_all
-from photogram.diagnosis.hypotheses import TURNS, images_turned, turn_of
+from photogram.diagnosis.hypotheses import KAPPA, TURNS
 from photogram.diagnosis.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius
@@ -20,10 +18,7 @@ from photogram.words import phrase
 SUSPICIOUS = 0.25  # Cost of a doubtful orientation (0: rays meet, 1: rays miss)
 UPRIGHT = 0.8  # Least vertical component of the z axis of a near-vertical photo
 MOST = 20  # Maximum number of explanations
-KAPPA = {"c or kappa": 180, "kappa + 90": -90, "kappa - 90": 90}
-"""Degrees by which kappa (ground-to-photo) is rotated, by mistake."""
-MIRRORS = {name: turn_of(name) for name in TURNS if name not in KAPPA}  # Reflections, by cause
-HALF_TURN, SENSE = "c or kappa", "sense"
+HALF_TURN, SENSE, SIGN = "c or kappa", "sense", "sign-of-principal-distance"
 
 
 def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]:
@@ -42,14 +37,18 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
         found = next(iter(verdicts(view.seen)), None)
         if found is None:
             break
-        if _side_of(found):
+        if side := _side_of(found):
+            names = [name for name in view.seen.photo_ids if not found.photos or name in found.photos]
+            values = {"misfit_before": found.before, "misfit_after": found.after}
+            explanations.append(
+                finding("grave", found.message, names, values=values, kind=_kind(side, found))
+            )
             blocks = blocks or [view.seen, view.seen]
-            explanations += _explanations(view.seen, found, words)
-            view = view.of_seen(_put_right(view.seen, found))
-            blocks[1] = view.seen if len(found.photos) != 1 else blocks[1]
         else:
             section.findings.append(finding("grave", found.message, kind="convention"))
-            view, exact = view.changed(found.change), exact and found.exact
+        view, exact = view.changed(found.change), exact and found.exact
+        if side and len(found.photos) != 1:
+            blocks[1] = view.seen
     bars = distances_in_millimetres(view.seen)
     if bars is not None:
         section.findings.append(finding("grave", bars.message, kind="convention"))
@@ -92,56 +91,17 @@ def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: 
     return section
 
 
-def _turn(block: Block, name: str) -> int:
-    degrees = KAPPA[name]
-    return -degrees if block.photo_to_ground and name != HALF_TURN else degrees
-
-
 def _side_of(found: Verdict) -> str:
     """Return the mistake of a verdict that concerns the sides of cameras; empty if it does not."""
     concerns = {*found.names} & {*TURNS}
     return next((name for name in found.names if name in TURNS or name == SENSE), "") if concerns else ""
 
 
-def _concerned(block: Block, found: Verdict) -> Bools:
-    return np.asarray(np.isin(block.photo_ids, found.photos or block.photo_ids))
-
-
-def _put_right(block: Block, found: Verdict) -> Block:
-    """Return the block with the correction of a verdict; a rotation of kappa preserves lenses."""
-    name, photos = _side_of(found), _concerned(block, found)
-    if name == SENSE:
-        return block.replace(photo_to_ground=not block.photo_to_ground)
-    if name in MIRRORS:
-        return images_turned(block, photos, MIRRORS[name])
-    attitudes = block.photo_attitudes.copy()
-    attitudes[photos, 2] += math.radians(_turn(block, name))
-    return block.replace(photo_attitudes=attitudes)
-
-
-def _explanations(block: Block, found: Verdict, words: Words) -> Iterator[Finding]:
-    """Yield a finding on all photos, on those of a principal distance, or on each photo."""
-    name, values = _side_of(found), {"misfit_before": found.before, "misfit_after": found.after}
-    names = [photo for photo, of in zip(block.photo_ids, _concerned(block, found), strict=True) if of]
-    kind = "mirrored" if name in MIRRORS else "kappa"
-    fields: dict[str, Any] = {"cause": phrase(f"mirror.{name}")} if name in MIRRORS else {}
-    if name in KAPPA:
-        fields["turn"] = _turn(block, name)
-    if found.photos and found.distance is None:
-        code = f"check.{kind}.{'half-turn' if name == HALF_TURN else 'photo'}"
-        for photo in names:
-            yield finding("grave", phrase(code, **fields, photo=photo), [photo], values=values)
-        return
-    fields["rivals"] = phrase("check.rivals", rivals=found.rivals) if found.rivals else ""
-    fields["group"] = (
-        phrase("group.distance", distance=found.distance) if found.photos else phrase("group.all-photos")
-    )
-    code = f"check.{kind}.group"
-    if name == HALF_TURN:
-        code = "check.sign-of-principal-distance"
-    if name == SENSE:
-        code, fields = "check.sense-of-rotation", {"sense": words.sense}
-    yield finding("grave", phrase(code, **fields), names, values=values)
+def _kind(side: str, found: Verdict) -> str:
+    if side == SENSE:
+        return "sense-of-rotation"
+    of_single = found.photos and found.distance is None
+    return "mirrored" if side not in KAPPA else "kappa" if of_single or side != HALF_TURN else SIGN
 
 
 def _median(values: Floats) -> float:
