@@ -37,15 +37,16 @@ def test_the_check_proposes_nothing_for_what_moves():
 def test_the_check_finds_gross_errors():
     found = diagnose(rolling(gross=True))
     assert len(found.grave) == 1
-    assert found.grave[0].phrase.code == "check.blunder.group"
+    assert found.grave[0].phrase.code == "check.blunder.image"
     assert has_code(found.grave[0], "named.image", point="P0", photo="IMG_1")
-    assert found.grave[0].phrase.fields["error"].fields["sizes"][0].startswith("x 1")
+    assert found.grave[0].phrase.fields["component"] == "x"
+    assert 10 < abs(found.grave[0].phrase.fields["error"]) < 20
     block = scanned()
     row = next(k for k, each in enumerate(block.observations) if each.KIND == "velocity")
     wrong = replace(block.observations[row], velocity=[0.0, 0.0, 5.0])
     observations = [*block.observations[:row], wrong, *block.observations[row + 1 :]]
     found = diagnose(block.replace(observations=observations))
-    assert [str(each.phrase.fields["subject"]) for each in found.grave] == [wrong.name]
+    assert [str(each.phrase.fields["named"]) for each in found.grave] == [wrong.name]
 
 
 def test_the_check_of_what_cannot_be_adjusted():

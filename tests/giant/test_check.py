@@ -290,7 +290,7 @@ def test_section_13_a_gross_error_of_a_fifth_of_a_millimetre(block, photo, axis)
     assert (blunder.kind, blunder.photos) == ("blunder", [photo])
     assert blunder.points == [block.point_ids[block.image_points[row]]]
     assert blunder.values["error_um"] == pytest.approx(200, abs=60)
-    assert blunder.phrase.fields["axis"] == "xy"[axis]
+    assert blunder.phrase.fields["component"] == "xy"[axis]
 
 
 @pytest.mark.giant("13", "6 residual reading: 3-sigma, patterns, heights of two-ray points")

@@ -13,15 +13,22 @@ from photogram.diagnosis.gross import parted_rays
 from photogram.diagnosis.robust import critical
 from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, spread_of
 from photogram.lazy_dataclasses import replace
-from photogram.network.block import Block
-from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, BlockSuspects
+from photogram.network.block import Block, flown_by
+from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
 from photogram.results.snooping_log import Removal
 from photogram.results.snooping_result import Snooped
 from photogram.show.angles import ARCSEC
 from photogram.show.quantity import Axis, Table, column
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
+CODES = {
+    IMAGE: "check.blunder.image",
+    CONTROL: "check.control-misfit.component",
+    POSITION: "check.station-misfit",
+    ATTITUDE: "check.station-misfit",
+}
+"""Messages by type; all others are additional observations."""
 ODDS = 20.0  # Likelihood ratio below which another observation is an alternative
 BLUNDER, TWENTIETH = 3.0, 1.96
 SHOWN = 20
@@ -48,7 +55,7 @@ class Misfits:
             for entry in found.log
             if entry.returned is None
         ]
-        explained = self._exchanged() | self._parted(entries)
+        explained = self._exchanged() | (set() if flown_by(block) else self._parted(entries))
         for entry in entries:
             if self._image_of(entry) not in explained:
                 self._add(entry)
@@ -76,16 +83,13 @@ class Misfits:
             name, count = self.block.photo_ids[photo], int((self.block.image_photos == photo).sum())
             message = phrase("check.bad-photo.points", photo=name, n=count)
             self.of_suspects.append(finding("grave", message, [name], values={"points": float(count)}))
-        elif kind == IMAGE:
-            own = self.of_suspects if self.suspected[self._image_of(entry)] else self.in_section
-            own.append(self._image(entry))
         elif kind == CONTROL:
-            findings = self._control(entry)
-            self.control.setdefault(findings[0].points[0], []).extend(findings)
-        elif kind in (POSITION, ATTITUDE):
-            self.in_section += self._station(entry)
+            point = self.block.point_ids[self.suspects.points[entry.group]]
+            self.control.setdefault(point, []).extend(self._errors(entry))
+        elif kind == IMAGE and self.suspected[self._image_of(entry)]:
+            self.of_suspects += self._errors(entry)
         else:
-            self.in_section.append(self._other(entry))
+            self.in_section += self._errors(entry)
 
     def _exchanged(self) -> set[int]:
         """Add exchanged names; return the images that they explain."""
@@ -132,84 +136,60 @@ class Misfits:
         """Return the root of T in units of the remaining variance."""
         return math.sqrt(entry.fisher * entry.dimension)
 
-    def _image(self, entry: Removal) -> Finding:
-        block, row = self.block, self._image_of(entry)
-        photo, point = int(block.image_photos[row]), int(block.image_points[row])
-        axis = int(np.argmax(np.nan_to_num(np.abs(entry.error)) / block.image_sd[row]))
-        rivals = [rival.group for rival in entry.rivals if rival.odds < ODDS]
-        others = [
-            block.photo_ids[self.suspects.photos[own]]
-            for own in rivals
-            if self.suspects.kinds[own] == IMAGE and self.suspects.points[own] == point
-        ]
-        two = np.count_nonzero(block.image_points == point) == 2
-        unit, factor = small_unit(block.image_unit)
-        error, test = factor * entry.error[axis], self._test(entry)
-        code = "check.gross-error.one" if self.suspected[row] else "check.blunder.image"
-        message = phrase(
-            code,
-            point=block.point_ids[point],
-            photo=block.photo_ids[photo],
-            axis="xy"[axis],
-            error=error,
-            unit=unit,
-            test=test,
-            redundancy=entry.redundancy,
-            rivals=phrase(f"check.rival.{'two-rays' if two else 'images'}", photos=others) if others else "",
-        )
-        values = {f"error_{unit}": error, "test_value": test, "axis": float(axis)}
-        photos = [block.photo_ids[photo], *others]
-        return finding(self._level(entry), message, photos, [block.point_ids[point]], values)
-
-    def _control(self, entry: Removal) -> list[Finding]:
-        """Return findings on the components with significant errors."""
-        block, suspects = self.block, self.suspects
-        others = [
-            block.point_ids[suspects.points[rival.group]]
-            for rival in entry.rivals
-            if rival.odds < ODDS and suspects.kinds[rival.group] == CONTROL
-        ]
-        rivals = phrase("check.rival.control", points=others) if others else ""
-        sizes = np.abs(entry.error) / np.array(entry.error_sd) / spread_of(self.result)
+    def _errors(self, entry: Removal) -> list[Finding]:
+        """Return findings on the component with the largest error, or on all significant ones of a vector."""
+        suspects, kind = self.suspects, int(self.suspects.kinds[entry.group])
+        code = CODES.get(kind, "check.observation-misfit")
+        if kind == IMAGE and self.suspected[self._image_of(entry)]:
+            code = "check.gross-error.one"
+        sizes = np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd)) / spread_of(self.result)
         limit = critical(self.found.outcome.tests, FOUND)
-        chosen = [k for k in range(len(sizes)) if sizes[k] > limit] or [int(np.argmax(np.nan_to_num(sizes)))]
-        name = block.point_ids[suspects.points[entry.group]]
+        chosen = np.flatnonzero(sizes > limit).tolist() if kind in (CONTROL, POSITION, ATTITUDE) else []
+        points, photos = self._names(entry.group, kind)
+        fields = {"named": suspects.name(entry.group), "redundancy": entry.redundancy}
+        fields |= {"point": points[0] if points else "", "photo": photos[0] if photos else ""}
+        fields["rivals"], others = self._rivals(entry, kind)
+        (photos if kind == IMAGE else points).extend(others)
         found = []
-        for k in chosen:
-            axis, component = int(suspects.components[entry.rows[k]]), suspects.row_name(entry.rows[k])
-            error, unit = _shown(entry.error[k], suspects.unit(entry.rows[k]))
+        for k in chosen or [int(sizes.argmax())]:
+            row = entry.rows[k]
+            error, unit = _shown(entry.error[k], suspects.unit(row), kind)
             test = float(sizes[k]) if len(chosen) > 1 else self._test(entry)
-            fields = {"component": component, "point": name, "test": test, "error": error, "unit": unit}
-            message = phrase("check.control-misfit.component", **fields, rivals=rivals)
-            values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
-            found.append(finding(self._level(entry), message, [], [name, *others], values))
+            component = suspects.row_name(row)
+            message = phrase(code, component=component, error=error, unit=unit, test=test, **fields)
+            values = {f"error_{unit}".rstrip("_"): error, "test_value": test}
+            values |= {"component": float(suspects.components[row]), "redundancy": entry.redundancy}
+            found.append(finding(self._level(entry), message, photos, points, values))
         return found
 
-    def _station(self, entry: Removal) -> list[Finding]:
-        name, test = self.block.photo_ids[self.suspects.photos[entry.group]], self._test(entry)
-        part = "coordinate" if self.suspects.kinds[entry.group] == POSITION else "angle"
-        found = []
-        for row in entry.rows:
-            axis = int(self.suspects.components[row]) + 1
-            message = phrase(f"check.station-misfit.{part}", photo=name, axis=axis, test=test)
-            found.append(finding(self._level(entry), message, [name], values={"test_value": test}))
-        return found
+    def _names(self, group: int, kind: int) -> tuple[list[str], list[str]]:
+        """Return the points and photos of a group."""
+        if kind == OBSERVATION:
+            own = self.suspects.observations[int(self.suspects.subjects[group])]
+            return [*own.points], [*own.photos]
+        point, photo = int(self.suspects.points[group]), int(self.suspects.photos[group])
+        return [self.block.point_ids[point]] * (point >= 0), [self.block.photo_ids[photo]] * (photo >= 0)
 
-    def _other(self, entry: Removal) -> Finding:
-        """Return the finding on an additional observation, of its component with the largest error."""
-        observation = self.suspects.observations[int(self.suspects.subjects[entry.group])]
-        k = int(np.argmax(np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd))))
-        error, unit = _shown(entry.error[k], entry.units[k])
-        test, redundancy = self._test(entry), entry.redundancy
-        fields = {"component": entry.components[k], "test": test, "redundancy": redundancy}
-        fields |= {"observation": observation.name, "error": error, "unit": unit}
-        message = phrase("check.observation-misfit", **fields)
-        values = {"test_value": test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
-        return finding(self._level(entry), message, observation.photos, observation.points, values)
+    def _rivals(self, entry: Removal, kind: int) -> tuple[Phrase | str, list[str]]:
+        """Return the message on images of the point, or control points, that may be wrong instead."""
+        suspects, group = self.suspects, entry.group
+        of, ids = (suspects.points, self.block.point_ids)
+        rivals = [own.group for own in entry.rivals if own.odds < ODDS and suspects.kinds[own.group] == kind]
+        code = "check.rival.control"
+        if kind == IMAGE:
+            rivals = [own for own in rivals if suspects.points[own] == suspects.points[group]]
+            two = np.count_nonzero(self.block.image_points == suspects.points[group]) == 2
+            of, ids = suspects.photos, self.block.photo_ids
+            code = f"check.rival.{'two-rays' if two else 'images'}"
+        others = [ids[of[own]] for own in rivals if of[own] >= 0]
+        return phrase(code, names=others) if others else "", others
 
 
-def _shown(error: float, unit: str) -> tuple[float, str]:
-    """Return an error in the unit of reports: angles in arc seconds."""
+def _shown(error: float, unit: str, kind: int) -> tuple[float, str]:
+    """Return an error in the unit of reports: angles in arc seconds, images in micrometres."""
+    if kind == IMAGE:
+        unit, factor = small_unit(unit)
+        return factor * error, unit
     return (error / ARCSEC, "arcsec") if unit == "rad" else (error, unit)
 
 

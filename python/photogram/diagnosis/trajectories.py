@@ -6,6 +6,7 @@ unit, axis or angle would be blamed for it.
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,8 @@ import numpy as np
 from photogram.adjustment.snooping import snoop
 from photogram.diagnosis.after_adjustment import explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.findings import Finding, Section, finding, note, note_all, note_verdict
+from photogram.diagnosis.findings import Section, note, note_all, note_verdict
+from photogram.diagnosis.misfits import Misfits
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.shutters import readout_hints
 from photogram.diagnosis.structure import structure_section
@@ -28,7 +30,6 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.diagnosis.findings import Words
-    from photogram.results.snooping_log import Removal
 
 
 def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[Section], Result | None]:
@@ -54,7 +55,8 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     section.findings += counted_lines(block, adjusted)
     found = _snooped(block, adjusted)
     if found is not None and (result.converged or found.result.converged):
-        section.findings += [_finding(each) for each in found.removed]
+        misfits = Misfits(block, np.zeros(len(block.image_xy), dtype=bool), found, found.result)
+        section.findings += [*misfits.of_suspects, *misfits.in_section, *chain(*misfits.control.values())]
     note_verdict(section, result.verdict)
     return [structure, section], result
 
@@ -65,16 +67,3 @@ def _snooped(block: Block, adjusted: Adjuster) -> Snooped | None:
         return snoop(block, threads=adjusted.options.get("threads"))
     except (AdjustmentError, InputError):
         return None
-
-
-def _finding(entry: Removal) -> Finding:
-    sizes = [
-        f"{component} {error:.4g} {unit}".rstrip()
-        for component, unit, error, sd in zip(
-            entry.components, entry.units, entry.error, entry.error_sd, strict=True
-        )
-        if np.isfinite(error) and abs(error) > sd
-    ]
-    error = phrase("check.error", sizes=sizes) if sizes else ""
-    message = phrase("check.blunder.group", subject=entry.sentence, statistic=entry.statistic, error=error)
-    return finding("grave", message, values={"statistic": entry.statistic})
