@@ -103,7 +103,7 @@ def test_a_wrong_check_point_heads_the_verdict():
 def test_what_is_barely_rejected_is_a_warning():
     one = block()
     sd = adjust(one).check_points.sd[2, 2]
-    result = adjust(spoiled(one, 3.9 * sd))
+    result = adjust(spoiled(one, 4.4 * sd))
     assert (result.verdict.code, result.verdict.exit) == ("look-at-check-points", 0)
     assert result.verdict.exit_code(strict=True) == 4
 
@@ -112,7 +112,7 @@ def test_single_tests_and_the_joint_test_share_the_level():
     (single,) = (
         each for each in adjust(block()).verdict.tests if getattr(each.kind, "code", "") == "test.checks"
     )
-    assert (single.tests, single.level) == (8, pytest.approx(0.05 / 2 / 8))
+    assert (single.tests, single.level) == (8, pytest.approx(0.01 / 2 / 8))
 
 
 def test_their_own_standard_deviations_count():

@@ -11,7 +11,7 @@ from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
 from photogram.results.result import Result
-from photogram.statistics.evidence import WITHHELD, Evidence
+from photogram.statistics.evidence import SUSPECT, WITHHELD, Evidence
 from photogram.words import phrase
 
 VARIANCE = (0.5, 2.0)  # Variance of unit weight of realistic standard deviations
@@ -123,7 +123,7 @@ def held_values(result: Result) -> list[Finding]:
 def disagreeing(result: Result) -> list[Finding]:
     """Return the finding on disagreeing check points, as in the verdict."""
     evidence = Evidence(result._findings())
-    levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
+    levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", SUSPECT))
     for level, limit in levels:
         if points := evidence.disagreement(limit):
             names = [str(each.fields["name"]) for each in points if "name" in each.fields]

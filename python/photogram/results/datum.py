@@ -244,10 +244,12 @@ def check_points(result: Result) -> CheckPoints:
 def _agreement(result: Result, found: CheckPoints) -> Agreement:
     from photogram.results.network_tables import point_axes  # few blocks have check points
     from photogram.statistics.agreement import agreement
+    from photogram.statistics.evidence import SUSPECT
 
     survey = np.zeros((len(found.rows), 3, 3))
     survey[:, range(3), range(3)] = found.given_sd**2
-    asked = partial(agreement, scale=result.covariance_scale, second=result.freedom_of_scale)
+    scale, freedom = result.covariance_scale, result.freedom_of_scale
+    asked = partial(agreement, scale=scale, second=freedom, level=SUSPECT)
     alone = asked(
         found.differences,
         result.point_cofactors[found.rows],

@@ -129,8 +129,6 @@ class Hypotheses:
             return False
         if code in DATUM and (self.compared or np.isnan(self.mdb[row, 0])):
             return False
-        if code not in DATUM and self.undetected(row) < RARE:
-            return False
         return effect.others >= max(FEWEST, math.ceil(SHARE * self.points))
 
     def name(self, row: int) -> Phrase:

@@ -34,6 +34,8 @@ LENS_PARAMETERS = 7  # Parameters of the lens model whose decrease of the sum of
 
 WITHHELD = 0.001  # Significance level of check points that forbid the use of the result
 
+SUSPECT = 0.01  # Significance level of check points that the verdict names
+
 MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 
 MISSING_LENS = "hypothesis.camera-radial"  # Code of an error that only a wider camera model removes
@@ -319,7 +321,7 @@ class Evidence:
                 whole.append(
                     replace(_whole(checks.together), kind=Phrase("test.checks_together"), statistic="T/m")
                 )
-            own = self._of_each_check(checks, self.found.level)
+            own = self._of_each_check(checks, SUSPECT)
             largest.append(_largest(checks.points, own, self._count(checks.points)))
         patterns = [_of_pattern(each) for each in self.found.systematic]
         return [*whole, *(each for each in largest if each is not None), *patterns]

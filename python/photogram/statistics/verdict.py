@@ -16,7 +16,7 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics import weight_rules
-from photogram.statistics.evidence import GLOBAL, MISSING_LENS, WITHHELD, Evidence, Test, part_of
+from photogram.statistics.evidence import GLOBAL, MISSING_LENS, SUSPECT, WITHHELD, Evidence, Test, part_of
 from photogram.statistics.findings import IMAGES, Findings, Text
 from photogram.words import Phrase
 
@@ -311,7 +311,7 @@ def _checks(e: Evidence) -> Phrase | None:
 def _suspect_checks(e: Evidence) -> Phrase | None:
     if "check-points" in e.codes:
         return None
-    if points := e.disagreement(e.found.level):
+    if points := e.disagreement(SUSPECT):
         return Phrase("verdict.look-at-check-points", {"points": points})
     errors = [] if e.codes else list(e.found.of_checks)
     return Phrase("verdict.look-at-check-points.named", {"errors": errors}) if errors else None
