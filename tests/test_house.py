@@ -39,9 +39,9 @@ FLOORS = (
     ("arguments",),
     ("memory",),
     ("errors",),
-    ("messages",),
+    ("messages", "extras"),
     ("words",),
-    ("lazy_dataclasses",),
+    ("lazy_dataclasses", "summaries"),
 )
 """From the top down, as CONTRIBUTING has them: a file knows its own folder and floors below."""
 

@@ -21,7 +21,7 @@ from photogram.absolute_orientation.tables import (
 from photogram.arguments.types import Floats
 from photogram.io import json
 from photogram.show.forms import record
-from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Section, conventions, significant
 from photogram.show.quantity import members
 from photogram.statistics.findings import Findings, Tested
@@ -59,7 +59,7 @@ def orientation_document(result: Orientation) -> Document:
             Section.of(control(result)),
             Section.of(rejected(result)),
             Section("size", "Size and fit", [Facts("Size", size), Facts("Fit", quality)]),
-            tests_section(result.verdict),
+            Section.of(verdict_table(result.verdict)),
             Section.of(points(result)),
             Section.of(cycles(result)),
             remarks_section(result.problems),

@@ -13,7 +13,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.results.parts import Iteration
-from photogram.show.methods import Brief, Documented, Judged
+from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
@@ -46,7 +46,7 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Orientation(Documented, Judged, Brief):
+class Orientation(Documented, Judged):
     """Result of an absolute orientation; arrays of n stations, NaN if not used.
 
     Covariances are cofactors times `covariance_scale`.

@@ -13,7 +13,7 @@ from photogram.arguments.arrays import frozen, names, numbers, text
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.methods import Brief
+from photogram.summaries import Brief
 from photogram.words import phrase
 
 if TYPE_CHECKING:

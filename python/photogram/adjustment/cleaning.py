@@ -22,7 +22,7 @@ from photogram.results.grouping import Grouping, GroupsArgument, grouped, observ
 from photogram.results.network import AdjustedNetwork
 from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped
-from photogram.show.methods import Brief, Documented
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Part, Remarks, Section
 from photogram.statistics.components import WORTH_CHANGING
 from photogram.words import phrase
@@ -32,7 +32,7 @@ STANDS = 0.05  # Components with a smaller relative change are stable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cleaned(Brief, Documented):
+class Cleaned(Documented):
     """Network without gross errors, with weights that agree with its residuals.
 
     Attributes

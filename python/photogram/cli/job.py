@@ -178,7 +178,8 @@ class Job:
 
     def run(self) -> Run:
         """Return options, inputs and times of the run for its report."""
-        from photogram.show.run import Run, input_files
+        from photogram.io.seals import input_files
+        from photogram.show.run import Run
 
         found, others = input_files(self._inputs())
         inputs = [replace(each, path=self.shown(each.path)) for each in found]

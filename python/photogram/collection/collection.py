@@ -19,7 +19,7 @@ from photogram.network.block import span
 from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation, Observations
 from photogram.network.tables import numbered
-from photogram.show.methods import Brief, Rows
+from photogram.summaries import Brief, Rows
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -53,7 +53,7 @@ from photogram.errors import AdjustmentError, message_of
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
 from photogram.messages import Message
-from photogram.show.methods import Brief, Documented, Judged
+from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.findings import Findings
 from photogram.words import phrase
@@ -126,7 +126,7 @@ class PlateResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Documented, Judged, Brief):
+class Calibration(Documented, Judged):
     """Result of a comparator calibration.
 
     Attributes

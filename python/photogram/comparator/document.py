@@ -19,8 +19,8 @@ from photogram.comparator.tables import (
     terms,
     variance,
 )
-from photogram.show.angles import ARCSEC
-from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.io.angles import ARCSEC
+from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import (
     Document,
     Drawing,
@@ -71,7 +71,7 @@ def calibration_document(calibration: Calibration) -> Document:
             Section(
                 "joint", "Joint adjustment", _joint(calibration.joint) if calibration.joint else [], JOINT
             ),
-            tests_section(verdict),
+            Section.of(verdict_table(verdict)),
             remarks_section(calibration.messages),
         ],
         members=_members(calibration),

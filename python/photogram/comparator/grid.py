@@ -19,7 +19,7 @@ from photogram.io.numbers import is_whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import unknown_name
-from photogram.show.methods import Brief
+from photogram.summaries import Brief
 from photogram.words import phrase
 
 BUILT_IN = (773, 1320, 778)  # The master grids of the program, in the order of its option MASTER (0, 1, 2)

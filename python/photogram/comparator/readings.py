@@ -13,7 +13,7 @@ from photogram.comparator.grid import Grid
 from photogram.errors import InputError
 from photogram.io.places import Place as Place
 from photogram.messages import Message, unknown_name
-from photogram.show.methods import Brief
+from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
 # A larger distance from the other readings of a point indicates another point or unit

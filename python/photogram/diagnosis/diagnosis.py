@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from photogram.diagnosis.findings import Finding, Section
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.methods import Brief, Documented, Rows
+from photogram.show.methods import Documented
 from photogram.show.page import Document
 from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Rule, Verdict, as_phrase, fitting_rules
+from photogram.summaries import Rows
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ CONVENTIONS = frozenset(
 
 
 @dataclass(repr=False)
-class Diagnosis(Documented, Brief):
+class Diagnosis(Documented):
     """The outcome of a check.
 
     Attributes

@@ -12,13 +12,13 @@ from photogram.diagnosis.findings import Finding, Level, Section, finding, small
 from photogram.diagnosis.gross import parted_rays
 from photogram.diagnosis.robust import critical
 from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, spread_of
+from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block, flown_by
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
 from photogram.results.snooping_log import Removal
 from photogram.results.snooping_result import Snooped
-from photogram.show.angles import ARCSEC
 from photogram.show.quantity import Axis, Table, column
 from photogram.words import Phrase, phrase
 

@@ -32,9 +32,10 @@ from photogram.film.marks import usual_places
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.cameras import Camera
-from photogram.show.methods import Brief, Documented, Judged, Rows
+from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.findings import Findings
+from photogram.summaries import Rows
 from photogram.words import Phrase, phrase
 
 SD_DESIGN = 0.02
@@ -66,7 +67,7 @@ class CalibratedMarks:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Certificate(Documented, Judged, Brief):
+class Certificate(Documented, Judged):
     """Calibration certificate in mm, data strip at the left. :meth:`read` reads files.
 
     Parameters

@@ -21,7 +21,7 @@ from photogram.film.certificate_tables import (
     terms,
 )
 from photogram.network.cameras import Camera
-from photogram.show.judgement import tests_section, verdict_document
+from photogram.show.judgement import verdict_document, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section
 from photogram.show.quantity import members
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, band, error_bars, spread
@@ -56,7 +56,7 @@ def certificate_document(certificate: Certificate) -> Document:
             Section("marks", "Marks", mark_parts),
             Section("lens", "Lens", lens_parts),
             Section("camera", "Camera", [*map(parameters, cameras)]),
-            tests_section(verdict),
+            Section.of(verdict_table(verdict)),
             Section("certificate", "Certificate", [Facts("Certificate", facts)]),
         ],
         members={

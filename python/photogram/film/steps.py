@@ -10,10 +10,11 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
-from photogram.show.judgement import judged, tests_section
-from photogram.show.methods import Brief, Documented, Rows
+from photogram.show.judgement import judged, verdict_table
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table
+from photogram.summaries import Rows
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StepsCompared(Documented, Brief):
+class StepsCompared(Documented):
     """Points of one block from simultaneous and sequential interior orientation.
 
     Standard deviations are a priori: unit weight is 1.
@@ -75,7 +76,7 @@ class StepsCompared(Documented, Brief):
             highlights=_facts(self),
             sections=[
                 Section("points", of_axes.title, [of_axes], _WHY),
-                tests_section(self.inside.verdict),
+                Section.of(verdict_table(self.inside.verdict)),
             ],
             members={
                 "kind": "film",

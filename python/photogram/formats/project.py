@@ -16,7 +16,7 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.frame import Frame
 from photogram.results.features import Definition
-from photogram.show.methods import Brief
+from photogram.summaries import Brief
 from photogram.targets.board import Board
 from photogram.words import Phrase, phrase
 

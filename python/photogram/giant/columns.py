@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.giant.fields import MOST_ANGLE, format_angle, format_deviations, format_real
-from photogram.show.angles import ARCSEC
+from photogram.io.angles import ARCSEC
 
 Table = NDArray[np.uint8]
 

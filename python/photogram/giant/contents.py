@@ -14,7 +14,7 @@ from photogram.giant.ground import GroundPoint, ground_records
 from photogram.giant.images import ImageFrame, image_records
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
-from photogram.show.methods import Brief, Rows, few
+from photogram.summaries import Brief, Rows, few
 from photogram.words import phrase
 
 

@@ -10,8 +10,8 @@ import math
 from collections.abc import Iterable
 from decimal import Decimal
 
+from photogram.io.angles import ARCSEC
 from photogram.io.records import parse_real
-from photogram.show.angles import ARCSEC
 from photogram.words import phrase
 
 MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC

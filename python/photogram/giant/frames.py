@@ -9,8 +9,8 @@ import numpy as np
 from photogram.giant.columns import Columns, angle_fields, deviation_fields, position_fields, texts
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
+from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.angles import ARCSEC
 from photogram.words import phrase
 
 ATTITUDE_SD = 90 * 3600 * ARCSEC  # Default standard deviation of omega, phi and kappa: 90 degrees, in radians

@@ -13,7 +13,7 @@ from photogram.history.changes import Change, History, Series
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.forms import record
-from photogram.show.judgement import judged, tests_section
+from photogram.show.judgement import judged, verdict_table
 from photogram.show.page import Document, Drawing, Section, layered
 from photogram.show.page import about as explanation
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each
@@ -148,7 +148,7 @@ def history_document(
             Section.of(calibrations),
             *more,
             *changes[1:],
-            tests_section(verdict),
+            Section.of(verdict_table(verdict)),
         ],
         members={
             "verdict": verdict.document(),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,9 +12,33 @@ import orjson
 
 from photogram.errors import InputError
 from photogram.io.files import reading
+from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
 SEAL = "sha256"  # The member of a document that contains its own checksum
+LISTED = 200  # Maximum number of listed input files
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that was read."""
+
+    path: Path
+    size: int
+    sha256: str
+
+
+def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
+    """Return at most `LISTED` files with sizes and SHA-256, and the rest's number."""
+    every = [each for each in dict.fromkeys(paths) if each.is_file()]
+    found = [InputFile(path, path.stat().st_size, checksum(path)) for path in every[:LISTED]]
+    return found, len(every) - len(found)
+
+
+def checksum(path: Path) -> str:
+    """Return the checksum of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def seal(document: Mapping[str, Any]) -> str:
@@ -31,8 +55,8 @@ def check_sealed(document: Mapping[str, Any], path: Path) -> None:
 
 def check_seal(path: Path, expected: object, of: str) -> None:
     """Reject a file whose checksum differs from the one that the file `of` states."""
-    with reading(path), path.open("rb") as file:
-        found = hashlib.file_digest(file, "sha256").hexdigest()
+    with reading(path):
+        found = checksum(path)
     if found != expected:
         raise InputError(phrase("file.other", file=of), file=path)
 

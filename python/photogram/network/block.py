@@ -53,7 +53,7 @@ from photogram.network.tables import (
 )
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
-from photogram.show.methods import Brief, Rows, few
+from photogram.summaries import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from photogram.arguments.types import NONE, Floats, Indices, OptionalArray
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
-from photogram.show.methods import Brief, Rows
+from photogram.summaries import Brief, Rows
 from photogram.words import phrase
 
 Weights = Literal["corrected", "measured"]

@@ -14,7 +14,7 @@ from photogram.messages import Message
 from photogram.perspective_center.deck import Deck
 from photogram.perspective_center.grid import Grid, joined
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
-from photogram.show.methods import Brief, Documented
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Judgement
 from photogram.words import phrase
 
@@ -42,7 +42,7 @@ class Stop:
 
 
 @dataclass(repr=False)
-class Run(Documented, Brief):
+class Run(Documented):
     """Result of processing a deck.
 
     Attributes

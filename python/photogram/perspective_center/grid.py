@@ -12,7 +12,7 @@ from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.methods import Brief
+from photogram.summaries import Brief
 from photogram.words import phrase
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce", "single"]

@@ -24,10 +24,11 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid, single
-from photogram.show.methods import Brief, Judged
+from photogram.show.methods import Judged
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import externally_studentized, studentized_limit
 from photogram.statistics.reliability import ROUNDING, TESTABLE
+from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]

@@ -12,12 +12,12 @@ from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, PhotogramError, RankError, message_of
+from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.planning.pattern import Pattern, UnknownQuality, with_known_readout
 from photogram.results.hypotheses import FEWEST
-from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import Documented
 from photogram.show.page import (

@@ -12,7 +12,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import remarks_section, verdict_document
-from photogram.show.methods import Brief, Judged, Tabular
+from photogram.show.methods import Judged, Tabular
 from photogram.show.page import (
     Document,
     Drawing,
@@ -40,7 +40,7 @@ MARGIN = 1.1  # Limits relative to the extreme values
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VarianceComponents(Judged, Tabular, Brief):
+class VarianceComponents(Judged, Tabular):
     """Variance components of groups of observations.
 
     Attributes
@@ -218,7 +218,7 @@ class Bin:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VarianceFunction(Tabular, Brief):
+class VarianceFunction(Tabular):
     """Variance of image coordinates: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
 
     Attributes

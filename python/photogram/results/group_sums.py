@@ -20,7 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import by_name
 from photogram.results.grouping import Grouping, GroupsArgument, grouped, observables
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Brief, Tabular
+from photogram.show.methods import Tabular
 from photogram.show.page import Document, Section, about
 from photogram.show.quantity import Table, column, of_each
 from photogram.statistics.components import balanced
@@ -80,7 +80,7 @@ class GroupSum:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GroupSums(Tabular, Brief):
+class GroupSums(Tabular):
     """Groups of the observations of an adjusted network, with their tests.
 
     A group should be tested after the removal of gross errors, and jointly with the others by variance

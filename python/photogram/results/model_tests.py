@@ -31,7 +31,7 @@ from photogram.results.distortion import INTERIOR, compared_places, partials_of,
 from photogram.results.fixed_tests import score
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
-from photogram.show.methods import Brief, Tabular
+from photogram.show.methods import Tabular
 from photogram.show.page import Document, Section, about
 from photogram.show.quantity import Quantity, Table, of_each
 from photogram.statistics.agreement import quadratic
@@ -102,7 +102,7 @@ class Model:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Tabular, Brief):
+class Comparison(Tabular):
     """A comparison of models of the same observations."""
 
     models: tuple[Model, ...]  # The best first

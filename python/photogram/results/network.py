@@ -25,9 +25,10 @@ from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
 from photogram.results.covariance import Adjusted, Covariances, Failure, Propagated, Selection
 from photogram.results.parts import Iteration, Observed
-from photogram.show.methods import Brief, Documented, Judged, Rows
+from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
+from photogram.summaries import Rows
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ MAX_BIAS_RATIO = 6.0  # Permitted effect of undetected errors on points, in stan
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
+class AdjustedNetwork(Valued, Judged, Documented, ABC):
     """An adjusted network of P photos with k unknowns, n points and m image points.
 
     All arrays are in the order of the input. Values that were excluded from the adjustment are NaN. Residuals

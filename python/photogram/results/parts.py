@@ -16,7 +16,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation
 from photogram.network.unknowns import Unknown
-from photogram.show.methods import Brief
+from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

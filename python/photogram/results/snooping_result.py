@@ -14,11 +14,12 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import NamedSuspects, Standing
 from photogram.results.snooping_log import Outcome, Removal, Rival, disputes
 from photogram.results.snooping_options import SnoopOptions
-from photogram.show.methods import Brief, Documented, Rows, few
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section, about
 from photogram.show.quantity import Quantity, Table, for_people, members, members_of_each, of_each, records
 from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
+from photogram.summaries import Rows, few
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Snooped(Brief, Documented):
+class Snooped(Documented):
     """A network after data snooping.
 
     Attributes

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Floats
+from photogram.io.angles import degrees_written
 from photogram.show import page, quantity
-from photogram.show.angles import degrees_written
-from photogram.show.page import Column, Document, Drawing, Facts, Part, Remarks, Section, Text, Tone
+from photogram.show.page import Column, Document, Drawing, Facts, Part, Remarks, Section, Text
 from photogram.show.quantity import Axis, Quantity, chosen, long
 from photogram.words import Words
 
@@ -90,15 +90,15 @@ def written(table: quantity.Table, numeral: Callable[[str], str] = str) -> page.
 
 
 def _columns(each: Quantity, by: Floats | None, numeral: Callable[[str], str]) -> Iterator[Column]:
-    if each.kind == "name":
-        yield Column(each.head, _names(each), text=True, tones=_tones(each.marked), link=each.link)
-        return
     axes, of = each.axes or (Axis(""),), each.of
+    count = len(axes) if of is None else 1
+    marked = [()] * count if each.marked is None else np.reshape(each.marked, (-1, count)).T.tolist()
+    if each.kind == "name":
+        yield Column(each.head, _names(each), text=True, marked=marked[0], link=each.link)
+        return
     mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
     decimals = _decimals(each, by, mixed)
-    values = np.reshape(each.outward(), (-1, len(axes) if of is None else 1))
-    marked = None if each.marked is None else np.reshape(each.marked, values.shape)
-    for k, column in enumerate(values.T):
+    for k, column in enumerate(np.reshape(each.outward(), (-1, count)).T):
         axis, rows = axes[k], np.full(len(column), k) if of is None else of
         cells = [
             numeral(_written_number(each, value, axes[row], decimals[row]))
@@ -106,9 +106,7 @@ def _columns(each: Quantity, by: Floats | None, numeral: Callable[[str], str]) -
         ]
         head = each.head.format(axis.label or axis.name) if of is None else each.head
         unit = "° ′ ″" if each.kind == "value" and axis.angle == "dms" else unit_written(each.unit(axis))
-        yield Column(
-            head, cells, "" if mixed else unit, tones=_tones(None if marked is None else marked[:, k])
-        )
+        yield Column(head, cells, "" if mixed else unit, marked=marked[k])
 
 
 def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:
@@ -150,7 +148,3 @@ def _written_number(each: Quantity, value: Any, axis: Axis, decimals: int | None
     if each.kind == "value" and axis.angle == "dms" and math.isfinite(value):
         return degrees_written(value, decimals or 0)
     return page.number_text(value, decimals, each.figures)
-
-
-def _tones(marked: Bools | None) -> Sequence[Tone]:
-    return () if marked is None else ["look" if mark else "" for mark in marked]

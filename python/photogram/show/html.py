@@ -138,7 +138,7 @@ def _table(table: Table, within: str, known: Set[str]) -> str:
 
 
 def _cells(column: Column, known: Set[str]) -> Iterable[str]:
-    if not (column.text or column.tones):
+    if not (column.text or column.marked):
         return [f"<td>{escape(text)}</td>" for text in column.cells]  # Most cells
     targets = column.link.targets if column.link else repeat("")
     here = column.link is not None and column.link.here

@@ -56,10 +56,6 @@ def verdict_table(verdict: Verdict, words: Words | None = None) -> Table:
     return Table("tests", words("table.tests"), quantities, words("table.tests.note"))
 
 
-def tests_section(verdict: Verdict) -> Section:
-    return Section.of(verdict_table(verdict))
-
-
 def remarks_section(sentences: Iterable[object]) -> Section:
     """Return the section of warnings."""
     return Section("remarks", "Remarks", [Remarks([str(each) for each in sentences])])

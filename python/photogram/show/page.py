@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -36,13 +37,12 @@ class Column:
     cells: Sequence[str]
     unit: str = ""
     text: bool = False  # Whether the column contains texts, aligned left
-    tones: Sequence[Tone] = ()  # Of the cells, `look` if marked; empty: none
+    marked: Sequence[bool] = ()  # Mask of marked cells; empty: none
     link: quantity.Link | None = None  # Target of the cells on a page
 
     @property
     def toned(self) -> list[tuple[str, Tone]]:
-        plain: Tone = ""
-        return [*zip(self.cells, self.tones or [plain] * len(self.cells), strict=True)]
+        return [(cell, "look" if mark else "") for cell, mark in zip_longest(self.cells, self.marked)]
 
 
 @dataclass(frozen=True)

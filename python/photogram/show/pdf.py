@@ -23,7 +23,7 @@ from photogram.show.sketch.svg import LETTERS
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts included in the library; for other letters it uses fonts of the machine."""
 
-OMITTED = ("members", "phases", "words", "sketch", "cells", "tones", "link")  # Fields that pages do not show
+OMITTED = ("members", "phases", "words", "sketch", "cells", "marked", "link")  # Fields that pages do not show
 LONGEST = 30  # Longest word that is not broken, characters
 
 

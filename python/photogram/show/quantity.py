@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.io.angles import ARCSEC
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.angles import ARCSEC
 
 if TYPE_CHECKING:
     import pandas as pd

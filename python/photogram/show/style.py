@@ -7,8 +7,9 @@ The colours of categories are the ones of Okabe and Ito (2008, "Color Universal 
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from photogram.extras import need
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +24,6 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)  # Colours of categories
 INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"  # Colours of normal, marked and auxiliary elements
 SOFT = "#5c5c5c"  # Colour of secondary text: contrast 6.7 to 1 on white; FAINT, for lines, has 3.4
 DPI = 120  # Dots per inch of PNG files
-MATPLOTLIB = "matplotlib", "plots in formats other than SVG", "plots"  # Package, its use, and its extra
 
 SETTINGS: Any = {
     "font.size": 9.0,
@@ -41,20 +41,9 @@ SETTINGS: Any = {
 }
 
 
-def need(package: str, user: str, extra: str) -> None:
-    """Raise an error with the name of the extra if a package is missing."""
-    try:
-        import_module(package)
-    except ModuleNotFoundError as error:
-        if error.name != package:
-            raise
-        message = f"{user} need {package}: pip install 'photogram[{extra}]'"
-        raise ModuleNotFoundError(message, name=package) from None
-
-
 def new_figure(width: float, height: float) -> Figure:
     """Return a figure without a window (inches)."""
-    need(*MATPLOTLIB)
+    need("matplotlib")
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained", dpi=DPI)

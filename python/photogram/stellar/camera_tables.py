@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.show.angles import ARCSEC
+from photogram.io.angles import ARCSEC
 from photogram.show.quantity import Axis, Kind, Quantity, Table, component
 from photogram.stellar.parameters import GRAD
 from photogram.words import Phrase, phrase

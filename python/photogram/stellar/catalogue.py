@@ -12,10 +12,10 @@ import numpy as np
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.io.angles import ARCSEC
 from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records, renaming
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.angles import ARCSEC
 from photogram.words import phrase
 
 _MAS = 1e-3 * ARCSEC

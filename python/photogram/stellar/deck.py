@@ -11,9 +11,9 @@ import numpy as np
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
+from photogram.io.angles import ARCSEC
 from photogram.io.places import at_place
 from photogram.io.records import Record, Source, parse_integer, parse_real
-from photogram.show.angles import ARCSEC
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, NAMES
 from photogram.stellar.problem import Axis, Problem, default_parameters, rejected

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.angles import ARCSEC
-from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.io.angles import ARCSEC
+from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import (
     Document,
     Fact,
@@ -55,7 +55,7 @@ def plate_document(result: Result) -> Document:
         of_solution.pop("parameters"),
         of_solution.pop("derived"),
         Section.of(tables.worst(result, MAX_WORST_COORDINATES)),
-        tests_section(result.verdict),
+        Section.of(verdict_table(result.verdict)),
         of_solution.pop("directions"),
         of_solution.pop("distortion"),
         Section.of(tables.movement(result)),

@@ -14,8 +14,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools
 from photogram.errors import AdjustmentError, InputError, PhotogramError, message_of
+from photogram.io.angles import ARCSEC
 from photogram.messages import Message
-from photogram.show.angles import ARCSEC
 from photogram.statistics.weight_rules import LARGEST_FACTOR
 from photogram.stellar.blind import ATTITUDE_ERROR, FIELD_ERROR, locate
 from photogram.stellar.camera_tables import correlation_remarks

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
-from photogram.show.judgement import remarks_section, tests_section, verdict_document
+from photogram.io.angles import ARCSEC
+from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section, conventions
 from photogram.show.quantity import members
 from photogram.show.sketch.plot import Plot
@@ -41,7 +41,7 @@ def night_document(result: CalibratedNight) -> Document:
         Section("exposures", "Exposures", [layers]),
         Section("lens", "Lens", [tables.lens_tests(result), tables.lenses(result)], lens),
         Section.of(tables.worst(result, MAX_WORST_IMAGES)),
-        tests_section(result.verdict),
+        Section.of(verdict_table(result.verdict)),
         remarks_section(result.messages),
     ]
     details = [

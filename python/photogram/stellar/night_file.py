@@ -13,12 +13,12 @@ import numpy as np
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.io.angles import ARCSEC
 from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records, renaming
 from photogram.io.places import Place, at_place
 from photogram.io.toml import Document, KeyPlace, Table, read_document
 from photogram.messages import unknown_name
-from photogram.show.angles import ARCSEC
 from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue, star_key
 from photogram.stellar.identification import STARS_OF_AN_ATTITUDE

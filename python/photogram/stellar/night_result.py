@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, unknown_name
-from photogram.show.methods import Brief, Documented, Judged
+from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, significance
 from photogram.stellar.catalogue import Catalogue
@@ -23,6 +23,7 @@ from photogram.stellar.places import Earth, InertialAttitude, inertial_attitude
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import SkyCamera
+from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -139,7 +140,7 @@ def _at(name: str, message: Phrase) -> Phrase:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibratedNight(Judged, Documented, Brief):
+class CalibratedNight(Judged, Documented):
     """Calibrated camera of a night, with the use of its images.
 
     Attributes

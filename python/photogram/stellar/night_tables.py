@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.show.angles import ARCSEC
+from photogram.io.angles import ARCSEC
 from photogram.show.page import Fact, about
 from photogram.show.quantity import Axis, Quantities, Quantity, Table, chosen, of_each
 from photogram.stellar.camera_tables import (

@@ -6,8 +6,8 @@ import math
 
 from photogram.arguments.fields import check_fields
 from photogram.errors import InputError
+from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, fields
-from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import Site
 from photogram.words import phrase
 

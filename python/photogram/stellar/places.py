@@ -14,8 +14,8 @@ from photogram import _photocore
 from photogram.arguments.fields import Checked
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.angles import ARCSEC
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.pointing import pole_matrix, terrestrial
 from photogram.stellar.sky import Effects, Site

@@ -13,12 +13,12 @@ import numpy as np
 
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Bools, Floats
+from photogram.io.angles import ARCSEC
 from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records
 from photogram.io.places import Place, at_place
 from photogram.io.toml import Document, Table, read_document
 from photogram.lazy_dataclasses import fields
-from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.catalogue import star_key
 from photogram.stellar.options import Options

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.angles import ARCSEC
+from photogram.io.angles import ARCSEC
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel, ScaleBar, around, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT

@@ -12,10 +12,10 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import unknown_name
-from photogram.show.methods import Brief
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import COMMON, INDEX, NAMES
 from photogram.stellar.sky import TAU, Site
+from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
 

@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.show.methods import Brief, Documented, Judged
+from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, correlation_remarks, correlations, significance
 from photogram.stellar.cameras import PlateCamera
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Judged, Documented, Brief):
+class Result(Judged, Documented):
     """Result of a plate calibration.
 
     Residuals are computed minus measured (v of the report), for stars adjusted minus catalogue. They are

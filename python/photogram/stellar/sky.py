@@ -14,8 +14,8 @@ from photogram.arguments.arrays import shaped, truth_value
 from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.angles import ARCSEC as ARCSEC
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.angles import ARCSEC as ARCSEC
 from photogram.words import phrase
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)

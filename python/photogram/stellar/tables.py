@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.io.angles import ARCSEC, degrees_minutes_seconds
 from photogram.lazy_dataclasses import fields
-from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity, Table, component, of_each
 from photogram.stellar.camera_tables import (
     ARC_SECONDS,

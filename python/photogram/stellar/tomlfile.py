@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 
+from photogram.io.angles import ARCSEC
 from photogram.io.places import at_place
 from photogram.io.toml import KeyPlace, Table, read_document
-from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 
 _STATION = {

@@ -26,7 +26,7 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.methods import Brief, Rows
+from photogram.summaries import Brief, Rows
 from photogram.targets.choices import Shape
 from photogram.words import phrase
 

@@ -12,7 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
-from photogram.show.methods import Brief, Rows
+from photogram.summaries import Brief, Rows
 from photogram.targets.cross_validation import DifferenceTest
 from photogram.targets.housing import transformed
 from photogram.targets.maps import distance_text, image_grid

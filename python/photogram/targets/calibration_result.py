@@ -20,9 +20,10 @@ from photogram.network.trajectories import Clock
 from photogram.results.parts import AdjustedCamera, AdjustedUnknown
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
-from photogram.show.methods import Brief, Documented, Judged, Rows
+from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.verdict import Verdict
+from photogram.summaries import Rows
 from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 from photogram.targets.worth import Worth
@@ -35,7 +36,7 @@ STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")  # R <- Exp(w) R, t <- t + dt in vi
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibrated(Brief, Judged, Documented):
+class Calibrated(Judged, Documented):
     """Adjusted calibration of K cameras in V views of a board of n points.
 
     Attributes

@@ -18,9 +18,10 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.methods import Brief, Documented, Rows
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table
+from photogram.summaries import Rows
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.lens_fit import (
     GRID,
@@ -44,7 +45,7 @@ MIN_RELATIVE_VARIANCE = 1e-2  # added to each covariance to limit the weight of 
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Conversion(Brief, Documented):
+class Conversion(Documented):
     """Camera converted to another lens model.
 
     Attributes

@@ -32,7 +32,7 @@ from photogram.arguments.types import (
 )
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
-from photogram.show.methods import Brief, Rows, few
+from photogram.summaries import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
 MIN_CORNERS_PER_VIEW = 6

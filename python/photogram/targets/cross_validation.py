@@ -21,8 +21,8 @@ from photogram import _photocore
 from photogram.arguments.arrays import whole_number
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.methods import Brief, Rows
 from photogram.statistics.distributions import log_chi_square, log_fisher
+from photogram.summaries import Brief, Rows
 from photogram.targets.housing import Housing
 from photogram.targets.projection import common_partials, datum_rows
 from photogram.targets.vision import unknown_of, values_of

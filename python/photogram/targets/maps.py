@@ -12,7 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import hull, outside
-from photogram.show.methods import Brief, Rows
+from photogram.summaries import Brief, Rows
 from photogram.targets.projection import worst
 from photogram.targets.worth_options import DatumName
 

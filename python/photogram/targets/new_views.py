@@ -18,7 +18,7 @@ from photogram.arguments.fields import Checked
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.methods import Brief, Rows
+from photogram.summaries import Brief, Rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.maps import distance_text
 from photogram.targets.projection import of_functions, worst

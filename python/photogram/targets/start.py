@@ -21,7 +21,7 @@ from photogram.network.passages import Bend, Figure
 from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
-from photogram.show.methods import Brief, Rows, few
+from photogram.summaries import Brief, Rows, few
 from photogram.targets.board import Board
 from photogram.targets.choices import Regularisation, Shape, Synchronisation
 from photogram.targets.corners import Corners

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted
-from photogram.show.methods import Brief, Documented, Rows
+from photogram.show.methods import Documented
+from photogram.summaries import Rows
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.new_views import Candidate
 
@@ -37,7 +38,7 @@ class PlannedView:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class ViewPlan(Brief, Documented):
+class ViewPlan(Documented):
     """Planned views of a board for the calibration of a camera.
 
     Attributes

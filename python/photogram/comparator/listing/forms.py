@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.comparator.fits import Residuals
-from photogram.show.angles import degrees_minutes_seconds
+from photogram.io.angles import degrees_minutes_seconds
 
 if TYPE_CHECKING:
     from photogram.comparator import CaseResult

@@ -16,7 +16,7 @@ from photogram.comparator.listing.forms import angle, centred, nearest, number, 
 from photogram.comparator.polynomial import TERMS, Polynomial
 from photogram.comparator.tables import linear, variance
 from photogram.comparator.variance import CaseVarianceTest, PolynomialTest
-from photogram.show.angles import ARCSEC
+from photogram.io.angles import ARCSEC
 from photogram.show.page import probability_written
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from photogram.comparator.years.record import RecordedCalibration
 from photogram.errors import InputError
 from photogram.history.changes import History, dates_of, history
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.methods import Brief, Documented, Judged
+from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
@@ -153,7 +153,7 @@ def _variance(record: RecordedCalibration) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Documented, Judged, Brief):
+class Comparison(Documented, Judged):
     """Comparison of calibrations over years.
 
     Attributes

@@ -22,7 +22,7 @@ from photogram.film.certificate import Certificate
 from photogram.history.changes import History, dates_of, history
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.methods import Brief, Documented, Judged
+from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
@@ -189,7 +189,7 @@ class DatedCamera:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CameraComparison(Documented, Judged, Brief):
+class CameraComparison(Documented, Judged):
     """Comparison of camera calibrations over years.
 
     Attributes

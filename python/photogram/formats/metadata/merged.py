@@ -28,7 +28,7 @@ from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.show.judgement import remarks_section
-from photogram.show.methods import Brief, Documented
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Facts, Section
 from photogram.show.quantity import Table, column
 from photogram.words import phrase
@@ -204,7 +204,7 @@ class PhotoRecord:
 
 
 @dataclass(frozen=True, repr=False)
-class Metadata(Documented, Brief):
+class Metadata(Documented):
     """Positions of photos from the metadata of a folder of photographs.
 
     Attributes

@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.objects import require_kind
 from photogram.errors import AdjustmentError, InputError
+from photogram.io.seals import InputFile
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.result import Result
 from photogram.results.statement import comparison, tables
@@ -23,15 +24,15 @@ from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
 from photogram.results.statement.request import Asked
 from photogram.results.statement.texts import Texts
-from photogram.show.methods import Brief, Documented, Rows
+from photogram.show.methods import Documented
 from photogram.show.page import Document
 from photogram.show.quantity import records
-from photogram.show.run import InputFile
+from photogram.summaries import Rows
 from photogram.words import Phrase, phrase
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Statement(Brief, Documented):
+class Statement(Documented):
     """An accuracy statement for a client: figures, standards, methods, assumptions.
 
     Lengths are in the linear unit of the block, along east, north and up.

@@ -8,8 +8,9 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.extras import need
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.style import BLUE, INK, VERMILION, need
+from photogram.show.style import BLUE, INK, VERMILION
 
 NOWHERE = np.empty((0, 2))
 
@@ -225,7 +226,7 @@ def contours(
 
     Levels ascend; there are `steps` colours between two of them. Cells with NaN are empty.
     """
-    need("contourpy", "contours", "report")
+    need("contourpy")
     from contourpy import FillType, LineType, contour_generator  # part of matplotlib, fast to import
 
     kinds: Any = {"fill_type": FillType.OuterOffset, "line_type": LineType.Separate}

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from photogram.errors import InputError
+from photogram.extras import need
 from photogram.show.sketch import marks
 from photogram.show.sketch.layout import NAME, NOTE, NUMBER, free_names
 from photogram.show.sketch.marks import Panel, Sketch
-from photogram.show.style import FAINT, INK, MATPLOTLIB, SETTINGS, need
+from photogram.show.style import FAINT, INK, SETTINGS
 from photogram.words import phrase
 
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
@@ -24,7 +25,7 @@ ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 def on_axes(sketch: Sketch, ax: Any) -> None:
     """Draw a plot on one axes object per panel, or in a figure or subfigure."""
-    need(*MATPLOTLIB)
+    need("matplotlib")
     from matplotlib import rc_context
     from matplotlib.figure import FigureBase
 
