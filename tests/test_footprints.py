@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from photogram import Camera, Spheroid, adjust, network, simulate
-from photogram.results.footprints import (
-    ellipses,
-    fitting_scale,
-    footprints,
-    grounds,
-    metric_covariances,
-    picture_frames,
-)
+from photogram.formats.maps.ellipses import ellipses, fitting_scale
+from photogram.results.footprints import footprints, grounds, metric_covariances, picture_frames
 
 SPACES = {
     "rectangular": {},
@@ -95,12 +89,12 @@ def test_ellipses_are_where_the_quadratic_form_is_the_quantile():
     root = random.normal(size=(20, 3, 3))
     covariances = root @ root.transpose(0, 2, 1)
     found = ellipses(covariances)
-    outlines = found.outlines(np.zeros((20, 2)))
+    outlines = found.outlines()
     forms = np.einsum("nvi,nij,nvj->nv", outlines, np.linalg.inv(covariances[:, :2, :2]), outlines)
     np.testing.assert_allclose(forms, 5.991464547107979)  # chi-square, two degrees of freedom, 95 %
     assert (found.major >= found.minor).all()
     np.testing.assert_array_equal(outlines[:, 0], outlines[:, -1])
-    ends = found.outlines(np.ones((20, 2)), scale=10.0)[:, 0] - 1.0
+    ends = found.outlines(scale=10.0)[:, 0]
     np.testing.assert_allclose(
         ends, 10 * found.major[:, None] * np.stack([np.sin(found.azimuth), np.cos(found.azimuth)], 1)
     )

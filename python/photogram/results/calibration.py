@@ -25,6 +25,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
+from photogram.results.network_tables import image_axes
 from photogram.results.parts import AdjustedCamera
 from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section, about, significant
 from photogram.show.quantity import Axis, Quantity, Table, component, for_people, members, of_each, records
@@ -338,9 +339,8 @@ def _terms_together(groups: Sequence[TermsTest]) -> Table:
 
 
 def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
-    axes = (Axis("", unit, small="um", factor=1000.0) if unit == "mm" else Axis.of("", unit),)
-    inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
-    rows = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
+    axes = (replace(image_axes(unit)[0], name=""),)
+    rows = curve.rows(RADII)
     added = "measured" if curve.direction == "backward" else "ideal"
     column: Any = partial(Quantity, axes=axes, kind="deviation", decimals=3)
     columns = [
@@ -360,12 +360,11 @@ def _field_remarks(result: Result, found: Calibration) -> list[str]:
     field, unit = lens_field(result, found.camera), str(found.camera.camera.unit)
     if field is None:
         return []
-    factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
-    at = field.largest
-    x, y = field.positions[at]
-    (dx, dy), (sx, sy) = field.vectors[at], np.sqrt(np.diag(field.covariances[at]))
-    sizes = {"dx": factor * dx, "dy": factor * dy, "sx": factor * sx, "sy": factor * sy, "small": written}
-    return [about("field", names=list(field.names), x=x, y=y, unit=unit, **sizes)]
+    axis, at = image_axes(unit)[0], field.largest
+    numbers = *field.vectors[at], *np.sqrt(np.diag(field.covariances[at]))
+    sizes = dict(zip(("dx", "dy", "sx", "sy"), np.multiply(axis.factor, numbers), strict=True))
+    place = dict(zip("xy", field.positions[at], strict=True))
+    return [about("field", names=list(field.names), **place, unit=unit, **sizes, small=axis.small)]
 
 
 def calibration_member(result: Result, found: Calibration) -> dict[str, Any]:

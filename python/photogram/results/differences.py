@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Things, adjusted
-from photogram.results.result import Result
+from photogram.results.result import Result, least_turns
 from photogram.words import Phrase, phrase
 
 _KINDS = ("photo", "point", "camera", "unknown")
@@ -108,7 +107,7 @@ def differences(first: Result, second: Result) -> Differences:
             turning = np.array(
                 [component in ("omega", "phi", "kappa") for _, component in shared], dtype=bool
             )
-            steps = np.where(turning, steps - math.tau * np.round(steps / math.tau), steps)
+            steps = np.where(turning, least_turns(steps), steps)
         with np.errstate(divide="ignore", invalid="ignore"):
             values = _larger(values, steps / sd, kind, shared)
             deviations = _larger(deviations, np.where(other_sd == sd, 0.0, other_sd / sd - 1), kind, shared)

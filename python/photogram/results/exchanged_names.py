@@ -12,6 +12,7 @@ observations. Images i and j of a photo are exchanged if T of both points with t
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -66,9 +67,8 @@ def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Ex
     pairs = _pairs(plain, used[seen], on_frames)
     if not pairs:
         return []
-    fit = _Fit(plain, used[seen])
     wanted = sorted({(i, k) for pair in pairs for i in pair for k in pair})
-    found = dict(zip(wanted, fit.of(wanted), strict=True))
+    found = dict(zip(wanted, _fitted(plain, used[seen], wanted), strict=True))
     passing: dict[tuple[int, int], list[tuple[float, float, int, int]]] = {}
     for i, j in pairs:
         as_named = found[i, i][0] + found[j, j][0]
@@ -107,79 +107,66 @@ def _pairs(block: Block, used: Bools, on_frames: Bools) -> list[tuple[int, int]]
     ]
 
 
-class _Fit:
-    def __init__(self, block: Block, used: Bools) -> None:
-        self.block, self.used = block, used
-        self.rays = Rays.of(block)
-        self.order = np.argsort(block.image_points, kind="stable")
-        counts = np.bincount(block.image_points, minlength=len(block.point_ids))
-        self.start = np.concatenate([[0], np.cumsum(counts)])
+def _fitted(block: Block, used: Bools, wanted: Sequence[tuple[int, int]]) -> list[tuple[float, int]]:
+    """Return T and its dimension for points of images, each with the ray of another image.
 
-    def of(self, wanted: list[tuple[int, int]]) -> list[tuple[float, int]]:
-        """Return T and its dimension for points of images, each with the ray of another image."""
-        of_images = [np.append(self._others(image), place) for image, place in wanted]
-        sizes = [len(each) for each in of_images]
-        problem, rows = np.repeat(np.arange(len(wanted)), sizes), np.concatenate(of_images)
-        points = self.block.image_points[[image for image, _ in wanted]]
-        squares = self._squares(problem, rows, points)
-        held = np.isfinite(self._prior_sd(points)).sum(axis=1)
-        dimensions = 2 * np.array(sizes) + held - 3
-        return list(zip(squares.tolist(), dimensions.tolist(), strict=True))
-
-    def _others(self, image: int) -> Indices:
-        """Return the other images of a point, on other photos: used ones, if any."""
-        block, point = self.block, self.block.image_points[image]
-        own = self.order[self.start[point] : self.start[point + 1]]
+    Points have their other used images, if any, else all their other images.
+    """
+    order = np.argsort(block.image_points, kind="stable")
+    starts = np.searchsorted(block.image_points[order], np.arange(len(block.point_ids) + 1))
+    rows, points = list[Indices](), block.image_points[[image for image, _ in wanted]]
+    for point, (image, place) in zip(points.tolist(), wanted, strict=True):
+        own = order[starts[point] : starts[point + 1]]
         own = own[block.image_photos[own] != block.image_photos[image]]
-        good = own[self.used[own]]
-        found: Indices = good if len(good) else own
-        return found
+        good = own[used[own]]
+        rows.append(np.append(good if len(good) else own, place))
+    sizes = np.array([*map(len, rows)])
+    prior_sd = np.full((len(points), 3), np.inf)
+    if not block.geographic:  # The axes of priors are those of the block
+        known = np.isfinite(block.point_positions[points])
+        prior_sd = np.where(known, block.point_sd[points], np.inf)
+    squares = _squares(
+        block, np.repeat(np.arange(len(wanted)), sizes), np.concatenate(rows), points, prior_sd
+    )
+    dimensions = 2 * sizes + np.isfinite(prior_sd).sum(axis=1) - 3
+    return list(zip(squares.tolist(), dimensions.tolist(), strict=True))
 
-    def _prior_sd(self, points: Indices) -> Floats:
-        """(n, 3) standard deviations of given coordinates; not used in geographic space."""
-        sd = self.block.point_sd[points]
-        if self.block.geographic:
-            return np.full(sd.shape, np.inf)
-        return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
 
-    def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
-        """(n,) minimum sums of squares of images `rows` of points `own`; infinite behind cameras."""
-        block, rays, count = self.block, self.rays, len(points)
-        sd = block.image_sd[rows]
+def _squares(block: Block, own: Indices, rows: Indices, points: Indices, prior_sd: Floats) -> Floats:
+    """(n,) minimum sums of squares of images `rows` of points `own`; infinite behind cameras."""
+    rays, sd, count = Rays.of(block), block.image_sd[rows], len(points)
 
-        def total(values: Floats) -> Floats:
-            return sums_of(own, values, count)
+    def total(values: Floats) -> Floats:
+        return sums_of(own, values, count)
 
-        across, right = rays.equations()
-        position = meet(total(across[rows]), total(right[rows]), counts_of(own, count))
-        # The axes are those of the block if priors are used, and a component may be unknown.
-        given = block.point_positions[points] - self.rays.axes.origin
-        prior_sd = self._prior_sd(points)
-        held = np.isfinite(prior_sd)
-        known = held.all(axis=1)
-        position[known] = given[known]
-        there = np.isfinite(position[own, 0])
-        if not there.any():
-            return np.full(count, np.inf)
-        photos = block.image_photos[rows]
-        reach = np.median(np.linalg.norm(position[own] - rays.centres[photos], axis=1)[there])
-        distances = np.abs(block.known_distances("exchanged names")[photos])
-        least = HELD * float(np.median(sd)) * reach / float(np.median(distances))
-        weight = np.where(held, 1 / np.maximum(np.where(held, prior_sd, 1.0), least) ** 2, 0.0)
-        squares = np.full(count, np.nan)
-        with np.errstate(all="ignore"):
-            for _ in range(STEPS):
-                residuals, in_front = rays.residuals(position[own], rows)
-                residuals = residuals / sd
-                partials = rays.partials(position[own], rows) / sd[:, :, np.newaxis]
-                apart = np.where(held, given - position, 0.0)
-                squares = total((residuals**2).sum(axis=1, keepdims=True))[:, 0]
-                squares = squares + (weight * apart**2).sum(axis=1)
-                normal = total(np.einsum("mki,mkj->mij", partials, partials))
-                normal[:, range(3), range(3)] += weight
-                vector = total(np.einsum("mki,mk->mi", partials, residuals)) + weight * apart
-                sound = np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(vector).all(axis=1)
-                sound[sound] &= np.linalg.cond(normal[sound]) < 1e14
-                position[sound] += np.linalg.solve(normal[sound], vector[sound, :, np.newaxis])[..., 0]
-        behind = np.bincount(own, ~in_front, count) > 0
-        return np.where(behind | ~np.isfinite(squares), np.inf, squares)
+    across, right = rays.equations()
+    position = meet(total(across[rows]), total(right[rows]), counts_of(own, count))
+    # A component may be unknown.
+    given, held = block.point_positions[points] - rays.axes.origin, np.isfinite(prior_sd)
+    known = held.all(axis=1)
+    position[known] = given[known]
+    there = np.isfinite(position[own, 0])
+    if not there.any():
+        return np.full(count, np.inf)
+    photos = block.image_photos[rows]
+    reach = np.median(np.linalg.norm(position[own] - rays.centres[photos], axis=1)[there])
+    distances = np.abs(block.known_distances("exchanged names")[photos])
+    least = HELD * float(np.median(sd)) * reach / float(np.median(distances))
+    weight = np.where(held, 1 / np.maximum(np.where(held, prior_sd, 1.0), least) ** 2, 0.0)
+    squares = np.full(count, np.nan)
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            residuals, in_front = rays.residuals(position[own], rows)
+            residuals = residuals / sd
+            partials = rays.partials(position[own], rows) / sd[:, :, np.newaxis]
+            apart = np.where(held, given - position, 0.0)
+            squares = total((residuals**2).sum(axis=1, keepdims=True))[:, 0]
+            squares = squares + (weight * apart**2).sum(axis=1)
+            normal = total(np.einsum("mki,mkj->mij", partials, partials))
+            normal[:, range(3), range(3)] += weight
+            vector = total(np.einsum("mki,mk->mi", partials, residuals)) + weight * apart
+            sound = np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(vector).all(axis=1)
+            sound[sound] &= np.linalg.cond(normal[sound]) < 1e14
+            position[sound] += np.linalg.solve(normal[sound], vector[sound, :, np.newaxis])[..., 0]
+    behind = np.bincount(own, ~in_front, count) > 0
+    return np.where(behind | ~np.isfinite(squares), np.inf, squares)

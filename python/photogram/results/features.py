@@ -305,13 +305,7 @@ def features(
         As in :meth:`Result.covariances`.
     """
     fitted, empty = _fitting(result, k, coverage)
-    found = []
-    for name, each in definitions.items():
-        try:
-            found.append(fitted(name, each))
-        except InputError as error:
-            raise InputError(_of_feature(name, error)) from None
-    return replace(empty, features=tuple(found))
+    return replace(empty, features=tuple(fitted(*each) for each in definitions.items()))
 
 
 def with_features(result: Result, definitions: Mapping[str, Definition]) -> Result:
@@ -324,17 +318,13 @@ def with_features(result: Result, definitions: Mapping[str, Definition]) -> Resu
     except (InputError, AdjustmentError) as error:
         message = Message(phrase("fit.none", reason=message_of(error)))
         return replace(result, messages=[*result.messages, message])
-    for name, each in definitions.items():
+    for each in definitions.items():
         try:
-            found.append(fitted(name, each))
+            found.append(fitted(*each))
         except (InputError, AdjustmentError) as error:
-            messages.append(Message(_of_feature(name, error)))
+            messages.append(Message(message_of(error)))
     told = [*result.messages, *messages, *(Message(each) for each in empty.remarks)]
     return replace(result, messages=told, features=replace(empty, features=tuple(found)))
-
-
-def _of_feature(name: str, error: Exception) -> Phrase:
-    return phrase("error.at", what=phrase("fit.named", name=name), message=message_of(error))
 
 
 def _fitting(
@@ -349,10 +339,15 @@ def _fitting(
     number("k", k, "positive")
     remarks = (str(phrase("fit.scale")),) if result.datum.has_chosen_scale else ()
     covariances = result.covariances()
-    return (
-        lambda name, definition: _fitted(result, covariances, name, definition, k, freedom),
-        Features((), k, coverage, freedom, remarks),
-    )
+
+    def fitted(name: str, definition: Definition) -> Feature:
+        try:
+            return _fitted(result, covariances, name, definition, k, freedom)
+        except InputError as error:
+            what = phrase("fit.named", name=name)
+            raise InputError(phrase("error.at", what=what, message=message_of(error))) from None
+
+    return fitted, Features((), k, coverage, freedom, remarks)
 
 
 def _fitted(

@@ -14,6 +14,7 @@ from photogram.network.films import Film, FilmPlacement, FilmSize, Readings, Sca
 from photogram.network.observations import FILM, Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
+from photogram.results.network_tables import image_axes
 from photogram.results.network_trial import OBSERVATION, type_name
 from photogram.results.tables import Tests
 from photogram.show.page import Drawing, Part, Section, about
@@ -108,7 +109,7 @@ def film_patterns(result: Result) -> list[VectorField]:
 _UNITS = ("mm", "mm", "rad", "", "", "")
 _SAID = (*(Axis("scale x"), Axis("scale y")), *(Axis.of("between axes", "rad"), Axis.of("rotation", "rad")))
 _DEVICE = (Axis.of("Sx", ""), Axis.of("Sy", ""), Axis.of("alpha", "rad"))
-_MM = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
+_MM = image_axes("mm")
 
 
 def film_table(result: Result) -> list[Quantity]:

@@ -393,8 +393,3 @@ def adjusted_cameras(
         numbers = np.array(redundancy), np.array(information), photos, images
         found.append(AdjustedCamera(name, given, camera, matrix, matrix * scale, *numbers))
     return tuple(found)
-
-
-def units(camera: Camera) -> list[str]:
-    """Return the unit of each parameter: `mm`, `mm^-2`, ..., empty for plain numbers."""
-    return [camera.unit_of(name) for name in camera.names]

@@ -337,7 +337,7 @@ class Result(OnFilm, AdjustedNetwork):
         ]
         residuals = np.hstack(observed) - np.hstack([self.photo_positions, self.photo_attitudes])
         turning = [0, 3, 4, 5] if self.block.geographic else [3, 4, 5]
-        residuals[:, turning] = _least_turns(residuals[:, turning])
+        residuals[:, turning] = least_turns(residuals[:, turning])
         return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
 
     @property
@@ -382,7 +382,7 @@ class Result(OnFilm, AdjustedNetwork):
         """
         differences = self.point_positions - self.block.point_positions
         if self.block.geographic:
-            differences[:, 0] = _least_turns(differences[:, 0])
+            differences[:, 0] = least_turns(differences[:, 0])
         return differences
 
     @cached_property
@@ -443,5 +443,6 @@ class Result(OnFilm, AdjustedNetwork):
         return self._table("observation")
 
 
-def _least_turns(angles: Floats) -> Floats:
+def least_turns(angles: Floats) -> Floats:
+    """Return angles without full rotations."""
     return np.asarray(angles - math.tau * np.round(angles / math.tau))

@@ -10,11 +10,12 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.crs_results import Placed, placed
+from photogram.formats.maps.ellipses import CONFIDENCE, ellipses, fitting_scale
 from photogram.formats.project import frame_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
 from photogram.network.moving_photos import Moment
-from photogram.results.footprints import CONFIDENCE, ellipses, fitting_scale, footprints
+from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.results.tables import ComponentTests, Tests
 from photogram.statistics.limits import normal_limit
@@ -243,7 +244,7 @@ def _with_ellipses(found: Placed, most: int) -> tuple[Indices, int]:
 
 def _ellipses(found: Placed, known: Indices, confidence: float, scale: float) -> _Part:
     own = ellipses(found.point_covariances[known], confidence)
-    steps = own.outlines(np.zeros((len(known), 2)), scale)
+    steps = own.outlines(scale)
     count = steps.shape[1]
     flat = np.column_stack([steps.reshape(-1, 2), np.zeros(steps.size // 2)])
     places = found.moved(np.repeat(found.points[known], count, axis=0), flat)

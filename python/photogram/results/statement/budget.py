@@ -28,7 +28,6 @@ from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances, Item, adjusted, used_rows
 from photogram.results.group_sums import Left, Probing
 from photogram.results.grouping import Grouping, grouped, observables
-from photogram.results.parts import units
 from photogram.results.result import Result
 from photogram.results.statement.request import invalid
 from photogram.results.statement.texts import Texts
@@ -453,5 +452,6 @@ def _unit(result: Result, kind: str, name: str, component: int) -> str:
         angle = component >= 3 or (block.geographic and component < 2)
         return "rad" if angle else block.linear_unit
     if kind == "camera":
-        return units(next(each.camera for each in result.cameras if each.name == name))[component]
+        camera = next(each.camera for each in result.cameras if each.name == name)
+        return camera.unit_of(camera.names[component])
     return next(each.units[component] for each in result.unknowns if each.name == name)

@@ -16,7 +16,7 @@ from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, quantity_columns, through, unit_deviations
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
-from photogram.results.parts import AdjustedCamera, units
+from photogram.results.parts import AdjustedCamera
 from photogram.results.statement import tables as declared
 from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
@@ -116,7 +116,7 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
 
 def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
     texts, columns, sd = statement.texts, declared.Columns(statement.texts), camera.sd
-    of, estimated = units(camera.camera), camera.estimated
+    of, estimated = [*map(camera.camera.unit_of, camera.names)], camera.estimated
     axes = tuple(Axis.of(name, unit) for name, unit in zip(camera.names, of, strict=True))
     names = [camera.names[k] for k in estimated]
     value = Quantity(
@@ -141,8 +141,7 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
         tables.append(Table("correlations", title, [columns.text("parameter", names), *numbers]))
     curve = distortion_curve(statement.result, camera)
     if curve is not None:
-        unit, inside = statement.result.block.image_unit, np.flatnonzero(curve.radii <= curve.observed)
-        rows = inside[np.unique(np.linspace(0, len(inside) - 1, MAX_RADII).round().astype(int))]
+        unit, rows = statement.result.block.image_unit, curve.rows(MAX_RADII)
         decimals = declared.decimals_for(curve.sd[rows])
         distortion = [
             columns.number("radius", curve.radii[rows], unit=unit),

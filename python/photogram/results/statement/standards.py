@@ -30,6 +30,7 @@ from photogram.results.statement.figures import Figures
 from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
+from photogram.show.sketch.marks import ellipse_axes
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import rmse_interval, root_mean
 
@@ -364,8 +365,6 @@ def iso_measures(of_all: Figures | None, lengths: LengthTest | None) -> list[Mea
 
 def _ellipse(moments: Floats) -> list[float] | None:
     """Return semi-axes of plan errors, and the larger axis' azimuth (rad)."""
-    if not np.isfinite(moments).all():
-        return None
-    values, vectors = np.linalg.eigh(moments)
-    a, b = (math.sqrt(max(float(each), 0.0)) for each in values[::-1])
-    return [a, b, math.atan2(vectors[0, 1], vectors[1, 1]) % math.pi]
+    semi_axes, angles = ellipse_axes(moments[np.newaxis])
+    found = [*semi_axes[0].tolist(), math.radians(90.0 - float(angles[0])) % math.pi]
+    return found if np.isfinite(found).all() else None
