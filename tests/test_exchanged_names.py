@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from photogram import Camera, adjust, diagnose, first_values, simulate, snoop
+from photogram.adjustment.exchanged_names import exchanged_names
 from photogram.diagnosis import names as names_of_points
-from photogram.results.exchanged_names import exchanged_names
 from photogram.words import Phrase
 
 

@@ -19,6 +19,7 @@ from photogram.adjustment.adjustment import (
     core_threads,
     with_datum,
 )
+from photogram.adjustment.exchanged_names import exchanged_names
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
@@ -33,7 +34,6 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
-from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.hypotheses import hypotheses
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
@@ -53,7 +53,7 @@ from photogram.results.network_trial import (
     network_trial,
 )
 from photogram.results.result import Result
-from photogram.results.snooping_log import Aside, Outcome, snooped
+from photogram.results.snooping_log import Aside, Exchange, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped, recorded
 from photogram.results.type_factors import type_factors

@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, core_threads
+from photogram.adjustment.exchanged_names import exchanged_names
 from photogram.adjustment.robust import LossName, loss_row
 from photogram.adjustment.snooping import finished, gone, used_images
 from photogram.arguments.arrays import one_of
@@ -29,7 +30,6 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.subset import image_rows
-from photogram.results.exchanged_names import exchanged_names
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,

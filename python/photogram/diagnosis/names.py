@@ -12,14 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from photogram.adjustment.exchanged_names import exchanged_names
 from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.subset import kept_images, of_photos
-from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
+from photogram.results.snooping_log import Exchange
 from photogram.statistics.limits import normal_limit
 
 CENTRES = 3  # Number of photos whose neighbourhood is examined

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results.group_sums import GroupSum
+from photogram.results.group_sums import GroupSum, sum_columns
 from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import remarks_section, verdict_document
 from photogram.show.methods import Judged, Tabular
@@ -155,10 +155,7 @@ def components_table(found: VarianceComponents) -> Table:
     codes = ["fixed" if each.held else "to-change" if each.worth_changing else "unchanged" for each in rows]
     held = np.array([bool(each.held) for each in rows], dtype=bool)
     columns = [
-        of_each(rows, "name", kind="name", name="group", head="Group"),
-        of_each(rows, "count", name="observations", head="Number", decimals=0),
-        of_each(rows, "redundancy", name="redundancy", head="Redundancy", decimals=2),
-        of_each(rows, "squares", name="sum_of_squares", head="Weighted sum of squares", decimals=2),
+        *sum_columns(rows),
         of_each(rows, "factor", name="factor", head="Component", decimals=3),
         of_each(rows, "sd", name="sd_factor", head="sd", decimals=3),
         of_each(rows, "least_sd", name="least_sd_factor"),

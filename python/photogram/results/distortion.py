@@ -81,7 +81,7 @@ class DistortionCurve:
     def rows(self, count: int) -> Indices:
         """Return the indices of up to `count` equidistant radii with images."""
         inside = np.flatnonzero(self.radii <= self.observed * (1 + 1e-9))
-        return inside[np.unique(np.linspace(0, len(inside) - 1, count).round().astype(int))]
+        return np.asarray(inside[np.unique(np.linspace(0, len(inside) - 1, count).round().astype(int))])
 
 
 def rows_of_images(result: Result, camera: AdjustedCamera) -> Indices:

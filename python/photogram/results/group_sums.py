@@ -9,6 +9,7 @@ chi-square test of q_g with r_g degrees of freedom is conservative for small red
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,8 +23,8 @@ from photogram.results.grouping import Grouping, GroupsArgument, grouped, observ
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Tabular
 from photogram.show.page import Document, Section, about
-from photogram.show.quantity import Table, column, of_each
-from photogram.statistics.components import balanced
+from photogram.show.quantity import Quantity, Table, column, of_each
+from photogram.statistics.components import Component, balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
@@ -118,10 +119,7 @@ class GroupSums(Tabular):
         ]
         low, high = np.reshape(sides, (-1, 2)).T
         columns = [
-            of_each(groups, "name", kind="name", name="group", head="Group"),
-            of_each(groups, "count", name="observations", head="Number", decimals=0),
-            of_each(groups, "redundancy", name="redundancy", head="Redundancy", decimals=2),
-            of_each(groups, "squares", name="sum_of_squares", head="Weighted sum of squares", decimals=2),
+            *sum_columns(groups),
             of_each(groups, "spread", name="spread"),
             of_each(groups, "freedom", name="degrees_of_freedom"),
             of_each(groups, "factor", name="factor", head="Factor of sd", decimals=3),
@@ -133,6 +131,16 @@ class GroupSums(Tabular):
         note = about("groups", n=tested, percent=100 * self.level, names=names)
         title = "Groups of observations"
         return Document(title, "", sections=[Section.of(Table("groups", title, columns, note))])
+
+
+def sum_columns(groups: Sequence[GroupSum | Component]) -> list[Quantity]:
+    """Return the names of groups, their numbers of observations, redundancy and sums of squares."""
+    return [
+        of_each(groups, "name", kind="name", name="group", head="Group"),
+        of_each(groups, "count", name="observations", head="Number", decimals=0),
+        of_each(groups, "redundancy", name="redundancy", head="Redundancy", decimals=2),
+        of_each(groups, "squares", name="sum_of_squares", head="Weighted sum of squares", decimals=2),
+    ]
 
 
 class Left:

@@ -116,6 +116,36 @@ class Removal:
 
 
 @dataclass(frozen=True)
+class Exchange:
+    """Exchanged names of two points on a photo."""
+
+    photos: tuple[str, ...]  # several if the images do not determine the photo
+    points: tuple[str, str]
+    # as_named, exchanged: T of both points with the given names, and with exchanged names on the first of the
+    # photos
+    as_named: float
+    exchanged: float
+    dimension: int  # degrees of freedom of both
+
+    @property
+    def sentence(self) -> Phrase:
+        one, other = self.points
+        photos = [Phrase("named.photo", {"photo": photo.removeprefix("photo ")}) for photo in self.photos]
+        return Phrase("exchange", {"one": one, "other": other, "photos": photos})
+
+    @property
+    def probable(self) -> Phrase:
+        """The sentence for a network that was not adjusted without it."""
+        one, other = self.points
+        return Phrase("exchange.probable", {"one": one, "other": other, "photos": list(self.photos)})
+
+    @property
+    def reason(self) -> Phrase:
+        fields = {"named": self.as_named, "exchanged": self.exchanged, "dimension": self.dimension}
+        return Phrase(f"exchange.reason{'' if math.isfinite(self.as_named) else '.apart'}", fields)
+
+
+@dataclass(frozen=True)
 class Round:
     number: int  # From 1; 0 for the robust start
     status: str  # of the adjustment at the start of the round

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import NamedSuspects, Standing
-from photogram.results.snooping_log import Outcome, Removal, Rival, disputes
+from photogram.results.snooping_log import Exchange, Outcome, Removal, Rival, disputes
 from photogram.results.snooping_options import SnoopOptions
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section, about

@@ -46,7 +46,8 @@ def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Elli
     """
     factor = 1.0 if confidence is None else math.sqrt(-2.0 * math.log1p(-confidence))
     semi_axes, angles = ellipse_axes(covariances[:, :2, :2])
-    return Ellipses(*factor * semi_axes.T, np.radians(np.where(angles < 0, -90.0, 90.0) - angles))
+    major, minor = factor * semi_axes.T
+    return Ellipses(major, minor, np.radians(np.where(angles < 0, -90.0, 90.0) - angles))
 
 
 def fitting_scale(found: Ellipses, places: Floats) -> float:

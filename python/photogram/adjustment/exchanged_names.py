@@ -11,52 +11,22 @@ observations. Images i and j of a photo are exchanged if T of both points with t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, counts_of, meet, sums_of
+from photogram.results.snooping_log import Exchange
 from photogram.statistics.likelihood import are_exchanged
-from photogram.words import Phrase
 
 MOST = 40  # Largest number of excluded images of a photo
 UNCERTAIN = 3.0  # Factor of T for errors of photos, which are fixed here
 STEPS = 4  # Gauss-Newton steps from the intersection of the rays
 HELD = 1e-6  # Standard deviation of fixed coordinates, relative to an image at the distance of the object
-
-
-@dataclass(frozen=True)
-class Exchange:
-    photos: tuple[str, ...]  # several if the images do not determine the photo
-    points: tuple[str, str]
-    # as_named, exchanged: T of both points with the given names, and with exchanged names on the first of the
-    # photos
-    as_named: float
-    exchanged: float
-    dimension: int  # degrees of freedom of both
-
-    @property
-    def sentence(self) -> Phrase:
-        one, other = self.points
-        photos = [Phrase("named.photo", {"photo": photo.removeprefix("photo ")}) for photo in self.photos]
-        return Phrase("exchange", {"one": one, "other": other, "photos": photos})
-
-    @property
-    def probable(self) -> Phrase:
-        """The sentence for a network that was not adjusted without it."""
-        one, other = self.points
-        return Phrase("exchange.probable", {"one": one, "other": other, "photos": list(self.photos)})
-
-    @property
-    def reason(self) -> Phrase:
-        fields = {"named": self.as_named, "exchanged": self.exchanged, "dimension": self.dimension}
-        return Phrase(f"exchange.reason{'' if math.isfinite(self.as_named) else '.apart'}", fields)
 
 
 def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
