@@ -49,7 +49,6 @@ class Edited:
     gross: list[Finding] = field(default_factory=list)  # Findings on images that intersection suspects
     # Findings on removed components of control, by point
     control: dict[str, list[Finding]] = field(default_factory=dict)
-    misleading: set[str] = field(default_factory=set)  # Photos of suspected images that are correct
     asked: bool = True  # Whether an adjustment was requested
 
     @property
@@ -148,4 +147,3 @@ def _remove(block: Block, suspected: Bools, control: Indices, adjusted: Adjuster
     misfits = Misfits(block, suspected, found, found.result)
     edited.section.findings += misfits.in_section
     edited.gross, edited.control = misfits.of_suspects, misfits.control
-    edited.misleading = misfits.misleading

@@ -263,7 +263,7 @@ def _after_adjustment(view: View, edited: Edited, words: Words) -> list[Section]
         return [stations(view.block, None), key_numbers(edited, words)]
     return [
         control(edited, words),
-        stations(view.block, result, edited.misleading),
+        stations(view.block, result),
         residuals(result, edited.spread),
         two_ray_heights(result),
         key_numbers(edited, words),

@@ -62,15 +62,6 @@ class Misfits:
         common = [each.fields for each in found.outcome.remarks if each.code == "snooping.common"]
         self.in_section += [finding("grave", phrase("check.common-error", **each)) for each in common]
 
-    @property
-    def misleading(self) -> set[str]:
-        """Photos of suspected images that agree with the others."""
-        out = self.suspects.with_any(self.found.outcome.out.rows) & (self.suspects.kinds == IMAGE)
-        left = self.suspected.copy()
-        left[self.suspects.subjects[out]] = False
-        on_points = np.isin(self.block.image_points, self.block.image_points[left])
-        return {self.block.photo_ids[photo] for photo in self.block.image_photos[on_points]}
-
     def _image_of(self, entry: Removal) -> int:
         """Return the number of an image; -1 for other observations."""
         is_image = self.suspects.kinds[entry.group] == IMAGE and entry.kind != "photo"

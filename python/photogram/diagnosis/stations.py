@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
@@ -20,7 +18,7 @@ from photogram.words import phrase
 LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their type."""
 FEW = 4  # Number of free departures for which limits are doubled
-MOVED = 10.0  # Limit of the change from the initial to the adjusted station, in the same unit
+MOVED, WRONG = 10.0, 25.0  # Changes from the initial to the adjusted station, in the same unit
 TINY = 1e-9  # A spread below this is rounding: radians, or the linear unit
 UPRIGHT = 0.8  # Least vertical component of the z axis of a photo that looks down
 FEWEST = 5  # Photos of a strip needed to fit a path
@@ -30,19 +28,15 @@ QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
 """Angles are between the photo and its strip, ground-to-photo."""
 
 
-def stations(block: Block, result: Result | None, misleading: Collection[str] = ()) -> Section:
-    """Compare stations with the smooth path of their strip and initial values.
-
-    `misleading` are photos that observe points whose good observations seemed wrong from the initial
-    stations. If one of them has moved, its initial values are wrong.
-    """
+def stations(block: Block, result: Result | None) -> Section:
+    """Compare stations with the smooth path of their strip and initial values."""
     section = Section(
         "Stations",
         "An aircraft flies straight and level as far as it can: a departure from its path wants a reason.",
     )
     which = "initial"
     if result is not None:
-        _moved(block, result, misleading, section)
+        _moved(block, result, section)
         block = result.block.replace(
             photo_positions=result.photo_positions, photo_attitudes=result.photo_attitudes
         )
@@ -138,7 +132,7 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
             )
 
 
-def _moved(given: Block, result: Result, misleading: Collection[str], section: Section) -> None:
+def _moved(given: Block, result: Result, section: Section) -> None:
     """Report the stations that the adjustment moved far more than the others."""
     block = result.block
     if len(block.photo_ids) - len(block.mounts) < FEWEST:
@@ -164,8 +158,8 @@ def _moved(given: Block, result: Result, misleading: Collection[str], section: S
         for photo in np.flatnonzero((sizes.max(axis=1) > MOVED) & ~small & ~mounted).tolist():
             k = int(sizes[photo].argmax())
             name = block.photo_ids[photo]
-            wrong = name in misleading
             change, times = float(changes[photo, k] * factor), float(sizes[photo, k])
+            wrong = times > WRONG
             message = phrase(
                 f"check.moved-station.{'wrong' if wrong else what}",
                 photo=name,

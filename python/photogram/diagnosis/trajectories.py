@@ -54,7 +54,11 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     note_all(section, "moving", "look", remarks(result))
     section.findings += counted_lines(block, adjusted)
     found = _snooped(block, adjusted)
-    if found is not None and (result.converged or found.result.converged):
+    if (
+        found is not None
+        and isinstance(found.result, Result)
+        and (result.converged or found.result.converged)
+    ):
         misfits = Misfits(block, np.zeros(len(block.image_xy), dtype=bool), found, found.result)
         section.findings += [*misfits.of_suspects, *misfits.in_section, *chain(*misfits.control.values())]
     note_verdict(section, result.verdict)
