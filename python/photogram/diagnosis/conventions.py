@@ -15,10 +15,9 @@ from functools import partial
 
 import numpy as np
 
-from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.hypotheses import attitude_readings, hypotheses, turns
-from photogram.diagnosis.mistakes import Proposal
+from photogram.diagnosis.mistakes import Adjuster, Proposal
 from photogram.diagnosis.regression import (
     LEAST,
     MOST,
@@ -33,13 +32,13 @@ from photogram.diagnosis.regression import (
     view,
 )
 from photogram.diagnosis.views import View
-from photogram.errors import AdjustmentError
 from photogram.messages import Message
+from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block, checked
-from photogram.network.geometry import rotation_matrix
 from photogram.network.motion import at_rest
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
+from photogram.network.subset import kept_images, of_photos
 from photogram.words import phrase
 
 SUSPICION = 0.35  # Misfit m above which photos are examined
@@ -208,17 +207,21 @@ def latitudes(block: Block) -> list[Message]:
 
 
 def readings(block: Block) -> list[Message]:
-    """Compare given attitudes with resected ones; finds mistakes in small angles."""
+    """Compare given attitudes with adjusted ones; finds mistakes in small angles."""
     if block.spheroid is not None:
         return []
-    known = given_points(block)
-    counts = np.bincount(block.image_photos[known[block.image_points]], minlength=len(block.photo_ids))
-    photos = spread(np.flatnonzero(counts >= LEAST), MOST)
-    resected = {photo: found for photo in photos.tolist() if (found := _resected(block, photo)) is not None}
-    if len(resected) < 2:
+    known = given_points(block)[block.image_points]
+    counts = np.bincount(block.image_photos[known], minlength=len(block.photo_ids))
+    rows = spread(np.flatnonzero(counts >= LEAST), MOST)
+    if len(rows) < 2:
         return []
-    rows = np.array(list(resected))
-    turned = np.array(list(resected.values()))
+    chosen = np.isin(np.arange(len(block.photo_ids)), rows)
+    free = view(of_photos(kept_images(block, known), chosen), np.arange(len(rows)))
+    point_sd = np.where(np.isfinite(free.point_positions), 0.0, np.inf)
+    resected = Adjuster({}).converged(free.replace(point_sd=point_sd))
+    if resected is None:
+        return []
+    turned = Attitudes.of(angles_form(block.photo_to_ground), resected.photo_attitudes).matrices
     own = _apart(Rays.of(block).cameras[rows], turned)
     rivals = [
         (_apart(matrices[rows], turned), cause) for cause, matrices in attitude_readings(block).values()
@@ -228,27 +231,6 @@ def readings(block: Block) -> list[Message]:
         return []
     angles = {"after": float(np.degrees(least)), "before": float(np.degrees(own))}
     return [Message(phrase("convention.attitudes", cause=cause, **angles))]
-
-
-def _resected(block: Block, photo: int) -> Floats | None:
-    """Return the (3, 3) attitude, photo to object, resected from given points."""
-    rows = np.flatnonzero((block.image_photos == photo) & given_points(block)[block.image_points])
-    points = block.image_points[rows]
-    count = len(rows)
-    observed = Observed(
-        block.point_positions[points],
-        np.zeros((count, 3)),
-        block.image_xy[rows],
-        block.image_sd[rows],
-        float(block.known_distances("hints")[photo]),
-        [block.point_ids[point] for point in points],
-    )
-    try:
-        pose = solve(observed, limit=1e-2, max_iterations=50).pose
-    except AdjustmentError:
-        return None
-    found: Floats = rotation_matrix(pose[np.newaxis, 3:])[0].T
-    return found
 
 
 def _apart(given: Floats, found: Floats) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from photogram.adjustment.exchanged_names import exchanged_names
 from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.diagnosis.regression import view
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.subset import kept_images, of_photos
@@ -127,26 +128,8 @@ def _chosen(block: Block, photos: Indices, sizes: Floats) -> Bools:
 
 
 def _images_alone(block: Block, kept: Bools) -> Block:
-    own = kept[block.image_photos]
-    rays = np.bincount(block.image_points[own], minlength=len(block.point_ids))
-    points = np.flatnonzero(rays > 1)
-    of_images = np.flatnonzero(own & (rays[block.image_points] > 1))
-    free = block.replace(
-        observations=(),
-        spheroid=None,
-        refraction=None,
-        image_photos=block.image_photos[of_images],
-        image_points=np.searchsorted(points, block.image_points[of_images]),
-        image_xy=block.image_xy[of_images],
-        image_sd=block.image_sd[of_images],
-        point_ids=[block.point_ids[point] for point in points],
-        point_positions=np.full((len(points), 3), np.nan),
-        point_sd=np.full((len(points), 3), np.inf),
-        photo_positions_observed=None,
-        photo_attitudes_observed=None,
-        photo_positions=np.full(block.photo_positions.shape, np.nan),
-        photo_attitudes=np.full(block.photo_attitudes.shape, np.nan),
-        photo_position_sd=np.full(block.photo_positions.shape, np.inf),
-        photo_attitude_sd=np.full(block.photo_positions.shape, np.inf),
-    )
-    return of_photos(free, kept)
+    """Return some photos with unknown poses and points, without other observations."""
+    free = view(of_photos(block, kept), np.arange(int(kept.sum())))
+    names = ("point_positions", "photo_positions", "photo_attitudes")
+    unknown = {name: np.full(getattr(free, name).shape, np.nan) for name in names}
+    return free.replace(spheroid=None, **unknown)

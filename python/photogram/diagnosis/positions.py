@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import permutations, product
 
@@ -76,24 +77,11 @@ def _with(block: Block, positions: Sequence[Position]) -> Block:
     )
 
 
-def _changed(
-    position: Position, observed: Floats | None = None, arm: object = None, shift: Shift | None = None
-) -> Position:
-    return Position(
-        position.photo,
-        position.position if observed is None else observed,
-        covariance=position.precision,
-        lever_arm=position.lever_arm if arm is None else arm,  # type: ignore[arg-type]
-        shift=shift,
-        time=position.time,
-    )
-
-
 def _coordinates(block: Block, given: list[Position]) -> Iterator[Proposal]:
     for kind, (order, first) in COORDINATES.items():
         if block.spheroid is None or kind == "feet in heights":
             factors = np.where(np.arange(3) >= first, FOOT, 1.0)
-            meant = [_changed(each, np.asarray(each.position)[order] * factors) for each in given]
+            meant = [replace(each, position=np.asarray(each.position)[order] * factors) for each in given]
             yield Proposal(kind, phrase(f"mistake.positions.{kind}"), partial(_with, positions=meant))
 
 
@@ -114,7 +102,9 @@ def _of_catalogue(block: Block, given: list[Position], adjusted: Adjuster) -> It
         elif code == "time-offset" and first is not None:
             facts = block_facts(block, first.photo_positions)
             flown = dict(zip(block.photo_ids, facts["velocities"] * size, strict=True))
-            meant = [_changed(each, np.asarray(each.position) - flown[each.photos[0]]) for each in given]
+            meant = [
+                replace(each, position=np.asarray(each.position) - flown[each.photos[0]]) for each in given
+            ]
             message = phrase(f"mistake.positions.{'seconds' if facts['timed'] else 'steps'}", offset=size)
             yield Proposal(code, message, partial(_with, positions=meant), parameters=1)
 
@@ -125,10 +115,10 @@ def _free(block: Block, given: list[Position], code: str, adjusted: Adjuster) ->
     unknown: Shift | LeverArm
     if code == "lever-arm":
         unknown = LeverArm("of all", arm, sd=np.inf)
-        changed = [_changed(each, arm=unknown) for each in given]
+        changed = [replace(each, lever_arm=unknown) for each in given]
     else:
         unknown = Shift("of all", sd=[0.0, 0.0, np.inf] if code == "gnss-heights" else np.inf)
-        changed = [_changed(each, shift=unknown) for each in given]
+        changed = [replace(each, shift=unknown) for each in given]
     result = adjusted.converged(_with(block, changed))
     if result is None:
         return
@@ -136,11 +126,11 @@ def _free(block: Block, given: list[Position], code: str, adjusted: Adjuster) ->
     value, unit = np.asarray(found.position), block.linear_unit
     sd = np.sqrt(np.maximum(np.diagonal(found.cofactors), 0))
     if isinstance(unknown, LeverArm):
-        name, meant = _code_of_arm(arm, value), [_changed(each, arm=value) for each in given]
+        name, meant = _code_of_arm(arm, value), [replace(each, lever_arm=value) for each in given]
     else:
         name = "geoid" if code == "gnss-heights" else "shift"
         fixed = Shift(unknown.name, value, sd=0.0)
-        meant = [_changed(each, shift=fixed) for each in given]
+        meant = [replace(each, shift=fixed) for each in given]
     parts = [f"{v:.3f} +- {s:.3f}" for v, s in zip(value, sd, strict=True)]
     message = phrase(f"mistake.positions.{name}", vector=parts, height=float(value[2]), unit=unit)
     yield Proposal(code, message, partial(_with, positions=meant), parameters=int((sd > 0).sum()))
