@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.hypotheses import FOOT
+from photogram.diagnosis.hypotheses import EXCHANGED, FOOT, with_coordinates
 from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain, omega
 from photogram.diagnosis.robust import mad_sd
 from photogram.diagnosis.tested_values import outliers, sizes_of_tests, spread_of
@@ -28,16 +28,16 @@ FEWEST_OF_PAIRS = 3  # Control points needed to identify an exchanged pair
 PAIRS = 3  # Largest number of pairs that are adjusted
 MANY = 2  # Number of control points that do not fit above which the whole set is doubted
 
-FACTORS = {
-    "feet in heights": (1, 1, FOOT),
-    "metres in heights": (1, 1, 1 / FOOT),
-    "feet in X": (FOOT, 1, 1),
-    "feet in Y": (1, FOOT, 1),
-    "feet in X and Y": (FOOT, FOOT, 1),
+SETS: dict[str, tuple[tuple[int, ...], tuple[float, ...]]] = {
+    "feet in heights": ((0, 1, 2), (1, 1, FOOT)),
+    "metres in heights": ((0, 1, 2), (1, 1, 1 / FOOT)),
+    "feet in X": ((0, 1, 2), (FOOT, 1, 1)),
+    "feet in Y": ((0, 1, 2), (1, FOOT, 1)),
+    "feet in X and Y": ((0, 1, 2), (FOOT, FOOT, 1)),
+    "X and Y exchanged": (EXCHANGED, (1, 1, 1)),
 }
-"""Hypotheses about all control; in geographic space only those on heights, and exchanged axes."""
-OF_HEIGHTS = ("feet in heights", "metres in heights")
-EXCHANGED = "X and Y exchanged"
+"""Order and factors of the coordinates of all control, by mistake."""
+OF_GEOGRAPHIC = ("feet in heights", "metres in heights", "X and Y exchanged")
 SAME_BUT_SCALE = {"metres in heights", "feet in X and Y"}
 
 
@@ -71,16 +71,15 @@ def wrong_control(block: Block, adjusted: Adjuster) -> Explained | None:
 
 
 def _of_sets(block: Block) -> Iterator[Proposal]:
-    for kind in [*FACTORS, EXCHANGED] if block.spheroid is None else [*OF_HEIGHTS, EXCHANGED]:
+    for kind in SETS if block.spheroid is None else OF_GEOGRAPHIC:
         yield Proposal(kind, phrase(f"mistake.control.{kind}"), partial(intended, kind=kind))
 
 
 def intended(block: Block, kind: str) -> Block:
     """Return the block with the intended control."""
-    order, factors = ([1, 0, 2], (1, 1, 1)) if kind == EXCHANGED else ([0, 1, 2], FACTORS[kind])
-    held = np.isfinite(block.point_sd).any(axis=1, keepdims=True)
-    positions = np.where(held, block.point_positions[:, order] * factors, block.point_positions)
-    return block.replace(point_positions=positions, point_sd=block.point_sd[:, order])
+    order, factors = SETS[kind]
+    control = np.asarray(np.isfinite(block.point_sd).any(axis=1))
+    return with_coordinates(block, "points", order, factors, control)
 
 
 def _of_pairs(block: Block) -> Iterator[Proposal]:

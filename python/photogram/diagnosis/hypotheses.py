@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.mistakes import Proposal
@@ -14,6 +15,7 @@ from photogram.network.attitudes import Attitudes, Representation, angles_form
 from photogram.network.block import Block
 from photogram.words import Phrase, phrase
 
+EXCHANGED = (1, 0, 2)  # Order of exchanged plan coordinates
 FOOT = 0.3048  # Metres; the survey foot differs by two millionths
 _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
 _HALF_TURN = np.pi / 2
@@ -196,29 +198,29 @@ def read_as(block: Block, name: str) -> Block:
     return block.replace(photo_attitudes=Attitudes(matrices).values(angles_form(block.photo_to_ground)))
 
 
-def _scaled(block: Block, factors: Floats, *, points: bool) -> Block:
-    """Return a block with the axes of the positions of points or photos scaled."""
-    if points:
-        return block.replace(point_positions=block.point_positions * factors)
-    observed = block.photo_positions_observed
-    return block.replace(
-        photo_positions=block.photo_positions * factors,
-        photo_positions_observed=None if observed is None else observed * factors,
-    )
+def with_coordinates(
+    block: Block,
+    of: str,
+    order: Sequence[int] = (0, 1, 2),
+    factors: ArrayLike = 1.0,
+    rows: Bools | None = None,
+) -> Block:
+    """Return a block with coordinates of `points` or `photos` in another order, and scaled.
 
-
-def _exchanged(block: Block, *, points: bool) -> Block:
-    """Return a block with the first two coordinates of photos or of points exchanged."""
-    order = [1, 0, 2]
-    if points:
-        return block.replace(
-            point_positions=block.point_positions[:, order], point_sd=block.point_sd[:, order]
+    `rows` are the points concerned; None: all.
+    """
+    order, factors = [*order], np.asarray(factors, dtype=np.float64)
+    if of == "points":
+        chosen = np.ones(len(block.point_ids), dtype=bool) if rows is None else rows
+        positions = np.where(
+            chosen[:, np.newaxis], block.point_positions[:, order] * factors, block.point_positions
         )
+        return block.replace(point_positions=positions, point_sd=block.point_sd[:, order])
     observed = block.photo_positions_observed
     return block.replace(
-        photo_positions=block.photo_positions[:, order],
+        photo_positions=block.photo_positions[:, order] * factors,
         photo_position_sd=block.photo_position_sd[:, order],
-        photo_positions_observed=None if observed is None else observed[:, order],
+        photo_positions_observed=None if observed is None else observed[:, order] * factors,
     )
 
 
@@ -239,14 +241,14 @@ def _positions(block: Block) -> Iterator[Proposal]:
             if not geographic or axes == (2,):
                 factors: Floats = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
                 message = phrase(f"mistake.feet.{what}", part=part, unit=block.linear_unit)
-                change = partial(_scaled, factors=factors, points=what == "points")
+                change = partial(with_coordinates, of=what, factors=factors)
                 yield Proposal(f"feet in {part} of {what}", message, change)
     if geographic:
         for what, positions in (("photos", block.photo_positions), ("points", block.point_positions)):
             if not (np.abs(positions[:, 0]) > _HALF_TURN).any():
-                yield _exchange(f"longitude and latitude of {what}", points=what == "points")
+                yield _exchange("longitude and latitude", what)
         return
-    yield _exchange("X and Y of photos", points=False)
+    yield _exchange("X and Y", "photos")
     # R = F A' in the axes of computer vision, A' in the axes of the photo
     for axes_of_t, matrix in (
         ("x right, y down, z forward", _TO_VISION),
@@ -255,8 +257,9 @@ def _positions(block: Block) -> Iterator[Proposal]:
         message = phrase("mistake.translations", axes=axes_of_t)
         yield Proposal("t for C", message, partial(_centres, axes=matrix))
     if known:
-        yield _exchange("X and Y of points", points=True)
+        yield _exchange("X and Y", "points")
 
 
-def _exchange(name: str, *, points: bool) -> Proposal:
-    return Proposal(name, phrase("mistake.exchanged-axes", axes=name), partial(_exchanged, points=points))
+def _exchange(axes: str, of: str) -> Proposal:
+    change = partial(with_coordinates, of=of, order=EXCHANGED)
+    return Proposal(f"{axes} of {of}", phrase("mistake.exchanged-axes", axes=f"{axes} of {of}"), change)
