@@ -388,6 +388,59 @@ def test_a_missing_radial_distortion_agrees_with_the_test_of_its_partials():
     assert "camera-radial" not in {code for code, _ in evaluated(adjust(block))}
 
 
+def test_errors_of_principal_distances_and_points_agree_with_tests_of_their_partials():
+    result, camera = adjust(block_of("lever arm (0.2, 0, 0) m")), GOLDEN["camera"]
+    block = result.block
+    partials = (block.image_xy - result.residuals - [camera["cx"], camera["cy"]]) / camera["f"]
+    found, count = evaluated(result), len(GOLDEN["velocity"])
+    for half in range(2):
+        own = (np.arange(count) >= count // 2)[block.image_photos] == half
+        expected = score_test(result, partials=[partials * own[:, np.newaxis]]).statistic
+        assert found["camera-f-half", half] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    exchange = np.ones_like(partials) * [1.0, -1.0]
+    expected = score_test(result, partials=[exchange]).statistic
+    assert found["camera-exchanged", 0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_scale_of_one_of_two_distances_is_an_error_of_this_distance():
+    """With one precise and one imprecise distance, the scale of both is the error of the precise one."""
+    block = block_of("clean")
+    *gnss, distance = block.observations
+    pair = [block.point_ids[k] for k in np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[:2]]
+    other = Distance(*pair, 1000.0, 1e6)
+    result = adjust(block.replace(observations=[*gnss, distance, other]))
+    trial = result._trial()
+    trial.stand()
+    found = trial.core.hypotheses(**facts_of())
+    rows = [k for k, code in enumerate(found["code"]) if code == "observation" and found["component"][k] < 0]
+    statistics = dict(zip(found["index"][rows].tolist(), found["statistic"][rows], strict=True))
+    assert evaluated(result)["distance-scale", -1] == pytest.approx(statistics[len(gnss)], rel=1e-5)
+
+
+def test_a_scale_of_all_distances_is_named():
+    block = block_of("clean")
+    *gnss, _ = block.observations
+    control = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[:4]
+    places = adjust(block).point_positions
+    pairs = [(i, j) for i in control for j in control if i < j]
+    lengths = [1.003 * np.linalg.norm(places[i] - places[j]) for i, j in pairs]
+    distances = [
+        Distance(block.point_ids[i], block.point_ids[j], length, 0.002)
+        for (i, j), length in zip(pairs, lengths, strict=True)
+    ]
+    verdict = adjust(block.replace(observations=[*gnss, *distances])).verdict
+    first = verdict.message.fields["errors"][0].fields["named"]
+    assert (verdict.code, first.code) == ("common-error", "hypothesis.distance-scale")
+
+
+def test_an_exchanged_principal_point_is_named():
+    camera = GOLDEN["camera"]
+    values = {"f": camera["f"], "cx": camera["cy"], "cy": camera["cx"], "k": camera["k1"]}
+    wrong = block_of("clean").replace(cameras=[Camera("simple_radial", values)])
+    named = adjust(wrong).verdict.message.fields["errors"][0].fields["named"]
+    assert named.code == "hypothesis.camera-exchanged"
+
+
 def test_the_next_photo_is_a_time_offset_by_the_way_to_it():
     result = adjust(block_of("clean"))
     ways = np.diff(result.photo_positions, axis=0)

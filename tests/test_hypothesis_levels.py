@@ -19,6 +19,7 @@ CATALOGUE = frozenset(
         *("control-rotation", "gnss-heights", "gnss-shift", "gnss-set", "gnss-drift", "time-offset"),
         *("lever-arm", "boresight", "camera-f", "camera-point", "camera-term", "readout-time", "scale"),
         *("bending", "observation", "gnss-next", "gnss-previous", "camera-affinity", "camera-f-strip"),
+        *("camera-f-half", "camera-exchanged"),
     }
 )
 """Codes of all hypotheses that the golden network with observed attitudes permits."""
@@ -75,7 +76,7 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
         count = len(block.photo_ids)
         tested = trial.core.hypotheses(
             times=np.arange(float(count)).tolist(),
-            position_sets=(2 * np.arange(count) // count).tolist(),
+            position_sets=(3 * np.arange(count) // count).tolist(),
             control_sets=[row % 2 for row in range(len(block.point_ids))],
             checks=[],
             velocities=np.array(GOLDEN["velocity"])[:photos],

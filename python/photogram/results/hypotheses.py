@@ -32,11 +32,13 @@ RARE = 0.1  # Plausible errors of a set that may remain undetected
 OF_CAMERAS = frozenset(
     {
         *("camera-f", "camera-f-single", "camera-point", "camera-term", "readout-time"),
-        *("camera-affinity", "camera-radial"),
+        *("camera-affinity", "camera-radial", "camera-exchanged"),
     }
 )
-OF_PHOTOS = ("gnss-next", "gnss-previous")  # Positions of other photos: their parameter is 0 or 1
+SHARES = ("gnss-next", "gnss-previous", "camera-exchanged")  # Their parameter is 0 or 1
+DETECTED = 4.13  # Standard deviations of an error that a test detects: root of lambda0
 WHOLE = 0.1  # Standard deviation of this parameter if it is 1
+NEARLY = 0.99  # Part of T that such an error explains, second-order terms excluded
 EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
 ABSURD = 5.0  # Standard deviations of plausible sizes beyond which an error has no plausible size
 ABSURD_PART, UNKNOWN_PART = 0.9, 0.7
@@ -55,6 +57,7 @@ DATUM = frozenset(
         "gnss-heights",
         "gnss-shift",
         "gnss-set",
+        "distance-scale",
         "scale",
     }
 )
@@ -129,6 +132,8 @@ class Hypotheses:
             return False
         if code in DATUM and (self.compared or np.isnan(self.mdb[row, 0])):
             return False
+        if code in SHARES and self.mdb[row, 0] < 1.0:
+            return False
         return effect.others >= max(FEWEST, math.ceil(SHARE * self.points))
 
     def name(self, row: int) -> Phrase:
@@ -154,12 +159,12 @@ class Hypotheses:
             return f" {self.suspects.unit(int(self.suspects.row_starts[self.group[row]]))}".rstrip()
         units = {
             **dict.fromkeys(
-                ("camera-f", "camera-f-strip", "camera-f-single", "camera-point"),
+                ("camera-f", "camera-f-strip", "camera-f-half", "camera-f-single", "camera-point"),
                 self.suspects.given.image_unit,
             ),
             **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
             **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
-            **dict.fromkeys(("camera-affinity", "camera-radial", *OF_PHOTOS), ""),
+            **dict.fromkeys(("camera-affinity", "camera-radial", "distance-scale", *SHARES), ""),
             **dict.fromkeys(("time-offset", "readout-time"), self.times),
         }
         return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()
@@ -211,7 +216,15 @@ class Hypotheses:
         graded = {str(self.code[row]) for row in self.harmful}
         sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
         codes = [own[0] for own in sources if untested.intersection(own) and not graded.intersection(own)]
-        return [phrase(f"datum.{code}") for code in codes]
+        return [self._assumption(code) for code in codes]
+
+    def _assumption(self, code: str) -> Phrase:
+        """Return the name of the source of the datum, with the error of its heights that check points detect."""
+        row = int(np.flatnonzero(self.code == code)[0])
+        if row not in self.relative:
+            return phrase(f"datum.{code}")
+        size = DETECTED * math.sqrt(self.sets[row]["cofactors"][0])
+        return phrase(f"datum.{code}.checks", size=f"{size:.2g}{self._unit(row)}")
 
     def common(self, rivals: float = -math.inf) -> list[int]:
         """Return rows of common errors that explain more than single values, the likeliest first."""
@@ -223,7 +236,14 @@ class Hypotheses:
             return []
         if self.statistic[found[0]] < EXPLAINED * self.excess:
             return []
-        return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
+        # If an error is large, its second-order terms exceed the odds between this error and its special case.
+        special = [row for row in found if self.code[row] in SHARES and self._is_whole(row, found[0])]
+        return special[:1] or [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
+
+    def _is_whole(self, row: int, first: int) -> bool:
+        """Whether a share is 1 and explains as much as the likeliest error."""
+        is_one = abs(self.estimate[row, 0] - 1.0) < 3 * WHOLE
+        return bool(is_one and self.statistic[row] > NEARLY * self.statistic[first])
 
     def _is_significant(self, row: int) -> bool:
         """Whether the test of a set rejects, and its error has a plausible size or explains nearly all.
@@ -416,7 +436,7 @@ def hypotheses(
 
     odds = _log_odds(change(statistic), k, np.maximum(found["observations"], k + 1), count)
     odds -= np.nansum(np.square(estimate / found["plausible"]), axis=1) / 2
-    shares = np.isin(found["code"], OF_PHOTOS)
+    shares = np.isin(found["code"], SHARES)
     odds[shares] -= np.square((estimate[shares, 0] - 1.0) / WHOLE) / 2
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))
     of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))

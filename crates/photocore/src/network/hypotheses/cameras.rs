@@ -1,7 +1,8 @@
-//! Parameters of cameras: fixed principal distance, principal point and terms of distortion; the principal distance of some photos.
+//! Parameters of cameras: fixed principal distance, principal point and terms of distortion; exchanged coordinates of the principal point;
+//! the principal distance of some photos.
 
 use super::super::trial::Trial;
-use super::catalogue::{Catalogue, put};
+use super::catalogue::{CameraError, Catalogue, put};
 use crate::adjustment::{Equation, Shared};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{Camera, CameraModel};
@@ -18,6 +19,10 @@ const MOST_SETS: usize = 8;
 const DISTANCE: f64 = 0.05;
 /// Plausible error of the principal point, in widths of the image.
 const POINT: f64 = 0.02;
+/// Plausible share of an exchange of its coordinates: all of it.
+const SHARE: f64 = 1.0;
+/// Photos of each half of a flight.
+const FEWEST_OF_HALF: usize = 3;
 
 const DISTANCES: [&str; 4] = ["f", "c", "fx", "fy"];
 pub(super) const POINTS: [&str; 4] = ["cx", "cy", "xp", "yp"];
@@ -72,12 +77,26 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
         let columns = catalogue.add((code, Some(camera)), &names, &plausible);
         for &photo in photos {
             let own = parameters.iter().zip(columns.iter().cycle());
-            catalogue.cameras[photo].extend(own.map(|(own, &column)| (own.0, column)));
+            let errors = own.map(|(own, &column)| CameraError { parameter: own.0, column, factor: 1.0 });
+            catalogue.cameras[photo].extend(errors);
+        }
+    }
+    if let [(x, _), (y, _)] = of(&POINTS)[..] {
+        let between = own.parameters()[y] - own.parameters()[x];
+        if between != 0.0 {
+            let column = catalogue.add(("camera-exchanged", Some(camera)), &["share"], &[SHARE])[0];
+            let errors = [(x, between), (y, -between)].map(|(parameter, factor)| CameraError {
+                parameter,
+                column,
+                factor,
+            });
+            photos.iter().for_each(|&photo| catalogue.cameras[photo].extend(errors));
         }
     }
 }
 
-/// The principal distance, fixed or free, of the photos of a strip, and of one of several cameras with equal parameters.
+/// The principal distance, fixed or free, of the photos of a strip, of the first and the second half of the photos, and of one of several
+/// cameras with equal parameters.
 fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize]) {
     let camera: Camera = catalogue.stations.photos[photos[0]].camera.clone();
     let named = camera.parameter_names().iter().enumerate();
@@ -86,7 +105,14 @@ fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize]) {
     let of_strips = photos.iter().filter_map(|&photo| Some((photo, strips.get(photo).copied().flatten()?)));
     let of_cameras = photos.iter().map(|&photo| (photo, trial.camera_of_photo[photo]));
     let (of_strips, of_cameras): (Vec<_>, Vec<_>) = (of_strips.collect(), of_cameras.collect());
-    for (code, of) in [("camera-f-strip", of_strips), ("camera-f-single", of_cameras)] {
+    let half = photos.len() / 2;
+    // Two strips are these halves.
+    let are_strips = of_strips.iter().map(|own| own.1).max() == Some(1);
+    let of_halves = if half < FEWEST_OF_HALF || are_strips { &[] } else { photos };
+    let of_halves: Vec<_> =
+        of_halves.iter().enumerate().map(|(k, &photo)| (photo, usize::from(k >= half))).collect();
+    let sets = [("camera-f-strip", of_strips), ("camera-f-half", of_halves), ("camera-f-single", of_cameras)];
+    for (code, of) in sets {
         let mut sets: Vec<usize> = of.iter().map(|own| own.1).collect();
         sets.sort_unstable();
         sets.dedup();
@@ -96,7 +122,8 @@ fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize]) {
         for set in sets {
             let column = catalogue.add((code, Some(set)), &["f"], &[DISTANCE * camera.scale()])[0];
             for &(photo, _) in of.iter().filter(|own| own.1 == set) {
-                catalogue.cameras[photo].extend(distances.iter().map(|&parameter| (parameter, column)));
+                let error = |&parameter| CameraError { parameter, column, factor: 1.0 };
+                catalogue.cameras[photo].extend(distances.iter().map(error));
             }
         }
     }
@@ -120,8 +147,8 @@ impl Catalogue<'_> {
             shared.values.clear();
             self.write_camera_partials((image, local), &mut shared.values);
         }
-        for (&(_, column), values) in columns.iter().zip(shared.values.chunks_exact(2)) {
-            put(partials, column, values[row] / equation.sd);
+        for (own, values) in columns.iter().zip(shared.values.chunks_exact(2)) {
+            put(partials, own.column, own.factor * values[row] / equation.sd);
         }
     }
 
@@ -136,8 +163,8 @@ impl Catalogue<'_> {
         each_camera!(&station.camera, camera => {
             let (_, computed) = camera.compare(&sight, observed.xy);
             let by_parameters = computed.by_parameters.each_ref().map(|row| row.as_ref());
-            for &(parameter, _) in &self.cameras[observed.photo] {
-                values.extend(by_parameters.map(|row| row[parameter]));
+            for own in &self.cameras[observed.photo] {
+                values.extend(by_parameters.map(|row| row[own.parameter]));
             }
         });
     }

@@ -34,6 +34,16 @@ pub(super) enum Seen {
     Attitudes,
 }
 
+/// Error of a parameter of the camera of a photo.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CameraError {
+    /// The parameter of the camera.
+    pub parameter: usize,
+    pub column: usize,
+    /// d(parameter of the camera) / d(parameter of the hypothesis).
+    pub factor: f64,
+}
+
 /// Deformations of the images of a photo, relative to its principal point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Deformations {
@@ -58,10 +68,10 @@ pub(super) struct Catalogue<'a> {
     displaced: HashMap<(Seen, usize), Vec<(usize, f64)>>,
     /// The same of fixed unknowns, whose error all observations see.
     fixed: HashMap<usize, Vec<(usize, f64)>>,
-    /// Errors of single observations that are no images of local points: columns and values.
+    /// Errors of observations that are no images of local points, in unit weight: columns and values.
     single: HashMap<EquationOf, Vec<(usize, f64)>>,
-    /// Parameters of the camera of each photo, and their columns.
-    pub(super) cameras: Vec<Vec<(usize, usize)>>,
+    /// Parameters of the camera of each photo.
+    pub(super) cameras: Vec<Vec<CameraError>>,
     /// Column of the readout time of the camera of each photo.
     pub(super) shutters: Vec<Option<usize>>,
     /// Deformations of the images of each photo.
@@ -109,10 +119,15 @@ impl<'a> Catalogue<'a> {
 
     /// Adds an error of some observations as a parameter.
     pub fn add_single(&mut self, error: &[(EquationOf, f64)]) {
-        for &(of, value) in error {
-            self.single.entry(of).or_default().push((self.count, value));
-        }
+        self.add_to(self.count, error);
         self.count += 1;
+    }
+
+    /// Adds partials of observations, in unit weight, by a parameter.
+    pub fn add_to(&mut self, column: usize, partials: &[(EquationOf, f64)]) {
+        for &(of, value) in partials {
+            self.single.entry(of).or_default().push((column, value));
+        }
     }
 
     /// Displaces an unknown, as some observations see it, with a parameter.

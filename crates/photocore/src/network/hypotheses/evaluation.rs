@@ -10,7 +10,7 @@ use super::facts::Facts;
 use super::groups::{single_errors, worst};
 use super::hypothesis::{About, Hypotheses, Hypothesis};
 use super::judged::{Criteria, Judged};
-use super::{assignment, attitudes, cameras, control, deformations, form, positions, shutter};
+use super::{assignment, attitudes, cameras, control, deformations, distances, form, positions, shutter};
 use crate::adjustment::{Leverages, correlation_above, whitening};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 use crate::{Threads, parallel};
@@ -20,6 +20,7 @@ fn catalogue<'a>(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Catal
     let mut catalogue = Catalogue::new(trial, found, facts);
     let (bundle, points) = (catalogue.bundle, catalogue.control_points(trial));
     control::add(&mut catalogue, &points);
+    distances::add(&mut catalogue);
     cameras::add(&mut catalogue, trial);
     deformations::add(&mut catalogue, trial);
     // Poses that are made of several blocks, or are vectors, have no unknowns of their own that could be displaced.

@@ -10,6 +10,7 @@ mod cameras;
 mod catalogue;
 mod control;
 mod deformations;
+mod distances;
 mod effect;
 mod evaluation;
 mod facts;

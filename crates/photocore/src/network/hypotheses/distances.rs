@@ -1,0 +1,31 @@
+//! Distances between points: a scale of all of them, such as another temperature or unit of the bars.
+
+use super::catalogue::Catalogue;
+use crate::adjustment::EquationOf;
+use crate::geometry::ObjectSpace;
+
+/// Plausible error of scale.
+const SCALE: f64 = 1e-2;
+
+pub(super) fn add(catalogue: &mut Catalogue<'_>) {
+    let bundle = catalogue.bundle;
+    if bundle.space != ObjectSpace::Rectangular {
+        return;
+    }
+    let tied = bundle.observations.iter().enumerate();
+    let lengths: Vec<(EquationOf, f64)> = tied
+        .filter_map(|(number, tied)| match (tied.observation.kind(), &tied.touches.points[..]) {
+            ("distance", &[first, second]) => {
+                let length = (catalogue.place(first) - catalogue.place(second)).norm();
+                let of = EquationOf::Tie { tie: bundle.tied_images() + number, row: 0 };
+                Some((of, length / tied.root[(0, 0)]))
+            }
+            _ => None,
+        })
+        .collect();
+    // One distance alone is a hypothesis of single observations.
+    if lengths.len() > 1 {
+        let column = catalogue.add(("distance-scale", None), &["scale"], &[SCALE])[0];
+        catalogue.add_to(column, &lengths);
+    }
+}
