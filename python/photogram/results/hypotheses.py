@@ -219,7 +219,7 @@ class Hypotheses:
         return [self._assumption(code) for code in codes]
 
     def _assumption(self, code: str) -> Phrase:
-        """Return the name of the source of the datum, with the error of its heights that check points detect."""
+        """Return the source of the datum, with the error of its heights that check points detect."""
         row = int(np.flatnonzero(self.code == code)[0])
         if row not in self.relative:
             return phrase(f"datum.{code}")
@@ -236,7 +236,7 @@ class Hypotheses:
             return []
         if self.statistic[found[0]] < EXPLAINED * self.excess:
             return []
-        # If an error is large, its second-order terms exceed the odds between this error and its special case.
+        # Second-order terms of a large error exceed the odds between this error and its special case.
         special = [row for row in found if self.code[row] in SHARES and self._is_whole(row, found[0])]
         return special[:1] or [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
