@@ -229,7 +229,7 @@ def test_images_that_no_position_explains():
         ({"image_sd": 0.0}, "error.positive"),
         ({"image_sd": -1.0}, "error.not-negative"),
         ({"object_sd": np.inf}, "error.finite"),
-        ({"principal_distance": 0.0}, "block.not-zero"),
+        ({"principal_distance": 0.0}, "error.not-zero"),
         ({"position": [1.0, 2.0]}, r"position: must have the shape"),
         ({"position": [1.0, 2.0, np.nan]}, "error.finite"),
         ({"position_sd": 1.0}, "resection.value-missing"),

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from orientation_models import SIZE, simulate
 
+from message_codes import coded
 from photogram import InputError, orient
 from photogram.absolute_orientation import Similarity, read_similarity, stream, transform_file
 
@@ -179,7 +180,7 @@ def test_files_that_cannot_be_read(oriented, tmp_path):
 def test_a_deviation_that_is_none(oriented, tmp_path):
     source = write_csv(tmp_path / "points.csv", points(3))
     for value in (-1.0, np.nan, np.inf):
-        with pytest.raises(InputError, check=lambda error: error.code == "orientation.point-sd"):
+        with pytest.raises(InputError, check=coded("error.not-negative")):
             transform_file(oriented.similarity, source, tmp_path / "out.csv", point_sd=value)
 
 

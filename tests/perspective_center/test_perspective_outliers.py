@@ -66,7 +66,7 @@ def test_without_redundancy_nothing_is_tested(make_grid):
     [
         ({"ids": 8}, "ids: must be a list of names, got 8"),
         ({"principal_distance": "150"}, "principal_distance: must be a number"),
-        ({"principal_distance": np.nan}, "principal distance must be positive"),
+        ({"principal_distance": np.nan}, "principal_distance: must be positive"),
         ({"principal_distance": None}, "principal_distance: must be a number"),
         ({"readings": np.nan}, "readings: .* whole number"),
         ({"readings": 2**64}, "readings: .* whole number"),

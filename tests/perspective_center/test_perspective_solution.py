@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from message_codes import coded
 from photogram import InputError, RankError
 from photogram.perspective_center import Grid, determine
 
@@ -189,9 +190,9 @@ def test_grids_that_contradict_themselves_are_refused(make_grid):
     grid = make_grid()
     with pytest.raises(InputError, match=r"model: must have the shape .*, got \(3, 3\)"):
         Grid(grid.ids, grid.plate_xy, grid.model[:3], 150.0)
-    with pytest.raises(InputError, check=lambda error: error.code == "projector.finite"):
+    with pytest.raises(InputError, check=coded("error.finite")):
         Grid(grid.ids, grid.plate_xy * np.nan, grid.model, 150.0)
-    with pytest.raises(InputError, match="principal distance"):
+    with pytest.raises(InputError, match="principal_distance"):
         Grid(grid.ids, grid.plate_xy, grid.model, -150.0)
     with pytest.raises(InputError, check=lambda error: error.code == "projector.readings"):
         Grid(grid.ids, grid.plate_xy, grid.model, 150.0, readings=np.zeros(25, dtype=int))

@@ -124,8 +124,7 @@ def orient(
         "scale": 1.0 if scale is None else scale,
     }
     for name, value in positive.items():
-        if not 0 < number(name, value) < math.inf:
-            raise InputError(phrase("orientation.positive", name=name, value=value))
+        number(name, value, "positive")
     if trace and method == "rigorous":
         raise InputError(phrase("orientation.trace"))
     if unknown := [name for name in rejected if name not in stations.ids]:

@@ -166,7 +166,7 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
     if (largest := max(values[:3], key=abs)) ** 2 > 1:
         raise record.error(phrase("orientation.sine", value=float(largest)))
     if values[3] <= 0:
-        raise record.error(phrase("orientation.positive", name="s", value=values[3]))
+        raise record.error(phrase("error.at", what="s", message=phrase("error.positive", value=values[3])))
     angles = np.arcsin(values[:3])
     kappa = _kappa(stations)
     if kappa is None:

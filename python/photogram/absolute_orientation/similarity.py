@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any, Self
 
@@ -110,13 +109,12 @@ class Similarity:
             is not a finite number.
         """
         a, b = shaped("rotation", rotation, (3, 3)), shaped("translation", translation, (3,))
-        scale, deviation_factor = number("scale", scale), number("deviation_factor", deviation_factor)
+        scale = number("scale", scale, "positive")
+        deviation_factor = number("deviation_factor", deviation_factor, "positive")
         if not (
             np.abs(a).max() < 2 and np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0
         ):
             raise InputError(phrase("orientation.rotation"))
-        if not (0 < scale < math.inf and 0 < deviation_factor < math.inf):
-            raise InputError(phrase("orientation.scales", scale=scale, factor=deviation_factor))
         centre, model = (
             shaped(name, value, (3,))
             for name, value in (("control_centre", control_centre), ("model_centre", model_centre))
@@ -169,7 +167,7 @@ class Similarity:
 
     def to_model(self, control: ArrayLike) -> Floats:
         """Return (n, 3) model coordinates x = s A X + B of control (TB 19, eq. 2.1)."""
-        centred = _rows("control", control) - self.control_centre
+        centred = shaped("control", control, (None, 3)) - self.control_centre
         model: Floats = self.scale * centred @ self.rotation.T + self.shift + self.model_centre
         return model
 
@@ -194,7 +192,7 @@ class Similarity:
         InputError
             If a shape differs, or a value is not a number.
         """
-        points = _rows("model", model)
+        points = shaped("model", model, (None, 3))
         try:
             sd = np.broadcast_to(numbers("model_sd", model_sd), points.shape) * self.deviation_factor
         except ValueError:
@@ -212,13 +210,6 @@ class Similarity:
             self.control_centre.tolist(),
             self.model_centre.tolist(),
         )
-
-
-def _rows(name: str, values: ArrayLike) -> Floats:
-    array = numbers(name, values)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(phrase("orientation.shape", name=name, shape=str(array.shape), rows="n"))
-    return array
 
 
 def read_similarity(path: Path, *, usable: bool = False) -> Similarity:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import frozen, names, numbers, text
+from photogram.arguments.arrays import names, numbers, shaped, text
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -86,12 +86,15 @@ class Stations(Brief):
         model_unit: str = "model unit",
     ) -> None:
         found = names("ids", ids)
+        shape = len(found), 3
         put = object.__setattr__  # the dataclass is frozen
         put(self, "ids", tuple(found))
-        put(self, "control", _table("control", control, len(found)))
-        put(self, "model", _table("model", model, len(found)))
-        put(self, "control_sd", _table("control_sd", control_sd, len(found)))
-        put(self, "model_sd", None if model_sd is None else _table("model_sd", model_sd, len(found)))
+        put(self, "control", shaped("control", control, shape, missing=True, one_row=True))
+        put(self, "model", shaped("model", model, shape, one_row=True))
+        put(self, "control_sd", shaped("control_sd", control_sd, shape, one_row=True))
+        if model_sd is not None:
+            model_sd = shaped("model_sd", model_sd, shape, one_row=True)
+        put(self, "model_sd", model_sd)
         put(self, "ground_unit", text("ground_unit", ground_unit))
         put(self, "model_unit", text("model_unit", model_unit))
         self._check()
@@ -159,13 +162,3 @@ class Stations(Brief):
         for row, column in np.argwhere(faulty).tolist():
             fields = {"station": self.ids[row], "value": float(values[row, column])}
             raise InputError(phrase(f"orientation.{code}", **fields))
-
-
-def _table(name: str, values: ArrayLike, count: int) -> Floats:
-    array = numbers(name, values, missing=name == "control")
-    if array.ndim == 2 and array.shape != (count, 3):
-        raise InputError(phrase("orientation.shape", name=name, shape=str(array.shape), rows=count))
-    try:
-        return frozen(np.broadcast_to(array, (count, 3)))
-    except ValueError:
-        raise InputError(phrase("orientation.shape", name=name, shape=str(array.shape), rows=count)) from None

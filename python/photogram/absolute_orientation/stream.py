@@ -15,6 +15,7 @@ from photogram.absolute_orientation.csv_files import header
 from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
+from photogram.arguments.arrays import number
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -92,8 +93,7 @@ def transform_file(
     OSError
         If a file cannot be written.
     """
-    if not 0 <= point_sd < np.inf:
-        raise InputError(phrase("orientation.point-sd", value=point_sd))
+    number("point_sd", point_sd, "not-negative")
     source, target = path_of("source", source), path_of("target", target)
     done = 0
     with OutputSet([source]) if outputs is None else nullcontext(outputs) as files:

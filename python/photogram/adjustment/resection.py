@@ -288,7 +288,7 @@ def resect(
     limit = number("tolerance", tolerance, "positive")
     number("max_iterations", whole_number("max_iterations", max_iterations), "positive")
     known_sd = np.concatenate(
-        [_deviations("position_sd", position_sd, (3,)), _deviations("attitude_sd", attitude_sd, (3,))]
+        [shaped("position_sd", position_sd, (3,), "sd"), shaped("attitude_sd", attitude_sd, (3,), "sd")]
     )
     solution = solve(
         given,
@@ -357,10 +357,10 @@ class Observed:
             raise argument_error("point_ids", "count", count=count, actual=len(ids))
         made = cls(
             points=shaped("object_points", points, (count, 3)),
-            point_sd=_deviations("object_sd", point_sd, (count, 3)),
+            point_sd=shaped("object_sd", point_sd, (count, 3), "sd", one_row=True),
             xy=shaped("image_xy", xy, (count, 2)),
-            xy_sd=_deviations("image_sd", xy_sd, (count, 2)),
-            principal_distance=number("principal_distance", principal_distance),
+            xy_sd=shaped("image_sd", xy_sd, (count, 2), "sd", one_row=True),
+            principal_distance=number("principal_distance", principal_distance, "not-zero"),
             names=ids,
         )
         checks = {"object_points": made.points, "object_sd": made.point_sd, "image_xy": made.xy}
@@ -370,10 +370,6 @@ class Observed:
                 code = "positive" if name == "image_sd" else "finite"
                 value = value_field(values[rows[0]].tolist())
                 raise argument_error(f"{name} of point {ids[rows[0]]}", code, value=value)
-        if not math.isfinite(made.principal_distance) or made.principal_distance == 0:
-            raise InputError(
-                phrase("block.not-zero", name="principal_distance", value=made.principal_distance)
-            )
         return made
 
 
@@ -417,14 +413,6 @@ def solve(
         if kind in RANK_FAILURES:
             raise RankError(phrase(f"resection.{kind}"), [], observed.names) from None
         raise AdjustmentError(message if kind == "input" else phrase(f"resection.{kind}")) from None
-
-
-def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return validated standard deviations; three values apply to every point."""
-    array = numbers(name, value)
-    if len(shape) == 2 and array.shape == shape[1:]:
-        array = np.broadcast_to(array, shape)
-    return shaped(name, array, shape, "sd")
 
 
 def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:

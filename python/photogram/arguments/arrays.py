@@ -33,24 +33,31 @@ RULES: dict[str, Callable[[Any], Any]] = {
     "finite": np.isfinite,
     "positive": lambda values: (values > 0) & np.isfinite(values),
     "not-negative": lambda values: (values >= 0) & np.isfinite(values),
+    "not-zero": lambda values: (values != 0) & np.isfinite(values),
     "sd": lambda values: values >= 0,  # Infinite if free
 }
 """Rules of numbers: functions that return which values are valid."""
 
 
 def shaped(
-    name: str, value: ArrayLike, shape: tuple[int | None, ...], rule: str = "", *, missing: bool = False
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int | None, ...],
+    rule: str = "",
+    *,
+    missing: bool = False,
+    one_row: bool = False,
 ) -> NDArray[np.float64]:
     """Return a read-only array of the given shape, with values of one of the `RULES`.
 
-    A size None is any number of rows; otherwise a single number is broadcast. Words, truth values and complex
-    numbers are rejected, even if NumPy would convert them. If `missing` is True, NaN is valid, and masked
-    values become NaN.
+    A size None is any number of rows; otherwise a single number is broadcast, and with `one_row` also a
+    single row. Words, truth values and complex numbers are rejected, even if NumPy would convert them. If
+    `missing` is True, NaN is valid, and masked values become NaN.
     """
     array = numbers(name, value, missing=missing)
     sizes = array.shape if array.ndim == len(shape) else (-1,) * len(shape)
     wanted = tuple(own if size is None else size for own, size in zip(sizes, shape, strict=True))
-    if array.ndim == 0 and -1 not in wanted:
+    if -1 not in wanted and (array.ndim == 0 or (one_row and array.shape == wanted[1:])):
         array = np.full(wanted, array)
         array.flags.writeable = False
     if array.shape != wanted:

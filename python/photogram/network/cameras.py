@@ -242,9 +242,8 @@ class Camera(Valued, Brief):
         missing = [name for name in self.names if name in needed and name not in given]
         require(not missing, f"parameters of camera {self.title}", "missing", name=", ".join(missing))
         for name, value in given.items():
-            require(math.isfinite(value), f"{name} of camera {self.title}", "finite", value=value)
-            if value == 0 and name in _GIVEN - {"cx", "cy"}:
-                raise InputError(phrase("block.not-zero", name=f"{name} of camera {self.title}", value=value))
+            rule = "not-zero" if name in _GIVEN - {"cx", "cy"} else "finite"
+            number(f"{name} of camera {self.title}", value, rule)
         return {name: given.get(name, 0.0) for name in self.names}
 
     def _checked_sd(self) -> dict[str, float]:

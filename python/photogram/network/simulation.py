@@ -118,7 +118,7 @@ def simulate(options: SimulationOptions | None = None, **changes: Unpack[Simulat
     high, relief = options.flying_height, options.relief
     require(relief < high, "relief", "less", high=high, value=relief)
     if not math.isfinite(options.footprint):
-        raise InputError(phrase("block.not-zero", name="principal_distance", value=distance))
+        raise argument_error("principal_distance", "not-zero", value=distance)
     taking = checked_cameras(options.cameras)
     _check_motion(motion, plain=spheroid is None and options.refraction is None, cameras=bool(taking))
     streams = _generator(options.seed).spawn(7)

@@ -437,8 +437,9 @@ class Trajectory:
             raise kind_error(f"{what} of trajectory {self.name}", "a Polynomial or a Spline", basis)
         basis = basis.over(*self.table.span)
         vars(self)[what] = basis
-        value = _of_each(f"value of the {what} of {self.name}", basis.value, basis.count)
-        sd = _of_each(f"sd of the {what} of {self.name}", basis.sd, basis.count)
+        where, shape = f"the {what} of {self.name}", (basis.count, 3)
+        value = shaped(f"value of {where}", basis.value, shape, one_row=True)
+        sd = shaped(f"sd of {where}", basis.sd, shape, one_row=True)
         return tuple(kind(f"{self.name} {what} {k}", value=value[k], sd=sd[k]) for k in range(basis.count))
 
     def _with_coefficients(self, coefficients: tuple[tuple[Coefficient, ...], ...]) -> Trajectory:
@@ -501,9 +502,3 @@ class Trajectory:
     def _row(self) -> _photocore.TrajectoryRow:
         """Row for the core, if the indices of coefficients are irrelevant."""
         return self.row({id(each): 0 for own in self.coefficients for each in own})
-
-
-def _of_each(name: str, given: ArrayLike, count: int) -> Floats:
-    """Return (count, 3) values from one for all coefficients, or one for each."""
-    found = numbers(name, given)
-    return shaped(name, np.tile(found, (count, 1)) if found.shape == (3,) else found, (count, 3))

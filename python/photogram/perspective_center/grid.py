@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -115,17 +114,13 @@ class Grid(Brief):
         if self.initial is not None:
             shapes["initial"] = (6,)
         for name, shape in shapes.items():
-            values = shaped(name, getattr(self, name), shape)
-            for value in values[~np.isfinite(values)].tolist():
-                raise InputError(phrase("projector.finite", name=name, value=value))
-            object.__setattr__(self, name, values)
+            object.__setattr__(self, name, shaped(name, getattr(self, name), shape, "finite"))
         readings = shaped("readings", self.readings, (count,))
         good = (readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))
         for value in readings[~good].tolist():
             raise InputError(phrase("projector.readings", value=value))
         object.__setattr__(self, "readings", readings.astype(np.int64))
-        if not 0 < number("principal_distance", self.principal_distance) < math.inf:
-            raise InputError(phrase("projector.principal-distance", value=self.principal_distance))
+        number("principal_distance", self.principal_distance, "positive")
 
 
 def joined(grids: Sequence[Grid]) -> Grid:

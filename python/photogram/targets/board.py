@@ -99,10 +99,7 @@ class Board(Valued, Brief):
         else:
             self._check_grid()
         if self.point_sd is not None:
-            sd = shaped("point_sd", self.point_sd, (len(self.places), 3))
-            if (wrong := sd[~((sd >= 0) & np.isfinite(sd))]).size:
-                raise InputError(phrase("targets.point-sd", value=float(wrong[0])))
-            self._set("point_sd", sd)
+            self._set("point_sd", shaped("point_sd", self.point_sd, (len(self.places), 3), "not-negative"))
         for name in ("sd_plane", "sd_spacing"):
             if getattr(self, name) is not None:
                 self._set(name, _length(name, getattr(self, name)))

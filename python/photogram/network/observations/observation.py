@@ -321,9 +321,7 @@ def _rows(name: str, value: Any, shape: tuple[int, ...], count: int | None, *, m
     array = numbers(name, value, missing=missing)
     if shape == (1,) and array.shape == (count,):
         array = array[:, np.newaxis]
-    if array.shape == shape:
-        array = np.broadcast_to(array, (count, *shape))
-    return shaped(name, array, (count, *shape), missing=missing)
+    return shaped(name, array, (count, *shape), missing=missing, one_row=True)
 
 
 def checked_observations(given: object) -> Observations[Observation]:
