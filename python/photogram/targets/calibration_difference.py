@@ -15,10 +15,11 @@ from photogram.network.hull import hull, outside
 from photogram.summaries import Brief, Rows
 from photogram.targets.cross_validation import DifferenceTest
 from photogram.targets.housing import transformed
-from photogram.targets.maps import distance_text, image_grid
+from photogram.targets.maps import at_distance, image_grid
 from photogram.targets.motion_fit import Criterion, Fitted, differences_at, fitted_motion, points_at
 from photogram.targets.projection import fixed_points, of_functions, point_partials, worst
 from photogram.targets.vision import imaged, unknown_of, values_of
+from photogram.words import Phrase, phrase
 
 RANK_TOLERANCE = 1e-5  # smaller singular values, relative to the largest, are rounding errors
 TEST_GRID = (12, 8)  # pixels across and down, for cameras of different models
@@ -138,18 +139,24 @@ class CameraDifference(Brief):
     @property
     def title(self) -> str:
         """Title with the compared cameras and distances."""
-        at = " and ".join(distance_text(each, self.unit) for each in self.distances)
-        return f"{self.cameras[1]} less {self.cameras[0]} {at}, the motion between them out"
+        first, second = self.cameras
+        at = [at_distance(each, self.unit) for each in self.distances]
+        return str(phrase("difference.title", first=first, second=second, at=at))
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the difference."""
-        shift = ", ".join(f"{each:.3g}" for each in self.translation)
-        moved = f", {shift} {self.unit}" if self.fitted.finite else ""
         rows = [
-            ("motion", f"{self.rotation:.4g} degrees{moved}"),
-            ("difference", f"rms {self.rms:.3g} px, largest {self.largest:.3g} px where the board was seen"),
+            ("motion", str(self.motion)),
+            ("difference", str(phrase("difference.sizes", rms=self.rms, largest=self.largest))),
         ]
         return self.title, rows + [("", each) for each in self.remarks]
+
+    @property
+    def motion(self) -> Phrase:
+        """Rotation in degrees, and the translation unless all points are infinitely far."""
+        x, y, z = (float(each) for each in self.translation)
+        fields = {"degrees": float(self.rotation), "x": x, "y": y, "z": z, "unit": self.unit}
+        return Phrase(f"difference.{'motion' if self.fitted.finite else 'rotation'}", fields)
 
     @property
     def sentences(self) -> list[str]:
@@ -162,22 +169,15 @@ class CameraDifference(Brief):
         """Limitations of the comparison, and the result of its test."""
         said = []
         if self.fitted.finite and len(self.distances) == 1:
-            said.append("one distance leaves the translation arbitrary: give a near and a far one")
+            said.append(phrase("difference.one-distance"))
         if self.shared > 0:
-            said.append(
-                f"{100 * self.shared:.0f} percent of the corners are the same: the two are not independent;"
-                " the difference shows what the models do, and is only a lower bound of the errors"
-            )
+            said.append(phrase("difference.shared", percent=100 * self.shared))
+        if (test := self.test) is not None:
+            code = f"difference.{'explained' if test.explained else 'unexplained'}"
+            said.append(phrase(code, name=test.name, factor=test.factor, p=test.probability))
         if self.covariances is None:
-            said.append("without covariances of both the difference cannot be tested")
-        if self.test is not None:
-            verdict = (
-                "explained by the uncertainties"
-                if self.test.explained
-                else (f"{self.test.factor:.2g} times what the uncertainties explain")
-            )
-            said.append(f"{self.test.name}: {verdict} (p {self.test.probability:.2g})")
-        return said
+            said.append(phrase("difference.untested"))
+        return [*map(str, said)]
 
 
 def compared(

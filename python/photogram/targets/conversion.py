@@ -35,7 +35,7 @@ from photogram.targets.lens_fit import (
     shows,
     within,
 )
-from photogram.targets.maps import distance_text, image_grid
+from photogram.targets.maps import at_distance, image_grid
 from photogram.targets.motion_fit import Fitted, points_at
 from photogram.targets.output.rig import Rig
 from photogram.targets.vision import TURNED
@@ -95,21 +95,21 @@ class Conversion(Documented):
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the conversion."""
         found = self.difference
-        at = " and ".join(distance_text(each, found.unit) for each in found.distances)
-        shift = ", ".join(f"{each:.3g}" for each in found.translation)
-        turn = f"{found.rotation:.3g} degrees" if np.any(found.fitted.motion != np.eye(4)) else "none"
+        at = [at_distance(each, found.unit) for each in found.distances]
+        turned = found.fitted.finite or np.any(found.fitted.motion != np.eye(4))
         column, row = self.where
         rows = [
-            ("difference", f"rms {self.rms:.3g} px, largest {self.largest:.3g} px {at}"),
-            ("largest at", f"column {column:.0f}, row {row:.0f}"),
-            ("motion of the axes", f"{turn}, {shift} {found.unit}" if found.fitted.finite else turn),
+            ("difference", str(phrase("conversion.sizes", rms=self.rms, largest=self.largest, at=at))),
+            ("largest at", str(phrase("conversion.where", column=column, row=row))),
+            ("motion of the axes", str(found.motion if turned else phrase("conversion.unturned"))),
             *self.camera.brief()[1],
         ]
         if self.covariance is not None:
-            rows.append(("covariance", f"that of {self.source.title}; the misfit above is not in it"))
+            rows.append(("covariance", str(phrase("conversion.covariance", source=self.source.title))))
         if self.unseen > 0:
-            rows.append(("not shown", f"{100 * self.unseen:.1f} percent of the picture"))
-        return f"{self.source.title}: {self.source.model} as {self.camera.model}", rows
+            rows.append(("not shown", str(phrase("conversion.unseen", percent=100 * self.unseen))))
+        models = {"source": self.source.model, "model": self.camera.model}
+        return str(phrase("conversion.title", camera=self.source.title, **models)), rows
 
     def document(self) -> Document:
         """Return the document with results, differences over the image and new camera."""

@@ -26,6 +26,7 @@ from photogram.summaries import Brief, Rows
 from photogram.targets.housing import Housing
 from photogram.targets.projection import common_partials, datum_rows
 from photogram.targets.vision import unknown_of, values_of
+from photogram.words import phrase
 
 MIN_PROBABILITY = 0.01  # calibrations with a larger p agree
 
@@ -184,21 +185,19 @@ class CrossValidation(Brief):
     def verdict(self) -> str:
         """Verdict of the cross-validation on every uncertainty map."""
         probability = min(each[-1].probability for each in self.tests)
-        if self.explained:
-            return f"cross-validation explained (p {probability:.2g})"
-        return (
-            f"cross-validation: the maps are too small by about {self.factor:.2g} (p {probability:.2g}): the"
-            " lens, the board or the weights are not as modelled"
-        )
+        code = f"cross.{'explained' if self.explained else 'too-small'}"
+        return str(phrase(code, factor=self.factor, p=probability))
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of splits and tests."""
         rows = []
         for (a, b), tests in zip(self.parts, self.tests, strict=True):
-            said = ", ".join(
-                f"{each.name} chi2 {each.chi2:.4g} of {each.dof} (p {each.probability:.2g})" for each in tests
-            )
-            rows.append((f"{len(a)} + {len(b)} views", said))
+            said = [
+                phrase("cross.test", name=each.name, chi2=each.chi2, dof=each.dof, p=each.probability)
+                for each in tests
+            ]
+            views = str(phrase("cross.views", first=len(a), second=len(b)))
+            rows.append((views, str(phrase("cross.tests", tests=said))))
         return "Cross-validation", [*rows, ("verdict", self.verdict)]
 
     def map(self, camera: int, pixels: Floats, distance: float, split: int = 0) -> CrossMap:

@@ -15,6 +15,7 @@ from photogram.network.hull import hull, outside
 from photogram.summaries import Brief, Rows
 from photogram.targets.projection import worst
 from photogram.targets.worth_options import DatumName
+from photogram.words import Phrase, phrase
 
 
 def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
@@ -25,7 +26,12 @@ def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> tuple[Floats, Fl
 
 def distance_text(distance: float, unit: str) -> str:
     """Return a distance in words: `at 2 m`, `at infinity`."""
-    return f"at {distance:g} {unit}" if math.isfinite(distance) else "at infinity"
+    return str(at_distance(distance, unit))
+
+
+def at_distance(distance: float, unit: str) -> Phrase:
+    """Return the phrase of a distance."""
+    return Phrase(f"map.at{'' if math.isfinite(distance) else '.infinity'}", {"n": distance, "unit": unit})
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -93,20 +99,14 @@ class UncertaintyMap(Brief):
     @property
     def title(self) -> str:
         """Title of the map with camera, distance and datum."""
-        noise = ", noise alone" if self.noise_only else ""
-        return (
-            f"{self.camera}: standard deviation of projection {distance_text(self.distance, self.unit)}"
-            f" (datum {self.datum}{noise}), px"
-        )
+        code, at = f"map.title{'.noise' if self.noise_only else ''}", at_distance(self.distance, self.unit)
+        return str(phrase(code, camera=self.camera, at=at, datum=self.datum))
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the map."""
         rows = [
-            (
-                "largest",
-                f"{self.largest:.3g} px where the board was seen, {np.nanmax(self.sd):.3g} px anywhere",
-            ),
-            ("smallest", f"{np.nanmin(self.sd):.3g} px"),
+            ("largest", str(phrase("map.largest", seen=self.largest, all=float(np.nanmax(self.sd))))),
+            ("smallest", str(phrase("map.pixels", size=float(np.nanmin(self.sd))))),
             ("model", self.model),
         ]
         return self.title, rows

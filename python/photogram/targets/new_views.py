@@ -20,9 +20,10 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.summaries import Brief, Rows
 from photogram.targets.housing import Housing, transformed
-from photogram.targets.maps import distance_text
+from photogram.targets.maps import at_distance
 from photogram.targets.projection import of_functions, worst
 from photogram.targets.vision import TURNED, motion_partials, rays
+from photogram.words import phrase
 
 MIN_CORNERS_PER_PICTURE = 12
 CORNER_MARGIN_PX = 5.0  # around a corner, for its detection
@@ -148,14 +149,15 @@ class Suggestions(Brief):
         """Suggested views and their effect, one line per view."""
         largest, said = float(self.before.max()), []
         for each in self.views:
-            said.append(f"{each.candidate.name}: largest {largest:.3g} -> {each.largest:.3g} px")
+            sizes = {"before": largest, "largest": each.largest}
+            said.append(str(phrase("views.smaller", view=each.candidate.name, **sizes)))
             largest = each.largest
         return said
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the suggested views."""
-        at = distance_text(self.distance, self.unit)
-        title = f"Views to take next, for the uncertainty of {self.camera} {at}"
+        at = at_distance(self.distance, self.unit)
+        title = str(phrase("views.next", camera=self.camera, at=at))
         return title, [(f"{number}", said) for number, said in enumerate(self.sentences, 1)]
 
 

@@ -20,7 +20,7 @@ from photogram.show.page import Fact, Tone, fixed, significant
 from photogram.show.quantity import Axis, Quantity
 from photogram.targets.lens_fit import field_of, grid_of_pixels
 from photogram.targets.vision import TURNED
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
@@ -128,10 +128,9 @@ def worst_points(calibrated: Calibrated) -> list[str]:
     rows = np.flatnonzero(_outlying(calibrated, codes, len(tests)))
     unit, lines = calibrated.calibration.board.unit, []
     for row in rows[np.argsort(-tests[rows], kind="stable")][:MAX_POINTS_LISTED].tolist():
-        differences = zip("xyz", result.point_differences[row].tolist(), strict=True)
-        apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in differences)
-        name = result.block.point_ids[row]
-        lines.append(f"point {name}: {apart} {unit} off its place, {tests[row]:.1f} standard deviations")
+        x, y, z = result.point_differences[row].tolist()
+        fields = {"x": x, "y": y, "z": z, "unit": unit, "test": float(tests[row])}
+        lines.append(str(phrase("board.point", point=result.block.point_ids[row], **fields)))
     return lines
 
 

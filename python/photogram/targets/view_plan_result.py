@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import counted
 from photogram.show.methods import Documented
 from photogram.summaries import Rows
-from photogram.targets.maps import UncertaintyMap, distance_text
+from photogram.targets.maps import UncertaintyMap, at_distance
 from photogram.targets.new_views import Candidate
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.show.page import Document
@@ -78,23 +78,19 @@ class ViewPlan(Documented):
     @property
     def headline(self) -> str:
         """Predicted accuracy in one sentence."""
-        at = distance_text(self.distance, self.calibrated.calibration.board.unit)
-        said = f"{counted(len(self.views), 'view')}: largest standard deviation {self.largest:.2g} px {at}"
-        if not self.need:
-            return said
-        return f"{said}, {'as good as' if self.enough else 'above'} the {self.need:g} px that are needed"
+        at = at_distance(self.distance, self.calibrated.calibration.board.unit)
+        code = f"plan.{'views' if not self.need else 'enough' if self.enough else 'few'}"
+        return str(phrase(code, n=len(self.views), largest=self.largest, at=at, need=float(self.need or 0)))
 
     @property
     def sentences(self) -> list[str]:
         """Views in order, with the effect of each."""
         said, before = [], math.nan
         for each in self.views:
-            brings = (
-                f"largest {each.largest:.3g} px"
-                if math.isnan(before)
-                else f"largest {before:.3g} -> {each.largest:.3g} px"
-            )
-            said.append(each.candidate.name + ("" if math.isnan(each.largest) else f": {brings}"))
+            code = "smaller" if math.isfinite(before) else "first"
+            code = "unknown" if math.isnan(each.largest) else code
+            sizes = {"before": before, "largest": each.largest}
+            said.append(str(phrase(f"views.{code}", view=each.candidate.name, **sizes)))
             before = each.largest
         return said
 
@@ -105,31 +101,21 @@ class ViewPlan(Documented):
         lens = given.cameras[0]
         (size,) = given.corners.sizes
         wide, high = size or (0, 0)
+        camera = {"width": wide, "height": high, "model": lens.model, "focal": float(lens.scale)}
         return [
-            f"Board: {given.board.described}; corners good to {given.sd0:g} px (--sd images=).",
-            f"Camera: {wide} x {high} px, {lens.model} with a focal length of {lens.scale:.5g} px, each free"
-            " parameter known to a tenth of the width of the picture.",
+            str(phrase("plan.board", board=given.board.described, sd=given.sd0)),
+            str(phrase("plan.camera", **camera)),
         ]
 
     @property
     def next(self) -> list[str]:
         """Next steps, in sentences."""
         given = self.calibrated.calibration
-        board, own = given.board, "--board board.toml"
-        if board.kind == "chessboard":
-            own = f"--board {board.columns}x{board.rows} --spacing {board.pitch[0]:g}"
-        found = []
-        if not self.enough:
-            found.append(
-                f"Plan more views, a larger board, or nearer ones (--away): {len(self.views)} of these do not"
-                f" reach {self.need:g} px."
-            )
-        return [
-            *found,
-            "Hold the board about so, still while each picture is taken, and take some views more than are"
-            " planned: cross-validation needs them to test the lens, which a plan takes for right.",
-            f"Calibrate with `photogram calibrate PHOTOGRAPHS {own} --sd images={given.sd0:g}`.",
-        ]
+        board, chess = given.board, given.board.kind == "chessboard"
+        sizes = {"columns": board.columns, "rows": board.rows, "spacing": float(board.pitch[0])}
+        found = [] if self.enough else [phrase("plan.more", n=len(self.views), need=float(self.need or 0))]
+        command = phrase(f"plan.calibrate.{'chessboard' if chess else 'board'}", **sizes, sd=given.sd0)
+        return [*map(str, (*found, phrase("plan.hold"), command))]
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the plan."""

@@ -7,9 +7,9 @@ import math
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
-from photogram.targets.maps import UncertaintyMap, distance_text
+from photogram.targets.maps import UncertaintyMap, at_distance
 from photogram.targets.new_views import Suggestions
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,11 +50,12 @@ class Worth:
         lines = []
         for camera in dict.fromkeys(each.camera for each in self.maps):
             maps = [each for each in self.maps if each.camera == camera]
-            largest = ", ".join(
-                f"{each.largest:.2g} px {distance_text(each.distance, each.unit)}" for each in maps
-            )
-            lines.append(f"{camera}: worst where the board was seen {largest}; {maps[0].model}")
+            sizes = [
+                phrase("map.size", size=each.largest, at=at_distance(each.distance, each.unit))
+                for each in maps
+            ]
+            lines.append(str(phrase("map.worst", camera=camera, sizes=sizes, model=maps[0].model)))
         lines += [line for each in self.differences for line in each.sentences]
         for each in self.suggestions:
-            lines += [f"view to take next: {line}" for line in each.sentences]
+            lines += [str(phrase("views.line", line=line)) for line in each.sentences]
         return [*lines, *map(str, self.remarks)]
