@@ -17,7 +17,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.diagnosis.mistakes import Adjuster, Proposal, explain_test
-from photogram.diagnosis.robust import critical
+from photogram.diagnosis.tested_values import FOUND
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -26,6 +26,7 @@ from photogram.network.observations import Fiducial, KnownTogether
 from photogram.results.parts import ObservedKind
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
+from photogram.statistics.limits import normal_limit
 from photogram.words import phrase
 
 CERTIFICATE = "certificate"
@@ -52,7 +53,7 @@ def mark_hints(result: Result) -> list[Message]:
     readings, marks = list(_readings(result)), list(_marks(result))
     tested = [*readings, *marks]
     largest = max((each.value for each in tested), default=0.0)
-    limit = critical(2 * len(tested))
+    limit = normal_limit(2 * len(tested), FOUND)
     if not largest > limit:
         return []
     whole = _photos(readings, limit)

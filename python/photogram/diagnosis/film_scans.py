@@ -19,10 +19,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.robust import critical
+from photogram.diagnosis.tested_values import FOUND
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
+from photogram.statistics.limits import normal_limit
 from photogram.words import Phrase, phrase
 
 FEWEST_OF_HALVES = 12  # Observations of a photo
@@ -47,7 +48,7 @@ def seam_hints(result: Result) -> list[Message]:
                 (*_step(*given, block.image_sd[own], axis), axis, row, film.readings.pitch) for axis in (0, 1)
             ]
     value, step, axis, row, pitch = max(found, default=(0.0, 0.0, 0, 0, 1.0))
-    if not value > critical(4 * len(result.films)):
+    if not value > normal_limit(4 * len(result.films), FOUND):
         return []
     code = f"film-check.seam.{('column', 'row')[axis]}"
     unit = "mm" if pitch == 1.0 else "px"
@@ -99,7 +100,7 @@ def line_hints(result: Result) -> list[Message]:
     for row, film in result.films:
         if film.readings.pitch != 1.0:
             scanners.setdefault(id(film.scanner), (film.scanner.name, []))[1].append(row)
-    limit = critical(4 * (len(WINDOWS) - FAR) * max(len(scanners), 1), CHANCE)
+    limit = normal_limit(4 * (len(WINDOWS) - FAR) * max(len(scanners), 1), CHANCE)
     messages = []
     for name, rows in scanners.values():
         jitter = max(_of_scanner(result, rows), key=lambda each: each.z, default=None)

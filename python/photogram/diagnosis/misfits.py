@@ -10,7 +10,6 @@ from photogram import _photocore
 from photogram.arguments.types import Bools
 from photogram.diagnosis.findings import Finding, Level, Section, finding, small_unit
 from photogram.diagnosis.gross import parted_rays
-from photogram.diagnosis.robust import critical
 from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, spread_of
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import replace
@@ -20,6 +19,7 @@ from photogram.results.result import Result
 from photogram.results.snooping_log import Removal
 from photogram.results.snooping_result import Snooped
 from photogram.show.quantity import Axis, Table, column
+from photogram.statistics.limits import normal_limit
 from photogram.words import Phrase, phrase
 
 CODES = {
@@ -134,7 +134,7 @@ class Misfits:
         if kind == IMAGE and self.suspected[self._image_of(entry)]:
             code = "check.gross-error.one"
         sizes = np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd)) / spread_of(self.result)
-        limit = critical(self.found.outcome.tests, FOUND)
+        limit = normal_limit(self.found.outcome.tests, FOUND)
         chosen = np.flatnonzero(sizes > limit).tolist() if kind in (CONTROL, POSITION, ATTITUDE) else []
         points, photos = self._names(entry.group, kind)
         fields = {"named": suspects.name(entry.group), "redundancy": entry.redundancy}

@@ -8,12 +8,12 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.diagnosis.findings import Section, note, small_unit
-from photogram.diagnosis.robust import critical
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
 from photogram.show.quantity import Axis, Table, column
+from photogram.statistics.limits import normal_limit
 from photogram.statistics.patterns import group_patterns
 from photogram.words import phrase
 
@@ -83,7 +83,7 @@ def _sums(result: Result, section: Section) -> None:
     # The sums of points without redundancy are rounding errors.
     floor = (ROUNDING * float(block.image_sd.min())) ** 2
     sizes = np.abs(sums) / np.sqrt(np.maximum(variances, floor)) * several[:, np.newaxis]
-    limit = critical(2 * int(several.sum()))
+    limit = normal_limit(2 * int(several.sum()), CHANCE)
     for point in np.argsort(-sizes.max(axis=1), kind="stable")[:SHOWN].tolist():
         if sizes[point].max() > limit:
             x, y = factor * sums[point]
@@ -117,7 +117,7 @@ def _frame_pattern(result: Result, plain: Block, spread: float, section: Section
     names, terms = _terms(plain.image_xy[used], size)
     sd = block.image_sd[used]
     usual = float(np.median(sd))
-    limit = critical(len(names))
+    limit = normal_limit(len(names), CHANCE)
     for index, name in enumerate(names):
         design = terms[:, index] / sd
         norm = float((design**2).sum())

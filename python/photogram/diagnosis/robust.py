@@ -19,11 +19,6 @@ def mad_sd(values: Floats) -> float:
     return MAD_TO_SD * float(np.median(finite)) if finite.size else float("nan")
 
 
-def critical(tests: int, chance: float = 0.01) -> float:
-    """Return the critical value of the largest of several normal values (Bonferroni)."""
-    return NormalDist().inv_cdf(1 - chance / 2 / max(tests, 1))
-
-
 def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
     """Return (k, d) coefficients by Tukey's biweight after least absolute deviations.
 

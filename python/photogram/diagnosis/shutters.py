@@ -79,33 +79,21 @@ def _proposals(block: Block) -> Iterator[Proposal]:
         rows = own.direction in ("down", "up")
         return replace(own, edges=ends[rows], direction="right" if rows else "down")
 
-    def across_back(own: Shutter) -> Shutter:
-        return opposite(across(own))
-
-    def proposal(name: str, change: Callable[[Shutter], Shutter]) -> Proposal:
-        return Proposal(name, phrase(f"mistake.shutter.{name}"), partial(_changed, change=change))
-
-    yield proposal("opposite", opposite)
-    rows = any(own.shutter.direction in ("down", "up") for own in block.timed if own.shutter is not None)
-    code = "columns" if rows else "rows"
-    yield proposal(f"{code}.first", across)
-    readouts = [own.readout for own in block.timed if own.shutter is not None]
-    if not all(each is not None and np.isinf(each.sd).all() for each in readouts):
+    shutters = [own.shutter for own in block.timed if own.shutter is not None]
+    readouts = {id(own.readout): own.readout for own in shutters if isinstance(own.readout, Readout)}
+    code = "columns" if any(own.direction in ("down", "up") for own in shutters) else "rows"
+    changes: dict[str, Callable[[Shutter], Shutter]] = {"opposite": opposite, f"{code}.first": across}
+    if not all(np.isinf(own.sd).all() for own in readouts.values()):
         # A free readout time adopts the sign that fits.
-        yield proposal(f"{code}.last", across_back)
-    if any(each is not None and abs(float(each.position[0])) > LONGEST for each in readouts):
-        known: dict[int, Readout] = {}
-
-        def thousandth(own: Shutter) -> Shutter:
-            readout = own.readout
-            if not isinstance(readout, Readout):
-                return replace(own, readout=MILLISECOND * readout)
-            meant = replace(
-                readout, value=MILLISECOND * readout.value, sd=MILLISECOND * np.asarray(readout.sd)
-            )
-            return replace(own, readout=known.setdefault(id(readout), meant))
-
-        yield proposal("milliseconds", thousandth)
+        changes[f"{code}.last"] = lambda own: opposite(across(own))
+    if any(abs(float(own.position[0])) > LONGEST for own in readouts.values()):
+        thousandth = {
+            key: replace(own, value=MILLISECOND * own.value, sd=MILLISECOND * np.asarray(own.sd))
+            for key, own in readouts.items()
+        }
+        changes["milliseconds"] = lambda own: replace(own, readout=thousandth[id(own.readout)])
+    for name, change in changes.items():
+        yield Proposal(name, phrase(f"mistake.shutter.{name}"), partial(_changed, change=change))
 
 
 def _changed(block: Block, change: Callable[[Shutter], Shutter]) -> Block:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.robust import critical, mad_sd
+from photogram.diagnosis.robust import mad_sd
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.statistics.limits import normal_limit
 
 FOUND, SURE = 0.01, 1e-4  # Probabilities that a correct block has any finding, and a grave one
 ROUNDING = 0.01  # Standard deviation of test values below which residuals are rounding errors
@@ -42,7 +43,7 @@ def sizes_of_tests(result: Result) -> dict[str, Floats]:
 
 def outliers(result: Result) -> dict[str, Bools]:
     """Return components by type beyond the critical value of the largest of all test values."""
-    limit = critical(tested_count(result), FOUND)
+    limit = normal_limit(tested_count(result), FOUND)
     return {name: each > limit for name, each in sizes_of_tests(result).items()}
 
 
