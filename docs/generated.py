@@ -110,7 +110,7 @@ def columns(words: str) -> str:
 
 def keys(_: str) -> str:
     """Return the declared keys of the settings of a plain project as TOML."""
-    from photogram.formats.plain.keys import KEYS
+    from photogram.formats.plain.settings import KEYS
 
     sections: dict[str, list[str]] = {}
     for key in KEYS:

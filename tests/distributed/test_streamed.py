@@ -11,9 +11,8 @@ from message_codes import rejected
 from photogram import Distance, InputError, Position
 from photogram.adjustment.first_features import started
 from photogram.distributed.run import partition, read_manifest, read_node
-from photogram.formats import Project, ReadOptions, read, to_files
-from photogram.formats.plain import batches
-from photogram.formats.plain.batches import Streamed, streamable
+from photogram.formats import Project, ReadOptions, in_parts, read, to_files
+from photogram.formats.in_parts import Streamed, streamable
 from photogram.io import delimited
 from photogram.network import Relative
 
@@ -89,7 +88,7 @@ def of_each_photo(project, folder):
 @pytest.mark.parametrize("changed", [copied, in_text, omitted, weighted, of_each_photo])
 @pytest.mark.parametrize("size", [1 << 30, 20_000])
 def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatch, changed, size):
-    monkeypatch.setattr(batches, "BUCKET", size)
+    monkeypatch.setattr(in_parts, "BUCKET", size)
     monkeypatch.setattr(delimited, "LARGE", 1000)
     monkeypatch.setattr(delimited, "PIECE", 3000)
     project = changed(project, tmp_path / "project")

@@ -10,9 +10,8 @@ import pytest
 
 from files.test_guards import COMMANDS
 from photogram.cli.options import declarations
-from photogram.formats.plain.keys import KEYS
 from photogram.formats.plain.schema import TABLES
-from photogram.formats.plain.settings import read_settings
+from photogram.formats.plain.settings import KEYS, read_settings
 from photogram.statistics.verdict import RULES
 
 REPLACED = ["out", "as_published"]  # Every command has a text of its own

@@ -231,7 +231,6 @@ def writes(program):
 
 IN_RUNS = {f"distributed/{name}.py" for name in ("executors", "files", "nodes", "run", "tasks")} | {
     "formats/in_parts.py",
-    "formats/plain/batches.py",
 }
 """These make folders of a run in parts, which is taken up again after whatever happens. One file writes
 there, under another name first; another one into a temporary folder."""

@@ -25,7 +25,7 @@ from golden_data import SHARED, needs
 from message_codes import refused
 from photogram import InputError
 from photogram.formats.isis import binary_network, network_text, read_network
-from photogram.formats.isis.reading import is_network
+from photogram.formats.isis.network import is_network
 from photogram.io.pvl import Group
 
 NETWORKS = SHARED / "moving" / "control_network"

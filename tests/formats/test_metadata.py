@@ -19,10 +19,12 @@ from photogram.formats.metadata.record import (
     SEA_LEVEL,
     UNSAID,
     fix_of,
+    is_reference,
     number_of,
     read_exposures,
+    read_geo_txt,
+    read_reference,
 )
-from photogram.formats.metadata.reference import is_reference, read_geo_txt, read_reference
 
 SAMPLES = DATA / "statement" / "metadata"
 PIX4D = "http://pix4d.com/camera/1.0"

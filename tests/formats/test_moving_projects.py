@@ -18,7 +18,7 @@ from photogram import Attitudes, InputError, adjust, formats
 from photogram.distributed.cut import vertices_of
 from photogram.formats import ReadOptions
 from photogram.formats.description import described
-from photogram.formats.plain.batches import Streamed, streamable
+from photogram.formats.in_parts import Streamed, streamable
 from photogram.network import Lens, Polynomial, Smoothness, Spline, Table, Timed, Trajectory
 from photogram.network.motion import about
 from photogram.show.forms import text as text_of

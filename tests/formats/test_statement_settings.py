@@ -13,7 +13,7 @@ from golden_data import DATA, golden
 from message_codes import check_message, rejected
 from photogram import InputError, adjust, formats
 from photogram.formats.names import with_names
-from photogram.formats.plain.keys import KEYS, read_sentences
+from photogram.formats.plain.settings import KEYS, read_sentences
 from photogram.formats.supplements import with_control
 from photogram.results.statement.request import Asked
 

@@ -45,7 +45,7 @@ def adjusted_on_disk(
 ) -> bool:
     """Plan or adjust a project batch by batch; False if this is impossible."""
     from photogram.formats import ReadOptions
-    from photogram.formats.plain.batches import streamable
+    from photogram.formats.in_parts import streamable
 
     if not streamable(path, None if division.cluster else division.memory_bytes):
         return False

@@ -68,7 +68,7 @@ class StatementOptions:
 
     def asked(self, project: Project | None, reading: ReadOptions, unit: str) -> dict[str, Any]:
         """Return checked settings of a statement from options or project; lengths are in a unit."""
-        from photogram.formats.plain.keys import read_sentences
+        from photogram.formats.plain.settings import read_sentences
         from photogram.results.statement.request import Asked, length_of
 
         declared = {} if project is None else project.statement

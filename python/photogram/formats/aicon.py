@@ -42,7 +42,6 @@ class _Reader:
     def __init__(self, path: Path, control_sd: tuple[float, ...] | None) -> None:
         self.block, self.control_sd = BlockBuilder(path, TITLE), control_sd
         self.inactive: dict[str, set[str]] = {"photos": set(), "points": set()}
-        self.images: list[list[float]] = []  # Standard deviations
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -67,7 +66,7 @@ def read(path: Path, options: ReadOptions) -> Project:
         if names:
             block.messages.append(Message(phrase("aicon.inactive", n=len(names), what=kind)))
     photos, points, xy = block.image_rows()
-    sd = np.array(reader.images)
+    sd = np.array(block.image_sd)
     block.images(photos, points, xy, sd if (sd > 0).all() else None)
     if not block.controls:
         block.lacks.append(Phrase("read.free", {"option": Phrase("option.datum")}))
@@ -148,9 +147,8 @@ def _images(path: Path, reader: _Reader) -> None:
             if len(only) > 1:
                 raise card.place.error(phrase("format.no-camera", photo=photo))
             block.photo(photo, only[0], card.place)
-        block.image(photo, point, x, y)
-        reader.images.append(sd)
-    if not reader.images:
+        block.image(photo, point, x, y, sd=sd)
+    if not block.image_keys:
         raise InputError(phrase("format.missing", what="active image observations"), file=path)
     if lost:
         block.messages.append(Message(phrase("aicon.inactive", n=lost, what="image observations"), path))

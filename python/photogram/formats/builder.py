@@ -16,8 +16,8 @@ from photogram.arguments.arrays import is_covariance, repeated_pairs
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.project import Project, Repeated, Size
-from photogram.formats.rigging import FrameOf, mounted
 from photogram.io.places import Failing, Place, at_place
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import angles_form, known_angles
 from photogram.network.block import Block
@@ -25,7 +25,75 @@ from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
 from photogram.network.observations import Control, Observation, Observations, Position
 from photogram.network.rigs import Mount
+from photogram.network.trajectories import Clock
+from photogram.network.unknowns import Sensor
 from photogram.words import Phrase, option_sd, phrase
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Sensors on one frame."""
+
+    name: str
+    reference: str  # Sensor whose axes are the axes of the frame
+    sensors: Mapping[str, Sensor]  # Poses of the other sensors
+    # Clocks of sensors on trajectories
+    clocks: Mapping[str, Clock] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FrameOf:
+    """Photos taken simultaneously: their indices by sensor name."""
+
+    name: str
+    rig: Rig
+    photos: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A photo without images that represents a frame."""
+
+    name: str
+    camera: str
+    like: int
+    centre: Floats
+    matrix: Floats
+
+
+def mounted(
+    frames: Sequence[FrameOf], photos: Sequence[str], centres: Floats, matrices: Floats
+) -> tuple[list[Mount], list[Stand]]:
+    """Return mounts, and the missing photos of frames.
+
+    `centres`, `matrices`: (P, 3) and (P, 3, 3) poses A, photo to object; NaN if unknown.
+    """
+    mounts: list[Mount] = []
+    stands: list[Stand] = []
+    taken = set(photos)
+    for frame in frames:
+        first = frame.photos.get(frame.rig.reference)
+        if first is not None:
+            name = photos[first]
+        else:
+            camera, row = next(iter(frame.photos.items()))
+            sensor = frame.rig.sensors[camera]
+            # For an unknown sensor the photo's own pose is a sufficient initial value.
+            turn = np.eye(3) if sensor.matrix is None else np.asarray(sensor.matrix)
+            matrix = matrices[row] @ turn.T
+            name = f"frame {frame.name}"
+            while name in taken:
+                name += "'"
+            taken.add(name)
+            centre = centres[row] - matrix @ sensor.position
+            stands.append(Stand(name, frame.rig.reference, row, centre, matrix))
+        mounts += [
+            Mount(photos[row], name, frame.rig.sensors[camera])
+            for camera, row in frame.photos.items()
+            if camera != frame.rig.reference
+        ]
+    return mounts, stands
+
 
 ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Default for image coordinates
 
@@ -77,6 +145,7 @@ class BlockBuilder:
         self._images: tuple[Indices, Indices, Floats, Floats | float | None] | None = None
         self.image_keys: list[tuple[Hashable, Hashable]] = []
         self.image_xy: list[tuple[float, float]] = []
+        self.image_sd: list[ArrayLike] = []  # NaN if unknown
 
     def camera(
         self,
@@ -193,7 +262,14 @@ class BlockBuilder:
         self._gnss[photo] = _Located(place or self.place, xyz, np.broadcast_to(sd, 3), crs)
 
     def image(
-        self, photo: Hashable, point: Hashable, x: float, y: float, place: Failing | None = None
+        self,
+        photo: Hashable,
+        point: Hashable,
+        x: float,
+        y: float,
+        place: Failing | None = None,
+        *,
+        sd: ArrayLike = np.nan,
     ) -> None:
         """Add an image observation of a photo that was added before."""
         if photo not in self.photo_rows:
@@ -202,6 +278,7 @@ class BlockBuilder:
             self.point(point)
         self.image_keys.append((photo, point))
         self.image_xy.append((x, y))
+        self.image_sd.append(sd)
 
     def images(self, photos: Indices, points: Indices, xy: Floats, sd: Floats | float | None = None) -> None:
         """Set all image observations: rows of photos and points, coordinates; `sd` is None if missing."""

@@ -16,16 +16,15 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.block_contents import posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format
-from photogram.formats.models import complete_positions
-from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.models import attitude_matrices, complete_positions, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_lines
 from photogram.io.packed_numbers import pieces
 from photogram.messages import Message
+from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.words import Phrase, phrase
@@ -153,7 +152,7 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     sizes = project.sizes
     positions = complete_positions(project)
     placed: Bools = np.asarray(np.isfinite(positions).all(axis=1))
-    oriented = posed(block)
+    oriented = known_poses(block)
     rows = np.flatnonzero(oriented[block.image_photos] & placed[block.image_points])
     if not len(rows):
         raise InputError(phrase("format.no-images"))

@@ -124,14 +124,7 @@ def enu_origin(crs: str) -> tuple[float, float, float] | None:
 
 def east_north_up(origin: tuple[float, float, float]) -> Floats:
     """Return (3, 3) rows: east, north and up at a position, geocentric."""
-    lat, lon = np.radians(origin[:2])
-    return np.array(
-        [
-            [-np.sin(lon), np.cos(lon), 0.0],
-            [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)],
-            [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)],
-        ]
-    )
+    return local_frames([[*np.radians(origin[1::-1]), 0.0]])[0]
 
 
 def _geocentric_of(origin: tuple[float, float, float]) -> Floats:

@@ -168,7 +168,9 @@ def placed(result: Result, crs: str = "") -> Placed:
         turned_covariances(turns, own)
         for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
     ]
-    own = _own_attitudes(result)
+    attitude_covariances = result.photo_covariances[:, 3:, 3:]
+    known = attitude_covariances if np.isfinite(attitude_covariances).all() else None
+    own = Attitudes.of(angles_form(block.photo_to_ground), result.photo_attitudes, known)
     return Placed(
         result=result,
         crs=crs,
@@ -239,14 +241,6 @@ def _positions(names: Sequence[str], xyz: Floats, covariances: Floats) -> dict[s
     }
 
 
-def _own_attitudes(result: Result) -> Attitudes:
-    """Return the attitudes of the photos relative to the axes of the block."""
-    covariances = result.photo_covariances[:, 3:, 3:]
-    known = bool(np.isfinite(covariances).all())
-    form = angles_form(result.block.photo_to_ground)
-    return Attitudes.of(form, result.photo_attitudes, covariances if known else None)
-
-
 def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
     """Return position differences in linear units; 0 for missing values."""
     lengths = lengths_of_units(result.point_positions[rows], result.block.spheroid)
@@ -277,7 +271,9 @@ def placed_section(found: Placed) -> Section:
     own.sort(key=lambda k: natural_order(names[int(found.rows[k])]))
     sd = np.sqrt(np.diagonal(found.point_covariances, axis1=1, axis2=2))
     decimals = decimals_of(sd)
-    rows, differences = found.rows[own[:MOST]], _listed_differences(found)
+    rows, differences = found.rows[own[:MOST]], dict[int, Floats]()
+    for given, steps in (found.differences(), found.control_differences()):
+        differences |= zip(given.tolist(), steps, strict=True)
     axes = [Axis.of(name.capitalize(), unit) for name, unit in zip(found.names, found.units, strict=True)]
     local = tuple(Axis.of(axis, "m") for axis in _LOCAL)
     columns = [
@@ -302,9 +298,3 @@ def placed_section(found: Placed) -> Section:
     )
     title = f"Control and check points in {found.crs}"
     return Section("in-crs", title, [Table("", title, columns, note)] if own else [])
-
-
-def _listed_differences(found: Placed) -> dict[int, list[float]]:
-    """Return differences of control and check points by row of points."""
-    pairs = (found.differences(), found.control_differences())
-    return {row: own for rows, d in pairs for row, own in zip(rows.tolist(), d.tolist(), strict=True)}

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Indices
+from photogram.formats.models import known_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.trajectories import shared_trajectories
-from photogram.formats.plain.writing import known_cameras
 from photogram.formats.project import Project
 from photogram.formats.self_check import agreement, doubts
 from photogram.messages import listed

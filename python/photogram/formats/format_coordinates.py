@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.models import intersected
-from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.models import attitude_matrices, intersected, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.network.attitudes import angles_form, known_angles
 from photogram.network.block import Block, refuse_passages, refuse_trajectories

@@ -12,8 +12,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.interior import is_mirrored
+from photogram.formats.models import known_cameras
 from photogram.formats.plain.films import WrittenFilms
-from photogram.formats.plain.writing import known_cameras
 from photogram.formats.project import Project
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.files import read_lines

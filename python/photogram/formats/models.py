@@ -1,24 +1,96 @@
-"""Model of a project: intersection of rays, transformation, parts that a format cannot contain."""
+"""Contents of projects for writers: cameras, poses, control, intersected points, and lost parts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.block_contents import correlated_control, posed
-from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.errors import InputError
 from photogram.formats.project import Frame, Project
 from photogram.io.places import Failing
 from photogram.messages import Message
-from photogram.network.attitudes import known_angles
+from photogram.network.attitudes import angles_form, known_angles, known_matrices
+from photogram.network.block import Block
+from photogram.network.block_checks import known_poses
+from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
+from photogram.network.films import Scan
 from photogram.network.motion import on_shared
 from photogram.network.observations import Control, Position
 from photogram.network.rays import meet_rays
 from photogram.network.subset import kept_images
 from photogram.words import Phrase, phrase
+
+
+def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
+    """Return cameras (also for principal distances), and the one of each photo."""
+    if block.cameras:
+        assert block.photo_cameras is not None
+        cameras = [
+            each if each.name else each.replace(name=name)
+            for each, name in zip(block.cameras, block.camera_names, strict=True)
+        ]
+        return cameras, block.photo_cameras.tolist()
+    distances = block.known_distances("the file").tolist()
+    places = {each: row for row, each in enumerate(dict.fromkeys(distances))}
+    cameras = [Camera("perspective", {"c": c}, name=f"camera {row}") for row, c in enumerate(places, 1)]
+    return cameras, [places[each] for each in distances]
+
+
+def attitude_matrices(block: Block) -> Floats:
+    """Return (P, 3, 3) attitudes A of photos, photo to object; NaN if unknown."""
+    return known_matrices(angles_form(block.photo_to_ground), block.photo_attitudes)
+
+
+def correlated_control(block: Block) -> dict[str, Control]:
+    """Return control with correlated coordinates by point name."""
+    return {each.point: each for each in block.observations.of_type(Control)}
+
+
+class KnownPoints(NamedTuple):
+    """Control and check points of a project.
+
+    `rows` are the k points of the block; `positions` and `sd` are (k, 3), NaN and infinite if unknown;
+    `covariances` are (k, 3, 3), 0 if free; `checks` are (k,) the check points.
+    """
+
+    rows: list[int]
+    positions: Floats
+    sd: Floats
+    covariances: Floats
+    checks: Bools
+
+
+def known_points(project: Project) -> KnownPoints:
+    """Return control points, also correlated ones, and check points."""
+    block, full = project.block, correlated_control(project.block)
+    correlated = np.array([name in full for name in block.point_ids], dtype=bool)
+    held = np.isfinite(block.point_sd).any(axis=1) | np.isfinite(block.point_positions).any(axis=1)
+    rows = np.flatnonzero(correlated | held).tolist()
+    checks = np.isin(rows, project.checks)
+    positions, sd = block.point_positions[rows].copy(), block.point_sd[rows].copy()
+    if block.point_check_sd is not None:
+        given = block.point_check_sd[rows]
+        sd = np.where(checks[:, np.newaxis] & np.isfinite(given), given, sd)
+    covariances = np.where(np.isfinite(sd), sd, 0.0)[:, :, np.newaxis] ** 2 * np.eye(3)
+    for k, row in enumerate(rows):
+        if (each := full.get(block.point_ids[row])) is not None:
+            positions[k], covariances[k], checks[k] = each.observed, each.precision, False
+            sd[k] = np.sqrt(np.diag(each.precision))
+    return KnownPoints(rows, positions, sd, covariances, checks)
+
+
+def check_images(block: Block, title: str) -> None:
+    """Reject image coordinates of films or line scanners."""
+    scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
+    if scanned:
+        raise InputError(phrase("format.film", title=title, photo=scanned[0]))
+    lines = [each.photo for each in block.timed if each.lines is not None]
+    if lines:
+        raise InputError(phrase("format.scanner", photo=lines[0]))
 
 
 def intersected(project: Project, points: Indices) -> Floats:
@@ -105,7 +177,7 @@ _ABSENT: Mapping[str, Count] = {
     "control": lambda project: _held(project) + len(project.checks),
     "rigs": lambda project: len(project.block.mounts),
     "boards": lambda project: len(project.block.passages),
-    "unposed": lambda project: np.count_nonzero(~posed(project.block)),
+    "unposed": lambda project: np.count_nonzero(~known_poses(project.block)),
 }
 """Functions that count the parts of a project that formats without a capability cannot contain."""
 _PARTIAL: Mapping[str, tuple[str, Count]] = {

@@ -11,12 +11,16 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
-from photogram.formats.block_contents import known_points, posed
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import Format
 from photogram.formats.images import Y_DOWN, lens_with, named_pixels, sizes_of, to_corner
-from photogram.formats.models import chosen_model, complete_positions
-from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.models import (
+    attitude_matrices,
+    chosen_model,
+    complete_positions,
+    known_cameras,
+    known_points,
+)
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_lines
@@ -25,6 +29,7 @@ from photogram.io.numbers import finite_number
 from photogram.io.places import Place, at_place, one_word, positive
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
+from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observations, Position
 from photogram.words import Phrase, phrase
@@ -59,7 +64,12 @@ def read(path: Path, options: ReadOptions) -> Project:
         with at_place(each):
             block.camera(_camera(name, each, *size), size)
     shots = dict(model["shots"].items())
-    rotations, translations = _poses(shots)
+    vectors = np.array([each["rotation"].numbers(3) for each in shots.values()])
+    for shot, vector in zip(shots.values(), vectors, strict=True):
+        if (most := np.abs(vector).max()) > 1e6:
+            raise shot["rotation"].error(phrase("format.angles", most=1e6, unit="rad", value=float(most)))
+    translations = np.array([each.get("translation", [0, 0, 0]).numbers(3) for each in shots.values()])
+    rotations = _photocore.vector_rotations(vectors)
     centres = -np.einsum("nji,nj->ni", rotations, translations)
     for (name, shot), centre, rotation in zip(shots.items(), centres, rotations, strict=True):
         block.photo(name, shot["camera"].text(), shot["camera"])
@@ -75,7 +85,9 @@ def read(path: Path, options: ReadOptions) -> Project:
     sizes = np.array(block.sizes, dtype=float)[np.array(block.photo_cameras)[photos]]
     block.images(photos, tracks, sizes / 2 + sizes.max(axis=1, keepdims=True) * xy)
     block.observations += _gps(shots, options, messages)
-    messages += _beside(folder)
+    for file in ("gcp_list.txt", "ground_control_points.json"):
+        if (folder / file).is_file():
+            messages.append(Message(phrase("opensfm.control", file=file, path=folder / file)))
     colours = {
         name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)] for name, each in points.items()
     }
@@ -130,16 +142,6 @@ def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
         },
         name=name,
     )
-
-
-def _poses(shots: dict[str, Tree]) -> tuple[Floats, Floats]:
-    """Return (n, 3, 3) rotations world to camera, and (n, 3) translations."""
-    vectors = np.array([each["rotation"].numbers(3) for each in shots.values()])
-    for shot, vector in zip(shots.values(), vectors, strict=True):
-        if (most := np.abs(vector).max()) > 1e6:
-            raise shot["rotation"].error(phrase("format.angles", most=1e6, unit="rad", value=float(most)))
-    translations = np.array([each.get("translation", [0, 0, 0]).numbers(3) for each in shots.values()])
-    return _photocore.vector_rotations(vectors), translations
 
 
 def _gps(shots: dict[str, Tree], options: ReadOptions, messages: list[Message]) -> Observations[Position]:
@@ -209,11 +211,6 @@ def _tracks(
     return np.array(photos, dtype=np.int64), np.array(tracks, dtype=np.int64), np.reshape(xy, (-1, 2))
 
 
-def _beside(folder: Path) -> list[Message]:
-    found = [name for name in ("gcp_list.txt", "ground_control_points.json") if (folder / name).is_file()]
-    return [Message(phrase("opensfm.control", file=name, path=folder / name)) for name in found]
-
-
 CONTROL = "gcp_list.txt"
 VERSION = "OPENSFM_TRACKS_VERSION_v2"
 
@@ -228,7 +225,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     block = project.block
     cameras, which = known_cameras(block)
     sizes = sizes_of(project)
-    rows = np.flatnonzero(posed(block))
+    rows = np.flatnonzero(known_poses(block))
     if not len(rows):
         raise InputError(phrase("format.poses"))
     attitudes = Attitudes(attitude_matrices(block)[rows])

@@ -14,12 +14,13 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.columns import PLAIN, in_units
 from photogram.formats.format import Format
 from photogram.formats.images import by_camera, from_corner, to_corner
+from photogram.formats.models import known_cameras
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.photos import cameras_of
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
-from photogram.formats.plain.writing import camera_table, known_cameras
+from photogram.formats.plain.writing import camera_table
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable

@@ -9,15 +9,14 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.block_contents import known_points, posed
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.models import complete_positions
-from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.models import attitude_matrices, complete_positions, known_cameras, known_points
 from photogram.formats.project import Project
 from photogram.formats.self_check import agreement
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
+from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.words import Phrase, option_sd, phrase
@@ -138,7 +137,7 @@ def reduced_images(project: Project, digits: int | None = None) -> ReducedImages
         of_photos,
         rows,
         scales * own[:, :2] / -own[:, 2:],
-        posed(block),
+        known_poses(block),
         attitude_matrices(block),
     )
 

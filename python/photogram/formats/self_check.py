@@ -8,14 +8,13 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.images import Y_DOWN
-from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.models import attitude_matrices, known_cameras
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
-from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.film_reduction import camera_images, camera_unit
-from photogram.network.motion import given_poses, on_shared
+from photogram.network.motion import given_poses, on_shared, timed_images
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.words import phrase
@@ -69,10 +68,11 @@ def _sample(project: Project) -> _Sample:
     rows = rows[:: max(1, len(rows) // MOST)]
     photos = block.image_photos[rows]
     cameras, photo_cameras = known_cameras(block)
-    by_photo = _rows_of_photos(block, photos) if block.timed else {}
+    sampled = np.full(len(block.image_xy), -1)
+    sampled[rows] = np.arange(len(rows))
     places, axes, xy = block.photo_positions[photos], matrices[photos], camera_images(block)[rows]
-    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
-        of_photo = by_photo[own.photo]
+    for own, trajectory, _, images in timed_images(block):
+        of_photo = sampled[images][sampled[images] >= 0]
         if len(of_photo):
             places[of_photo], axes[of_photo], xy[of_photo] = _moving(own, trajectory, xy[of_photo])
     return _Sample(
@@ -82,13 +82,6 @@ def _sample(project: Project) -> _Sample:
         axes.transpose(0, 2, 1),
         xy,
     )
-
-
-def _rows_of_photos(block: Block, photos: Indices) -> dict[str, Indices]:
-    """Return the indices of (m,) observations by photo name."""
-    order = np.argsort(photos, kind="stable")
-    bounds = np.searchsorted(photos[order], np.arange(len(block.photo_ids) + 1)).tolist()
-    return {name: order[bounds[row] : bounds[row + 1]] for row, name in enumerate(block.photo_ids)}
 
 
 def _moving(own: Timed, trajectory: Trajectory, xy: Floats) -> tuple[Floats, Floats, Floats]:

@@ -15,7 +15,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.io.sheets import UNPACKABLE, check_unpacked_size
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import Phrase, phrase
@@ -93,10 +93,8 @@ class Element:
     def whole(self, name: str) -> int:
         """Return the whole number of a child."""
         found = self.need(name)
-        try:
+        with at_place(found):
             return whole_number(found.text.strip(), highest=2**53)
-        except ValueError as error:
-            raise found.error(message_of(error)) from None
 
     def attribute(self, name: str, default: float | None = None) -> float:
         """Return an attribute as a number."""

@@ -14,9 +14,9 @@ from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.isd import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
 from photogram.formats.isis import FORMAT, binary_network, read_network
+from photogram.formats.isis.assembling import full_matrices
+from photogram.formats.isis.network import is_binary
 from photogram.formats.isis.outcome import Outcome, contents_of
-from photogram.formats.isis.points import full_matrices
-from photogram.formats.isis.reading import is_binary
 from photogram.network import geocentric_to_geographic
 
 SETTINGS = (

@@ -23,10 +23,10 @@ FORMAT = Format(
     name="agisoft",
     title=TITLE,
     recognises=_recognises,
-    read=later(f"{__name__}.reading", "read"),
-    write=later(f"{__name__}.writing", "write"),
+    read=later(f"{__name__}.files", "read"),
+    write=later(f"{__name__}.files", "write"),
     files=(FILE, "*.xml"),
     holds=frozenset({"names", "frame", "lenses", "shared-cameras", "control", "gnss"}),
-    cannot_hold=later(f"{__name__}.writing", "cannot_hold"),
+    cannot_hold=later(f"{__name__}.files", "cannot_hold"),
     pixels=True,
 )

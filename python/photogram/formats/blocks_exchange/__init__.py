@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from photogram.formats.format import Format, later
 from photogram.formats.xml_stream import root_of
 
@@ -13,18 +11,14 @@ FILE = "block.xml"
 TITLE = "BlocksExchange"
 
 
-def _recognises(path: Path) -> bool:
-    return path.is_file() and root_of(path)[0] == "BlocksExchange"
-
-
 FORMAT = Format(
     name="blocks_exchange",
     title=TITLE,
-    recognises=_recognises,
-    read=later(f"{__name__}.reading", "read"),
-    write=later(f"{__name__}.writing", "write"),
+    recognises=lambda path: path.is_file() and root_of(path)[0] == "BlocksExchange",
+    read=later(f"{__name__}.files", "read"),
+    write=later(f"{__name__}.files", "write"),
     files=(FILE, "*.xml"),
     holds=frozenset({"names", "points", "frame", "lenses", "shared-cameras", "control", "gnss", "unposed"}),
-    cannot_hold=later(f"{__name__}.writing", "cannot_hold"),
+    cannot_hold=later(f"{__name__}.files", "cannot_hold"),
     pixels=True,
 )

@@ -10,16 +10,16 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.builder import BlockBuilder
+from photogram.formats.builder import BlockBuilder, FrameOf, Rig
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model
 from photogram.formats.colmap.files import read_model
 from photogram.formats.images import Y_DOWN
 from photogram.formats.names import NAMES, NamedValues, renamed
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
-from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
+from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.unknowns import Sensor
 from photogram.words import Phrase, phrase
@@ -125,13 +125,8 @@ def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, In
     if bad.any():
         row = int(np.argmax(bad))
         raise places[row].error(phrase("format.length", length=float(lengths[row])))
-    w, x, y, z = quaternions.T / lengths
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.array(rows).transpose(2, 0, 1), np.flatnonzero(differences > NORMALISED)
+    matrices = Attitudes.of("quaternion", quaternions).matrices.copy()
+    return matrices, np.flatnonzero(differences > NORMALISED)
 
 
 def _rigid(pose: Sequence[float], place: Place) -> tuple[Floats, Floats]:

@@ -9,17 +9,17 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.block_contents import posed
 from photogram.formats.colmap import content
 from photogram.formats.colmap.files import binary_files, text_files
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
-from photogram.formats.models import complete_positions
+from photogram.formats.models import attitude_matrices, complete_positions, known_cameras
 from photogram.formats.names import names_file, numbered
-from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.io.json import to_json
+from photogram.io.parquet import packed
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
+from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.rigs import Mount
 from photogram.results.result import Result
@@ -80,7 +80,7 @@ def _written(project: Project) -> _Written:
         _camera(camera, size, numbers[camera.name])
         for camera, size in zip(cameras, sizes_of(project), strict=True)
     ]
-    rows = np.flatnonzero(posed(block))
+    rows = np.flatnonzero(known_poses(block))
     if not len(rows):
         raise InputError(phrase("format.poses"))
     photos = numbered([block.photo_ids[row] for row in rows], details.get("image numbers"))
@@ -218,7 +218,7 @@ def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
 def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> bytes:
     """Return covariances, stored by row, in the order of their numbers."""
     own = sorted(rows.items())
-    lower = _lower(covariances[[row for _, row in own]])
+    lower = packed(covariances[[row for _, row in own]])
     table = np.empty(len(own), [("id", number), ("c", "<f8", lower.shape[1])])
     table["id"], table["c"] = [each for each, _ in own], lower
     return struct.pack("<Q", len(table)) + table.tobytes()
@@ -245,15 +245,9 @@ def _camera_covariances(model: _Written, result: Result) -> bytes:
         matrix = own.get(names[camera.number])
         if matrix is None or matrix.shape != (count, count):
             matrix = np.zeros((count, count))
-        triangle = _lower(matrix[np.newaxis])[0].astype("<f8")
+        triangle = packed(matrix[np.newaxis])[0].astype("<f8")
         found.append(struct.pack("<II", camera.number, count) + triangle.tobytes())
     return struct.pack("<Q", len(found)) + b"".join(found)
-
-
-def _lower(matrices: Floats) -> Floats:
-    rows, columns = np.tril_indices(matrices.shape[1])
-    found: Floats = matrices[:, rows, columns]
-    return found
 
 
 def _centre_and_rotation(result: Result) -> Floats:

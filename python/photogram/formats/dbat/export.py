@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.cards import Card
-from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of
+from photogram.formats.dbat.tables import DbatBuilder, Sensor, sensor_of
 from photogram.formats.project import Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_beginning, read_lines
@@ -171,4 +171,4 @@ def _measurements(lines: _Lines, content: DbatBuilder) -> None:
         photo = _number(card, 0)
         content.check_photo(photo, card.place)
         sd = card.numbers(4, "sx sy") if len(card.words) >= 6 else np.full(2, np.nan)
-        content.pixel(photo, _number(card, 1), card.numbers(2, "x y"), np.where(sd > 0, sd, np.nan))
+        content.image(photo, _number(card, 1), *card.numbers(2, "x y"), sd=np.where(sd > 0, sd, np.nan))

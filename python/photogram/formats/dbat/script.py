@@ -10,8 +10,17 @@ import numpy as np
 
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError
-from photogram.formats.dbat.content import DbatBuilder, Sensor, sensor_of
-from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, titled, untitled
+from photogram.formats.dbat.tables import (
+    DbatBuilder,
+    Sensor,
+    sensor_of,
+    take_images,
+    take_photos,
+    take_points,
+    take_poses,
+    titled,
+    untitled,
+)
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
@@ -323,7 +332,7 @@ def read_measurements(path: Path, options: ReadOptions) -> DbatBuilder:
     for photo in sorted({photo for (_, photo), _ in images}):
         content.numbered_photo(photo, str(photo), camera, content.place)
     for (point, photo), xy in images:
-        content.pixel(photo, point, np.array(xy), np.full(2, np.nan))
+        content.image(photo, point, *xy, sd=(math.nan, math.nan))
     beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
     if path.name.endswith(MEASURED) and beside.is_file():
         for place, own in _cells(beside, "id,name,photos (used),", 6):

@@ -16,7 +16,7 @@ HEAD = 1 << 16  # Bytes that identify a network
 def _recognises(path: Path) -> bool:
     if not path.is_file():
         return False
-    from photogram.formats.isis.reading import is_network
+    from photogram.formats.isis.network import is_network
 
     with files.reading(path), path.open("rb") as file:
         return is_network(file.read(HEAD))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.csm.isd import Isd, to_angles
+from photogram.formats.csm.isd import to_angles
 from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.network import POINT_TYPES
 from photogram.formats.isis.outcome import Image, Outcome
@@ -310,7 +310,11 @@ class Parameter:
 def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
     """Return the coefficients of an image that are free or of degree 0."""
     solving, own = image.solving, adjusted.given
-    places, angles = _middle(image.supported.isd, own)
+    # The inertial position and angles at the centre of the tables
+    isd, still = image.supported.isd, Trajectory(own.name, own.table)
+    tables = (isd.position.times, isd.pointing.times)
+    (places, _), (_, turned) = (about(still, float(times[0] + times[-1]) / 2) for times in tables)
+    angles = to_angles(to_camera(isd, turned[np.newaxis]))[0]
     degrees = float(np.rad2deg(1.0))
     kinds = (
         (own.coefficients[0], adjusted.position, adjusted.position_sd, solving.position, places, 1 / KM),
@@ -330,11 +334,3 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
                 numbers = (begun[axis, k] * unit, change * unit, apriori, sd[k, axis] * unit)
                 found.append(Parameter(name, k, _UNITS[part], *map(float, numbers)))
     return found
-
-
-def _middle(isd: Isd, own: Trajectory) -> tuple[Floats, Floats]:
-    """Return the inertial position and angles at the centre of tables."""
-    still = Trajectory(own.name, own.table)
-    tables = (isd.position.times, isd.pointing.times)
-    (places, _), (_, turned) = (about(still, float(times[0] + times[-1]) / 2) for times in tables)
-    return places, to_angles(to_camera(isd, turned[np.newaxis]))[0]

@@ -16,7 +16,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.isis.network import ControlNetwork
-from photogram.formats.isis.points import per_metre
 from photogram.formats.isis.settings import Settings
 from photogram.formats.isis.solving import Solving
 from photogram.formats.project import Project
@@ -25,6 +24,7 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, local_frames
 from photogram.network.motion import focal_images
+from photogram.results.footprints import metric_covariances
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -134,12 +134,8 @@ class Outcome:
     @cached_property
     def covariances(self) -> Floats:
         """(n, 3, 3) a-posteriori covariances of X, Y, Z, square metres."""
-        own, spheroid = self.result.point_covariances, self.result.block.spheroid
-        if spheroid is None:
-            return np.asarray(own)
-        metres = per_metre(self.result.point_positions, spheroid)
-        to_xyz = self._axes.transpose(0, 2, 1) / metres[:, np.newaxis]
-        return np.asarray(to_xyz @ own @ to_xyz.transpose(0, 2, 1))
+        own, axes = metric_covariances(self.result), self._axes
+        return own if self.result.block.spheroid is None else axes.transpose(0, 2, 1) @ own @ axes
 
     @property
     def _axes(self) -> Floats:

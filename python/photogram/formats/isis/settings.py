@@ -129,11 +129,6 @@ class Settings:
         """Number of free coefficients of each coordinate."""
         return _count(self.positions, self.spk_solve_degree)
 
-    @property
-    def point_sigmas(self) -> Sigmas:
-        """Standard deviations of the adjusted coordinates of all points, metres."""
-        return self.latitude_sigmas if self.axes == "latitudinal" else self.rectangular_sigmas
-
 
 def _count(solved: Solved, degree: int) -> int:
     return degree + 1 if solved == "all" else ("none", "first", "second", "third").index(solved)

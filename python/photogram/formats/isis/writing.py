@@ -28,13 +28,14 @@ from photogram.formats.csm.reading import UNITS
 from photogram.formats.isis.jigsaw_files import jigsaw_files
 from photogram.formats.isis.network import (
     HEADER,
+    LABEL_BYTES,
     MESSAGE,
     ControlNetwork,
     columns_of_measures,
     columns_of_points,
+    is_binary,
 )
 from photogram.formats.isis.outcome import Image, Outcome, contents_of
-from photogram.formats.isis.reading import LABEL_BYTES, is_binary
 from photogram.formats.project import Project
 from photogram.io.json import read_json
 from photogram.io.pvl import Group, Value, label_text

@@ -12,17 +12,21 @@ from photogram.arguments.arrays import natural_order, truth_value
 from photogram.errors import InputError
 from photogram.formats.cards import filled_lines
 from photogram.formats.control_lists import SYSTEMS
-from photogram.formats.metadata.pictures import ENDINGS, said_by_picture, time_of_picture
+from photogram.formats.metadata.pictures import said_by_picture, time_of_picture
 from photogram.formats.metadata.record import (
+    ENDINGS,
     FIXED,
+    GEO_TXT,
     Said,
     is_events,
+    is_reference,
     number_of,
     prefix_of,
     read_events,
     read_exposures,
+    read_geo_txt,
+    read_reference,
 )
-from photogram.formats.metadata.reference import GEO_TXT, is_reference, read_geo_txt, read_reference
 from photogram.formats.plain.schema import TABLES
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass, field

@@ -30,7 +30,6 @@ from photogram.io.files import reading
 from photogram.io.places import Place
 from photogram.words import phrase
 
-ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff", ".dng")
 GPS = 0x8825  # The EXIF tag that points to the GPS tags
 _EXIF, _TAKEN, _FRACTION = 0x8769, 0x9003, 0x9291
 """EXIF tags: pointer to the EXIF group, and in it DateTimeOriginal and SubSecTimeOriginal."""

@@ -16,6 +16,7 @@ from photogram.film.validity import age_remark, changed_remark, valid_certificat
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.tables import Tables, columns_of
 from photogram.io.column_table import ColumnTable
+from photogram.io.places import Place, at_place
 from photogram.io.toml import day_of
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
@@ -35,8 +36,10 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
     table = tables.read("photos")
     if table is None or (not tables.settings.certificates and "certificate" not in table):
         return {}
-    cameras = _cameras_of_films(tables, table)
-    texts = table.texts("certificate")
+    listed = tables.read("cameras")
+    only = "" if listed is None or listed.count != 1 else listed.texts("camera")[0]
+    names, texts = table.texts("camera"), table.texts("certificate")
+    cameras = {row: names[row] or only for row, film in enumerate(table.texts("film")) if film}
     found: dict[str, Path] = {}
     for row, camera in cameras.items():
         if not texts[row]:
@@ -54,13 +57,6 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
     for camera, own in certificates.items():
         _tell(tables, camera, own, several.get(camera, [own]), sorted(filter(None, flown[camera])))
     return certificates
-
-
-def _cameras_of_films(tables: Tables, table: ColumnTable) -> dict[int, str]:
-    films, names = table.texts("film"), table.texts("camera")
-    cameras = tables.read("cameras")
-    only = "" if cameras is None or cameras.count != 1 else cameras.texts("camera")[0]
-    return {row: names[row] or only for row, film in enumerate(films) if film}
 
 
 def _flown(
@@ -154,11 +150,8 @@ def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera
 
 def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: Path | None) -> Floats:
     """Return a covariance matrix of all marks of a camera with a datum."""
-    try:
+    with at_place(Place(file), f"camera {camera}"):
         found, free = with_datum(xy, covariance)
-    except InputError as error:
-        message = phrase("error.at", what=f"camera {camera}", message=message_of(error))
-        raise InputError(message, file=file) from None
     if free:
         tables.remark("plain.distances-only", file, camera=camera, n=free)
     return found

@@ -1,24 +1,30 @@
-"""Assignment of fiducial readings to marks, and the scanned side of films."""
+"""Fiducial readings: their marks, the scanned side of films, and mistakes in pitch, side or names."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import ContradictionError, InputError, message_of
+from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import conformal, is_mirrored, mirror_message, side_residuals, true_places
-from photogram.film.marks import which_mark
+from photogram.film.marks import DECIDED, which_mark
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.words import phrase
+from photogram.network.cameras import Camera
+from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram.film import Certificate
+
 
 BETTER = 4.0  # Smallest ratio of distances between any other placement and the best one
 NEAR = 0.1  # Largest distance in the best placement, relative to the format; poses and points are approximate
@@ -37,19 +43,6 @@ class Lying:
         t1, t2, theta, m = conformal(self.places, true, mirrored=self.mirrored)
         q = (images @ np.array([1.0, 1j]) - (t1 + 1j * t2)) / ((1.0 + m) * np.exp(1j * theta))
         return np.asarray(-np.conj(q) if self.mirrored else q)
-
-
-@dataclass(frozen=True)
-class Laid:
-    """A placed film, with true scanner positions of marks and images."""
-
-    way: Lying
-    marks: Floats
-    images: Floats
-
-    def places(self) -> Floats:
-        """Return (m,) complex positions of its images in the camera frame."""
-        return self.way.back(self.marks, self.images)
 
 
 @dataclass(frozen=True)
@@ -92,23 +85,23 @@ class Seen:
         found: Floats = np.ones(len(rows)) if sd is None else sd[rows].max(axis=1)
         return found
 
-    def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:
-        """Yield expected image positions: from pose, and from tie points."""
+    def expected(self, photo: str, placed: Callable[[str], Floats | None]) -> Iterator[Expected]:
+        """Yield expected image positions: from pose, and from tie points of a photo whose film is placed."""
         own = self.images.points[self._rows(photo)]
         centre, axes, c = self._pose(photo)
         places = _projected((self.points[own] - centre) @ axes, c)
         known = np.flatnonzero(np.isfinite(places))
         yield Expected(known, places[known])
-        found = ((other, lies) for other in self._neighbours(photo, own) if (lies := laid(other)) is not None)
-        other, lies = next(found, (None, None))
-        if other is None or lies is None:
+        found = ((other, q) for other in self._neighbours(photo, own) if (q := placed(other)) is not None)
+        other, places = next(found, (None, None))
+        if other is None or places is None:
             return
         theirs = self.images.points[self._rows(other)]
         rows, there = (
             np.array([np.flatnonzero(each == point)[0] for point in np.intersect1d(own, theirs)])
             for each in (own, theirs)
         )
-        q = lies.places()[there]
+        q = places[there]
         _, turned, distance = self._pose(other)
         rays = np.column_stack([q.real, q.imag, np.full(len(q), distance)])
         places = _projected(rays @ turned.T @ axes, c)
@@ -242,11 +235,8 @@ class MarkReadings:
     def _named(self, table: ColumnTable, photo: ScannedPhoto) -> InputError | None:
         """Identify the marks of a photo; return an error if ambiguous."""
         places = self.places.get(photo.camera, {})
-        try:
+        with at_place(table.head, f"photo {photo.name}"):
             found = which_mark(np.array(list(places.values())).reshape(-1, 2), photo.true)
-        except InputError as error:
-            message = phrase("error.at", what=f"photo {photo.name}", message=message_of(error))
-            raise table.head.error(message) from None
         given = self.given_side(photo)
         ways = [each for each in found.alike if given in (None, each.mirrored)]
         if len(ways) != 1:
@@ -263,12 +253,13 @@ class MarkReadings:
         """Return the placement index of a film from known points or tie points."""
         images, true = photo.true_places(self.seen.readings(photo.name)), photo.true
         found = (
-            way_by_images(ways, true, images, each) for each in self.seen.expected(photo.name, self._laid)
+            way_by_images(ways, true, images, each)
+            for each in self.seen.expected(photo.name, self._places_of_images)
         )
         return next((each for each in found if each is not None), None)
 
-    def _laid(self, name: str) -> Laid | None:
-        """Return the placement of a film if its marks or the given side determine it."""
+    def _places_of_images(self, name: str) -> Floats | None:
+        """Return (m,) complex image positions in the camera frame, if marks or side define the placement."""
         photo = next((each for each in self.photos if each.name == name), None)
         if photo is None or len(photo.marks) < 2 or not all(photo.marks):
             return None
@@ -277,7 +268,7 @@ class MarkReadings:
         side = is_mirrored(q, true) if side is None else side
         if side is None:
             return None
-        return Laid(Lying(q, side), true, photo.true_places(self.seen.readings(photo.name)))
+        return Lying(q, side).back(true, photo.true_places(self.seen.readings(photo.name)))
 
     def places_of(self, photo: ScannedPhoto) -> Floats:
         """Return (n, 2) positions of the marks of a photo in the camera frame."""
@@ -310,3 +301,96 @@ class MarkReadings:
         if given is None and found is None:
             self.tables.remark("plain.side-unknown", photo=photo.name)
         return bool(found if given is None else given)
+
+
+SHRUNK = 0.01  # Largest change of film size, relative
+INCH = 25.4  # Millimetres
+SAME = 0.5  # Largest difference (pixels) of the marks of all photos of a resampled scan
+SHORTEST = 4  # Smallest number of angles of a distortion table with a curve
+FEWEST = 4  # Smallest number of marks that detects names rotated by a quarter
+
+
+def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> Phrase | None:
+    """Return an error of the scanner pitch; `places` are (n, 2) camera marks."""
+    if len(places) < 2:
+        return None
+    *_, m = conformal(places, photo.true, mirrored=mirrored)
+    if abs(m) <= SHRUNK or m <= -1.0:
+        return None
+    pitch = photo.machine.readings.pitch
+    meant = pitch / (1.0 + m)
+    fields = {"photo": photo.name, "factor": 1.0 + m, "meant": meant, "pitch": pitch}
+    return phrase("plain.scale-of-scan", dpi=round(INCH / meant, -1), **fields)
+
+
+def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats) -> Phrase | None:
+    """Return a remark on images beyond a distortion table with an inaccurate curve.
+
+    `places` are (m,) complex, in the camera frame, and `sd` (m,) their standard deviations, mm.
+    """
+    if own.radial is None or own.c is None or len(own.radial.angle) < SHORTEST:
+        return None
+    if camera.parameters != own.camera(camera.model).parameters:  # type: ignore[arg-type]
+        return None
+    radius = np.abs(places - complex(camera.parameters["xp"], camera.parameters["yp"]))
+    last, curve = own.c * float(np.tan(own.radial.angle.max())), own.curve()
+    beyond = radius[(radius > last) & (curve.sd_at(radius) > sd)]
+    if not len(beyond):
+        return None
+    farthest = beyond.max(keepdims=True)
+    sd_um = 1e3 * float(curve.sd_at(farthest)[0])
+    fields = {"camera": camera.name, "n": len(beyond), "all": len(places), "last": last, "sd_um": sd_um}
+    return phrase("plain.beyond-distortion", farthest=float(farthest[0]), **fields)
+
+
+def mark_remarks(
+    photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Floats]], found: Sequence[bool | None]
+) -> list[Phrase]:
+    """Return remarks on marks that are probably mistakes of the input."""
+    said: list[Phrase] = []
+    mirrored = [photo.name for photo, side in zip(photos, found, strict=True) if side]
+    if len(mirrored) > max(1.0, len(photos) / 2):
+        said.append(phrase("plain.mirrored-photos", n=len(mirrored), all=len(photos)))
+    elif mirrored:
+        said.append(phrase("plain.mirrored-films", names=mirrored))
+    said += _resampled(photos)
+    return said + list(_round(photos, places))
+
+
+def _resampled(photos: Sequence[ScannedPhoto]) -> list[Phrase]:
+    """Return a remark on resampled scans: marks of all photos are at the same pixels."""
+    readings: dict[tuple[str, str], list[Floats]] = {}
+    pixels = [photo for photo in photos if photo.machine.readings.pitch != 1.0]
+    for photo in pixels:
+        for mark, reading in zip(photo.marks, photo.readings, strict=True):
+            readings.setdefault((photo.camera, mark), []).append(reading)
+    several = [np.ptp(each, axis=0).max() for each in readings.values() if len(each) > 1]
+    if len(pixels) < 3 or len(several) < 2 or max(several) > SAME:
+        return []
+    return [phrase("plain.resampled")]
+
+
+def _round(photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Floats]]) -> Iterator[Phrase]:
+    """Yield remarks on marks that fit better with names rotated by a quarter."""
+    sums: dict[str, Floats] = {}
+    counts: dict[str, int] = {}
+    for photo in photos:
+        if len(photo.marks) < FEWEST:
+            continue
+        names = list(places[photo.camera])
+        try:
+            found = which_mark(np.array([*places[photo.camera].values()]), photo.true)
+        except InputError:
+            continue
+        own = [names.index(mark) for mark in photo.marks]
+        way = next((each for each in found.ways if each is not None and each.marks.tolist() == own), None)
+        if way is None:
+            continue
+        # On a film scanned from the other side, the same names are in reverse order.
+        turns = (way.quarter_turns + (-1 if way.mirrored else 1) * np.arange(4)) % 4
+        sums[photo.camera] = sums.get(photo.camera, np.zeros(4)) + found.omega[4 * way.mirrored + turns]
+        counts[photo.camera] = counts.get(photo.camera, 0) + 2 * len(own) - 6
+    for camera, omega in sums.items():
+        best = int(np.argmin(omega))
+        if omega[0] - omega[best] > DECIDED * max(1.0, omega[best] / max(counts[camera], 1)):
+            yield phrase("plain.turned-marks", camera=camera, degrees=90 * best)

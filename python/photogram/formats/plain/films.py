@@ -18,8 +18,15 @@ from photogram.film.interior import (
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.certificates import marks_of, read_fiducials
 from photogram.formats.plain.covariances import Covariances
-from photogram.formats.plain.film_mistakes import beyond_message, mark_remarks, scale_message
-from photogram.formats.plain.film_readings import Lying, MarkReadings, ScannedPhoto, Seen
+from photogram.formats.plain.film_readings import (
+    Lying,
+    MarkReadings,
+    ScannedPhoto,
+    Seen,
+    beyond_message,
+    mark_remarks,
+    scale_message,
+)
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import (
     Machine,
@@ -268,16 +275,14 @@ class _Reader:
             for name, sd, held in zip(FILM[3:], kind.sd_size, film.size.deviations == 0, strict=True)
             if not held and math.isfinite(sd)
         ]
-        values = {"m": 0.0 if roll is not None else float(kind.roll.position[0]), "b1": 0.0, "b2": 0.0}
-        sd = dict(zip(FILM[3:], kind.sd_size, strict=True))
-        covariance = self.covariances.over("film", photo.name, FILM)
-        if covariance is not None:
-            full = [*film.placement.position.tolist(), *(values[name] for name in FILM[3:])]
-            own = photo.name, film.placement, film.size, roll
-            return [KnownFilm(*own, FILM, full, covariance=covariance)]
+        sizes = 0.0 if roll is not None else float(kind.roll.position[0]), 0.0, 0.0
+        values = dict(zip(FILM, (*film.placement.position.tolist(), *sizes), strict=True))
+        own = photo.name, film.placement, film.size, roll
+        if (covariance := self.covariances.over("film", photo.name, FILM)) is not None:
+            return [KnownFilm(*own, FILM, list(values.values()), covariance=covariance)]
         if not names:
             return []
-        own = photo.name, film.placement, film.size, roll
+        sd = dict(zip(FILM[3:], kind.sd_size, strict=True))
         return [KnownFilm(*own, names, [values[n] for n in names], sd=[sd[n] for n in names])]
 
 

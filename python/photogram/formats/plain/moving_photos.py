@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.formats.builder import Rig
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.rigs import Rigs, sensor_of
@@ -17,12 +18,11 @@ from photogram.formats.plain.tables import (
     Tables,
     columns_of,
     columns_of_records,
-    indices_of,
     made,
     named_of,
 )
+from photogram.formats.plain.trajectories import increasing, rows_of
 from photogram.formats.plain.unknowns import read_unknowns, unknown_columns
-from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
@@ -132,18 +132,10 @@ def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
     """Return the line times by photo name."""
     table = tables.rows("line_times")
     names = [*photos.names, *sorted(photos.unused)]
-    of_photos = indices_of(table, "photo", {name: row for row, name in enumerate(names)}, "photo")
+    groups = rows_of(table, "photo", {name: row for row, name in enumerate(names)})
     values = table.given(("line", "time", "seconds_per_line"))
-    found: dict[str, Lines] = {}
-    for place in np.unique(of_photos).tolist():
-        rows = np.flatnonzero(of_photos == place)
-        back = np.diff(values[rows, 0]) <= 0
-        if back.any():
-            row = int(rows[1 + int(np.argmax(back))])
-            last, value = values[[rows[np.argmax(back)], row], 0].tolist()
-            raise table.cell_error(row, "line", "plain.increase", before=last, value=value)
-        found[names[place]] = made(table, int(rows[0]), Lines, values[rows])
-    return found
+    increasing(table, groups, "line")
+    return {name: made(table, int(rows[0]), Lines, values[rows]) for (name,), rows in groups.items()}
 
 
 def placed(photos: Photos, timed: Sequence[Timed], spheroid: Spheroid | None) -> Photos:

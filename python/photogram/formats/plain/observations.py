@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.formats.builder import Rig
 from photogram.formats.plain.rigs import read_bases
 from photogram.formats.plain.schema import (
     ANGULAR,
@@ -38,7 +39,6 @@ from photogram.formats.plain.unknowns import (
     unknown_columns,
     written_values,
 )
-from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
 from photogram.network import observations
@@ -238,7 +238,8 @@ def observation_tables(block: Block) -> _Columns:
     observed = {name: own for name, own in observed.items() if own}
     names: dict[int, str] = {}
     for name in _GROUPS:
-        members = [each for kind in _POSES if _group_table(kind) == name for each in observed.get(kind, ())]
+        kinds = [kind for kind in _POSES if any(each.field == name for each in TABLES[kind].all_columns)]
+        members = [each for kind in kinds for each in observed.get(kind, ())]
         if groups := _named_groups(members, names):
             titles = [group or _GROUP_TITLES[name] for group in groups]
             found[name] = {"group": list(groups)}
@@ -257,10 +258,6 @@ def observation_tables(block: Block) -> _Columns:
             (part,) = TABLES[name].unknowns
             found[name] = unknown_columns(block, part, distinct, [each.name for each in distinct])
     return found
-
-
-def _group_table(name: str) -> str:
-    return next(column.field for column in TABLES[name].all_columns if column.kind == "group")
 
 
 def _named_groups(own: Sequence[Any], groups: dict[int, str]) -> dict[str, dict[str, Any]]:

@@ -173,15 +173,18 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
     rows = indices_of(table, "photo", places | dict.fromkeys(photos.unused, len(places)), "photo")
     names = table.names("point")
     xy = table.given((xs, ys))
-    _check_twice(table, rows, names.rows, len(names.names))
+    again = repeated_pairs(rows, names.rows, len(names.names))
+    if again.size:
+        second = int(again[0])
+        first = int(np.flatnonzero((rows == rows[second]) & (names.rows == names.rows[second]))[0])
+        raise table.error(second, phrase("plain.image-twice", record=table.records[first]))
     keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
-    sd = _image_sd(tables, table)
+    given, sd = _sd_is_given(tables, table), _image_sd(tables, table)
+    whole = Images(given, rows, names.rows, names.names, xy, sd)
     if keep is None:
-        return Images(_sd_is_given(tables, table), rows, names.rows, names.names, xy, sd)
-    left = int(np.count_nonzero(~keep))
-    if left:
+        return whole
+    if left := int(np.count_nonzero(~keep)):
         tables.remark("plain.unused-images", table.path, n=left)
-    whole = Images(_sd_is_given(tables, table), rows, names.rows, names.names, xy, sd)
     return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))), used=keep)
 
 
@@ -196,15 +199,6 @@ def _some(images: Images, which: Bools) -> Images:
         images.xy[which],
         None if images.sd is None else images.sd[which],
     )
-
-
-def _check_twice(table: ColumnTable, photos: Indices, points: Indices, count: int) -> None:
-    again = repeated_pairs(photos, points, count)
-    if again.size:
-        second = int(again[0])
-        alike = (photos == photos[second]) & (points == points[second])
-        first = int(np.flatnonzero(alike)[0])
-        raise table.error(second, phrase("plain.image-twice", record=table.records[first]))
 
 
 def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:

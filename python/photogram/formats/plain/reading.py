@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError, message_of
+from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.names import NamedValues
 from photogram.formats.plain import SETTINGS
@@ -38,13 +38,14 @@ from photogram.formats.plain.photos import (
 from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
 from photogram.formats.plain.schema import AXES, SD_AXES, TABLES
 from photogram.formats.plain.seams import mounted_halves, with_seams
-from photogram.formats.plain.settings import Settings, read_settings, unread_tables
+from photogram.formats.plain.settings import read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.tables import Tables, Transform, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.project import Project, Unused
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed
@@ -86,7 +87,10 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
         raise InputError(phrase("error.missing", name="images.csv"), file=settings.path)
     tables, seams = with_seams(tables)
     transform = Transform(settings, tables.messages)
-    cameras = read_cameras(tables if options.cameras is None else _with_cameras(tables, options.cameras))
+    if options.cameras is not None:
+        files = {**settings.tables, "cameras": options.cameras}
+        tables = replace(tables, settings=replace(settings, tables=files))
+    cameras = read_cameras(tables)
     trajectories = read_trajectories(tables)
     control = tables.read("control")
     # A frame without origin is defined by control, which is therefore transformed first.
@@ -161,7 +165,9 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
         control_crs=settings.crs.get("control", ""),
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
-    _check_features(settings, points.names)
+    for name, (_, wanted) in settings.features.items():
+        with at_place(Place(settings.path), f"[features] {name}"):
+            named_points(wanted, points.names)
     if control is not None and given is not None:
         from photogram.formats.control_system import check_systems
 
@@ -181,21 +187,6 @@ def _unused(source: ImageSource, images: Images) -> Unused:
         xy=xy,
         sd=np.ones_like(xy) if sd is None else sd,
     )
-
-
-def _check_features(settings: Settings, names: Sequence[str]) -> None:
-    """Reject features through missing points."""
-    for name, (_, wanted) in settings.features.items():
-        try:
-            named_points(wanted, names)
-        except InputError as error:
-            message = phrase("error.at", what=f"[features] {name}", message=message_of(error))
-            raise InputError(message, file=settings.path) from None
-
-
-def _with_cameras(tables: Tables, path: Path) -> Tables:
-    settings = replace(tables.settings, tables={**tables.settings.tables, "cameras": path})
-    return replace(tables, settings=settings, parsed=dict(tables.parsed))
 
 
 def _unknowns(
@@ -265,8 +256,8 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
                 raise table.error(row, phrase("error.covariance"))
             observed.append(Control(names[row], values[row], covariance=(turned[row] + turned[row].T) / 2))
             held[row] = np.inf
-    off = {row for row, use in enumerate(uses) if use == "off"}
-    values = np.where(np.array([row in off for row in range(len(uses))])[:, np.newaxis], np.nan, values)
+    off = np.array([use == "off" for use in uses], dtype=bool)[:, np.newaxis]
+    values = np.where(off, np.nan, values)
     vegetated = read_cover(table, names, uses)
     return _Given(table, names, values, held, check_sd, observed, vegetated)
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.formats.builder import FrameOf, Rig
 from photogram.formats.plain.schema import AXES, TABLES
 from photogram.formats.plain.tables import Tables, columns_of_records, indices_of, made
 from photogram.formats.plain.unknowns import read_unknowns, unknown_columns, value_columns
-from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation

@@ -37,7 +37,7 @@ from photogram.network.attitudes import Attitudes, Representation, angles_form, 
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Observations
 from photogram.network.unknowns import Unknown
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 _Made = TypeVar("_Made")
 _Kind = TypeVar("_Kind", bound=Unknown)
@@ -45,11 +45,8 @@ _Kind = TypeVar("_Kind", bound=Unknown)
 
 def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any, **more: Any) -> _Made:
     """Create an object from a row; its errors name the row."""
-    try:
+    with at_place(table.at(row)):
         return make(*values, **more)
-    except InputError:
-        with at_place(table.place(row)):
-            raise
 
 
 def made_of_rows(
@@ -219,25 +216,19 @@ class Tables:
         """Return an angle in radians from a cell in the unit of the project."""
         from photogram.io.numbers import finite_number
 
-        unit = self.settings.angle
-        if unit == "dms":
-            return math.radians(degrees(text))
-        value = finite_number(text)
-        return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
+        return (degrees if self.settings.angle == "dms" else finite_number)(text) * self.radians
 
     def angles(
         self, table: ColumnTable, columns: Sequence[str], default: float = math.nan, *, infinite: bool = False
     ) -> Floats:
         """Return (rows, k) angles in radians."""
-        unit = self.settings.angle
-        if unit == "dms":
+        if self.settings.angle == "dms":
             return table.vectors(columns, default, infinite=infinite, read=self.angle)
-        found = table.vectors(columns, infinite=infinite)
-        found = {"deg": np.radians(found), "gon": found * math.pi / 200}.get(unit, found)
+        found = table.vectors(columns, infinite=infinite) * self.radians
         return np.where(np.isnan(found), default, found)
 
-    def attitudes(self, table: ColumnTable) -> Floats:
-        """Return (rows, k) numbers of attitudes, angles in radians; NaN without."""
+    def matrices(self, table: ColumnTable) -> Floats:
+        """Return (rows, 3, 3) attitudes A, photo to object; NaN without."""
         names = ANGLES[self.settings.attitude]
         others = [each for each in table.columns if each in ALL_ANGLES and each not in names]
         if others and not set(names) <= set(table.columns):
@@ -245,23 +236,12 @@ class Tables:
             raise table.head.error(phrase("plain.attitude-columns", **fields))
         plain = self.settings.attitude in ("quaternion", "rotation_vector", "matrix")
         values: Floats = (table.vectors if plain else partial(self.angles, table))(names)
-        check_complete(table, names, values)
-        return values
-
-    def matrices(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) attitudes A, photo to object; NaN without."""
-        values = self.attitudes(table)
+        check_complete(table, values, phrase("plain.all-or-none", columns=list(names)))
         found = np.full((len(values), 3, 3), np.nan)
         known = np.flatnonzero(~np.isnan(values).any(axis=1))
         if len(known):
             self._check_rows(table, values, known)
             found[known] = matrices_of(self.settings, values[known])
-        return found
-
-    def known_matrices(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) attitudes A, photo to object, all required."""
-        found = self.matrices(table)
-        self.check_known(table, found)
         return found
 
     def check_known(self, table: ColumnTable, matrices: Floats) -> None:
@@ -272,7 +252,7 @@ class Tables:
 
     @property
     def radians(self) -> float:
-        """Radians per unit of angles, for covariances."""
+        """Radians per unit of angles."""
         return {"gon": math.pi / 200, "rad": 1.0}.get(self.settings.angle, math.pi / 180)
 
     @property
@@ -312,11 +292,7 @@ class Tables:
     ) -> Floats:
         """Return (rows, k) standard deviations: table, `[sd]`, or default."""
         given = self.settings.sd.get(kind)
-        defaults = (
-            [default] * len(columns)
-            if given is None
-            else list(given) * (len(columns) if len(given) == 1 else 1)
-        )
+        defaults = np.broadcast_to((default,) if given is None else given, len(columns)).tolist()
         common = table.numbers("sd", infinite=True) if "sd" in table and kind != "photos" else None
         found = np.empty((table.count, len(columns)))
         for k, column in enumerate(columns):
@@ -397,12 +373,12 @@ def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind:
     return [known.get(name) for name in names]
 
 
-def check_complete(table: ColumnTable, columns: Sequence[str], values: Floats) -> None:
+def check_complete(table: ColumnTable, values: Floats, message: Phrase) -> None:
     """Reject rows with only some of the numbers of a vector."""
     partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
     if partly.any():
         row = int(np.flatnonzero(partly)[0])
-        raise table.error(row, phrase("plain.all-or-none", columns=list(columns)))
+        raise table.error(row, message)
 
 
 def correlations(
@@ -472,19 +448,20 @@ class Transform:
                     [np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]]
                 ), own
             return values, own
-        from photogram.formats.crs import to_frame
+        from photogram.formats.crs import amid, to_frame
 
         if self.settings.length != "m":
             raise InputError(phrase("plain.crs-unit", unit=self.settings.length), file=self.settings.path)
-        partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
-        if partly.any():
-            row = int(np.flatnonzero(partly)[0])
-            raise table.error(row, phrase("plain.partial-position", crs=crs))
+        check_complete(table, values, phrase("plain.partial-position", crs=crs))
         known = ~np.isnan(values).any(axis=1)
         if not known.any():
             return values, own
         try:
-            self._settle(crs, values[known])
+            kind, origin = self.frame.kind, self.frame.origin
+            if kind == "cartesian" or (kind == "topocentric" and origin is None):
+                # The origin is the mean of the first positions.
+                self.frame = Frame("topocentric", "EPSG:4979", amid(crs, values[known]))
+                self._messages.append(Message(phrase("plain.frame", crs=crs, frame=str(self.frame))))
             found, turned, remarks = to_frame(crs, values[known], own[known], self.frame)
         except InputError as error:
             if error.file:
@@ -494,11 +471,3 @@ class Transform:
         positions[known], rotated[known] = found, turned
         self._messages += [Message(text, table.path) for text in remarks]
         return positions, rotated
-
-    def _settle(self, crs: str, values: Floats) -> None:
-        """Choose the origin of a topocentric frame: mean of the first positions."""
-        from photogram.formats.crs import amid
-
-        if self.frame.kind == "cartesian" or (self.frame.kind == "topocentric" and self.frame.origin is None):
-            self.frame = Frame("topocentric", "EPSG:4979", amid(crs, values))
-            self._messages.append(Message(phrase("plain.frame", crs=crs, frame=str(self.frame))))

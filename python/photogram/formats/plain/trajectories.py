@@ -73,10 +73,10 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
     return found
 
 
-def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
-    """Return the rows of each trajectory or, if `bases`, of each of its corrections."""
-    indices_of(table, "trajectory", places, "trajectory")
-    words: Sequence[Sequence[str]] = [table.texts("trajectory")]
+def rows_of(table: ColumnTable, column: str, places: Mapping[str, int], *, bases: bool = False) -> Groups:
+    """Return the rows of each photo or trajectory or, if `bases`, of each correction of trajectories."""
+    indices_of(table, column, places, column)
+    words: Sequence[Sequence[str]] = [table.texts(column)]
     if bases:
         words = [*words, table.words("of", BASES, "")]
     found: dict[tuple[str, ...], list[int]] = {}
@@ -85,7 +85,7 @@ def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = Fal
     return {key: np.array(rows, dtype=np.int64) for key, rows in found.items()}
 
 
-def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple: bool = False) -> Floats:
+def increasing(table: ColumnTable, groups: Groups, column: str = "time", *, multiple: bool = False) -> Floats:
     """Return (rows,) times, increasing in each group (or equal if `multiple`)."""
     times = table.given((column,))[:, 0]
     for rows in groups.values():
@@ -102,8 +102,9 @@ def _turned(
 ) -> dict[str, tuple[Floats, Floats]]:
     """Return (k,) times and (k, 3, 3) attitudes by trajectory."""
     table = tables.rows(name)
-    groups = _rows_of(table, places)
-    times, matrices = _times(table, groups), tables.known_matrices(table)
+    groups = rows_of(table, "trajectory", places)
+    times, matrices = increasing(table, groups), tables.matrices(table)
+    tables.check_known(table, matrices)
     if flip is not None:
         matrices = matrices @ flip
     return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
@@ -112,9 +113,9 @@ def _turned(
 def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> list[Table]:
     """Return the sampled trajectory of each row."""
     own = tables.rows("trajectory_positions")
-    groups = _rows_of(own, places)
-    times, values = _times(own, groups), np.column_stack([own.given(AXES), own.vectors(VELOCITY)])
-    check_complete(own, VELOCITY, values[:, 3:])
+    groups = rows_of(own, "trajectory", places)
+    times, values = increasing(own, groups), np.column_stack([own.given(AXES), own.vectors(VELOCITY)])
+    check_complete(own, values[:, 3:], phrase("plain.all-or-none", columns=list(VELOCITY)))
     positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
     attitudes = _turned(tables, "trajectory_attitudes", places)
     kinds = [tables.words("trajectories", f"{of}interpolation") for of in ("", "attitude_")]
@@ -155,11 +156,11 @@ class _Bases:
             row = int(np.argmax(negative))
             raise table.cell_error(row, f"sd_{kind}", "error.not-negative", value=float(self.sd[row]))
         own = tables.rows("trajectory_knots")
-        groups = _rows_of(own, places, bases=True)
-        values = _times(own, groups, "knot", multiple=True)
+        groups = rows_of(own, "trajectory", places, bases=True)
+        values = increasing(own, groups, "knot", multiple=True)
         self.knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
         self.coefficients = tables.rows("trajectory_coefficients")
-        self.rows = _rows_of(self.coefficients, places, bases=True)
+        self.rows = rows_of(self.coefficients, "trajectory", places, bases=True)
         self.words = tables.words("trajectories", kind)
         self.signs = np.ones((table.count, 3))  # Direction of the axes of coefficients
         if kind == "rotation":
@@ -248,7 +249,7 @@ class _Bases:
 def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> list[Observation]:
     """Read sums of neighbouring coefficients."""
     table = tables.rows("smoothness")
-    groups = _rows_of(table, {name: row for row, name in enumerate(trajectories)}, bases=True)
+    groups = rows_of(table, "trajectory", {name: row for row, name in enumerate(trajectories)}, bases=True)
     sd = tables.deviations(table, "smoothness", SD_AXES)
     table.check_given(sd, SD_AXES)
     observed, covariances = table.vectors(AXES, 0.0), covariances_of(sd, table)

@@ -25,6 +25,7 @@ from photogram.io.numbers import degrees_typed
 from photogram.network import trajectories, unknowns
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
+from photogram.words import phrase
 
 TURNS = ("attitude", "turn", "mounting")  # Kinds of columns with rotations
 
@@ -78,7 +79,7 @@ def read_unknowns(
     for column in unknown.values:
         own = read_values(tables, table, column)
         if column.kind not in TURNS and math.isnan(column.number):
-            check_complete(table, column.names, own)
+            check_complete(table, own, phrase("plain.all-or-none", columns=list(column.names)))
         if column.kind == "mounting":
             own = own.transpose(0, 2, 1)
         elif column.kind == "place" and transform is not None:

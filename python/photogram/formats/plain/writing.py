@@ -9,19 +9,17 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.formats.block_contents import correlated_control, known_points
 from photogram.formats.images import by_camera, to_tables
+from photogram.formats.models import correlated_control, known_cameras, known_points
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
-from photogram.formats.plain.cameras import knots_table
+from photogram.formats.plain.cameras import OF_LINES, Exposure, exposure_columns, knots_table, of_cameras
 from photogram.formats.plain.covariances import covariance_tables
-from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films import WrittenFilms
-from photogram.formats.plain.keys import asked_files, key_tables
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
 from photogram.formats.plain.observations import observation_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES, OPK, deviation_columns
-from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
+from photogram.formats.plain.settings import LENGTHS, VERSION, Settings, asked_files, key_tables
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import columns_of, correlations, places_written, signs_in_files
 from photogram.formats.plain.trajectories import lost_smoothness, smoothness_table, trajectory_tables
@@ -30,7 +28,6 @@ from photogram.io.csv_text import csv_text
 from photogram.io.files import read_text
 from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
 from photogram.io.toml import quoted_text, toml_text, with_comments
-from photogram.network.attitudes import angles_form, known_matrices
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.film_reduction import camera_unit
@@ -49,38 +46,12 @@ def cannot_hold(project: Project) -> list[str]:
     lost = Rigs(block, [cameras[row].name for row in which], {}).lost
     if lost:
         found.append(f"{lost} bases of sensors that took no photo")
-    again = _second_positions(block)
-    if again:
+    observed = [each.point for each in block.observations.of_type(Control)]
+    held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1)).tolist()
+    twice = {block.point_ids[row] for row in held}.intersection(observed)
+    if again := len(observed) - len(set(observed)) + len(twice):
         found.append(f"{again} second positions of points: the table of control has a row for each")
     return found
-
-
-def _second_positions(block: Block) -> int:
-    """Return the number of additional observations of the position of a point."""
-    observed = [each.point for each in block.observations if isinstance(each, Control)]
-    held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1)).tolist()
-    twice = {block.point_ids[row] for row in held} & set(observed)
-    return len(observed) - len(set(observed)) + len(twice)
-
-
-def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
-    """Return cameras (also for principal distances), and the one of each photo."""
-    if block.cameras:
-        assert block.photo_cameras is not None
-        cameras = [
-            each if each.name else each.replace(name=name)
-            for each, name in zip(block.cameras, block.camera_names, strict=True)
-        ]
-        return cameras, block.photo_cameras.tolist()
-    distances = block.known_distances("the file").tolist()
-    places = {each: row for row, each in enumerate(dict.fromkeys(distances))}
-    cameras = [Camera("perspective", {"c": c}, name=f"camera {row}") for row, c in enumerate(places, 1)]
-    return cameras, [places[each] for each in distances]
-
-
-def attitude_matrices(block: Block) -> Floats:
-    """Return (P, 3, 3) attitudes A of photos, photo to object; NaN if unknown."""
-    return known_matrices(angles_form(block.photo_to_ground), block.photo_attitudes)
 
 
 def write(project: Project) -> Mapping[str, bytes]:
@@ -296,14 +267,9 @@ def control_table(project: Project) -> dict[str, Any]:
         return {}
     positions, sd, names = known.positions, known.sd, [block.point_ids[row] for row in known.rows]
     columns: dict[str, Any] = {"point": names} | columns_of(AXES, places_written(block, positions))
-    columns |= {
-        f"sd_{axis}": np.where(np.isinf(own), np.nan, own) for axis, own in zip(AXES, sd.T, strict=True)
-    }
+    # Only known coordinates of a control point are written with an infinite standard deviation: free.
+    columns |= columns_of(deviation_columns(AXES), np.where(np.isinf(sd) & np.isnan(positions), np.nan, sd))
     columns |= correlations(known.covariances, AXES)
-    # Known but free coordinates of a control point are written with an infinite standard deviation.
-    for k, axis in enumerate(AXES):
-        unheld = np.isinf(sd[:, k]) & np.isfinite(positions[:, k])
-        columns[f"sd_{axis}"] = np.where(unheld, np.inf, columns[f"sd_{axis}"])
     columns["use"] = ["check" if check else "control" for check in known.checks]
     if vegetated := project.statement.get("vegetated"):
         there = [name in vegetated and check for name, check in zip(names, known.checks, strict=True)]
