@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.fields import check_members
-from photogram.errors import InputError, message_of
+from photogram.errors import InputError
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import fields
 from photogram.words import phrase
 
@@ -124,10 +125,8 @@ class Decoder:
         if not isinstance(given, dict):
             raise self._error("error.table", value=str(given))
         members = {name: self.value(value) for name, value in given.items()}
-        try:
+        with at_place(Place(self._path)):
             check_members(kind, members)
-        except InputError as error:
-            raise InputError(message_of(error), file=self._path) from None
         return members
 
     def _object(self, given: dict[str, Any]) -> object:
@@ -136,7 +135,7 @@ class Decoder:
             raise self._error("document.class", name=str(name))
         own = self.fields({member: each for member, each in given.items() if member != "is"})
         kind = self._classes[name]
-        try:
+        with at_place(Place(self._path)):
             check_members(kind, own)
             stored = {
                 each.metadata["stored"]: each.name for each in fields(kind) if "stored" in each.metadata
@@ -145,8 +144,6 @@ class Decoder:
             made = kind(**own)
             for method, value in computed.items():
                 made = getattr(made, method)(value)
-        except InputError as error:
-            raise InputError(message_of(error), file=self._path) from None
         self._made.append(made)
         return made
 

@@ -145,9 +145,7 @@ def _spelling(place: str) -> str:
 
 
 def _above(place: str) -> Iterable[str]:
-    while (upper := os.path.dirname(place)) != place:
-        yield _spelling(upper)
-        place = upper
+    return (_spelling(str(each)) for each in Path(place).parents)
 
 
 def _identity(status: os.stat_result) -> _Identity:
