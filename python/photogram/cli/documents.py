@@ -97,12 +97,11 @@ class Documents:
         if self.place is None:
             return {}
         from photogram.show.html import page_html
-        from photogram.show.run import reproducibility
 
         try:
             with job.status("drawing the report"):
                 page = make()
-                content = page_html(page.with_sections(reproducibility(job.run(), page.phases)))
+                content = page_html(page.with_sections(job.reproducibility(page.phases)))
         except ModuleNotFoundError as error:
             if self.html is not None or error.name != "contourpy":
                 raise

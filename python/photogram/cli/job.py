@@ -30,7 +30,7 @@ from photogram.cli.options import (
     options_of,
     roles,
 )
-from photogram.messages import Message
+from photogram.messages import Message, printable
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -39,8 +39,9 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from photogram import Progress
+    from photogram.io.seals import InputFile
     from photogram.io.writing import Files, OutputSet
-    from photogram.show.run import Run
+    from photogram.show.page import Section
 
 LARGEST = 2**53  # Largest integer of an option; larger doubles are not exact counts
 
@@ -176,15 +177,33 @@ class Job:
         if code:
             raise typer.Exit(code)
 
-    def run(self) -> Run:
-        """Return options, inputs and times of the run for its report."""
+    def input_files(self) -> tuple[list[InputFile], int]:
+        """Return the first files that were read, with checksums, and the number of the others."""
         from photogram.io.seals import input_files
-        from photogram.show.run import Run
 
         found, others = input_files(self._inputs())
-        inputs = [replace(each, path=self.shown(each.path)) for each in found]
-        seconds = time.perf_counter() - self._clock
-        return Run(f"photogram {self.name}", self._options, inputs, self._began, seconds, others)
+        return [replace(each, path=self.shown(each.path)) for each in found], others
+
+    def reproducibility(self, phases: Mapping[str, float]) -> Section:
+        """Return the last section of a report: program, options, inputs and times."""
+        from photogram.show.html import reproducibility
+        from photogram.show.page import Fact, Facts, about
+        from photogram.show.quantity import Axis, Quantity, Table, of_each
+
+        inputs, others = self.input_files()
+        files = [
+            Quantity([printable(str(each.path)) for each in inputs], kind="name", head="File"),
+            of_each(inputs, "size", (Axis.of("", "bytes"),), "deviation", head="Size", decimals=0),
+            of_each(inputs, "sha256", (), "name", head="SHA-256"),
+        ]
+        options = [Fact(name, printable(value)) for name, value in self._options.items()]
+        run = [
+            Fact("Command", printable(f"photogram {self.name}")),
+            Fact("Began", self._began.strftime("%Y-%m-%d %H:%M:%S"), "UTC"),
+            Fact.of("Time up to this report", time.perf_counter() - self._clock, "s", decimals=2),
+        ]
+        table = Table("", "Input files", files, f"and {others} more" if others else "")
+        return reproducibility(phases, run, [table, Facts(about("run.options"), options)])
 
     @contextmanager
     def status(self, text: str) -> Iterator[Status | None]:

@@ -113,20 +113,19 @@ def stated(
     from photogram.formats.crs_results import placed
     from photogram.results.statement.comparison import System
 
-    run = job.run()
     system = None
     if crs is not None:
         place = placed(result, crs)
         (x, y, z), (u, v, w) = place.names, place.units
         system = System(crs, ((x, u), (y, v), (z, w)), place.carried)
-    given = " ".join(name if value == "True" else f"{name} {value}" for name, value in run.options.items())
+    given = " ".join(name if value == "True" else f"{name} {value}" for name, value in job.given.items())
     return made(
         result,
         strict=strict,
         assumed=assumed,
         system=system,
-        inputs=run.inputs,
-        command=f"{run.command} {given}".rstrip(),
+        inputs=job.input_files()[0],
+        command=f"photogram {job.name} {given}".rstrip(),
         **{"date": date.today().isoformat(), **asked},
     )
 

@@ -93,10 +93,14 @@ def _columns(each: Quantity, by: Floats | None, numeral: Callable[[str], str]) -
     axes, of = each.axes or (Axis(""),), each.of
     count = len(axes) if of is None else 1
     marked = [()] * count if each.marked is None else np.reshape(each.marked, (-1, count)).T.tolist()
-    if each.kind == "name":
-        yield Column(each.head, _names(each), text=True, marked=marked[0], link=each.link)
-        return
     mixed = of is not None and len({axis.small for axis in axes}) > 1  # Each component has its own unit
+    if each.kind == "name":
+        names = [*map(str, np.asarray(each.values).tolist())]
+        if mixed and of is not None:  # Components with their units
+            units = [f", {unit_written(axis.small)}" if axis.small else "" for axis in axes]
+            names = [name + units[k] for name, k in zip(names, of.tolist(), strict=True)]
+        yield Column(each.head, names, text=True, marked=marked[0], link=each.link)
+        return
     decimals = _decimals(each, by, mixed)
     for k, column in enumerate(np.reshape(each.outward(), (-1, count)).T):
         axis, rows = axes[k], np.full(len(column), k) if of is None else of
@@ -127,17 +131,6 @@ def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None
     if of_rows and each.kind == "value" and not mixed:
         return [max(own for own in found if own is not None)] * count
     return found
-
-
-def _names(each: Quantity) -> list[str]:
-    if each.axes and each.of is not None:  # Components with units if these differ
-        mixed = len({axis.small for axis in each.axes}) > 1
-        names = [
-            f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
-            for axis in each.axes
-        ]
-        return [names[k] for k in each.of.tolist()]
-    return [*map(str, np.asarray(each.values).tolist())]
 
 
 def _written_number(each: Quantity, value: Any, axis: Axis, decimals: int | None) -> str:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 import textwrap
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Sequence
 
 from photogram import _photocore
 from photogram.io import json
@@ -52,17 +51,10 @@ def record(document: Document) -> dict[str, object]:
 
 def to_json(document: Document) -> bytes:
     """Return a document as JSON (UTF-8); values that are not numbers are null."""
-    with _without_collection():
-        return json.to_json({"program": f"photogram {_photocore.__version__}", **record(document)})
-
-
-@contextmanager
-def _without_collection() -> Iterator[None]:
-    """Stop the search for cycles, which needs more time than the creation of millions of rows."""
     enabled = gc.isenabled()
-    gc.disable()
+    gc.disable()  # The search for cycles needs more time than the creation of millions of rows.
     try:
-        yield
+        return json.to_json({"program": f"photogram {_photocore.__version__}", **record(document)})
     finally:
         if enabled:
             gc.enable()

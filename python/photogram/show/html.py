@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import platform
 import re
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from html import escape
 from importlib.resources import files
@@ -12,7 +13,7 @@ from itertools import repeat
 from photogram import _photocore
 from photogram.show import page as parts
 from photogram.show.cells import formatted
-from photogram.show.page import Column, Document, Drawing, Fact, Judgement, Section, Table
+from photogram.show.page import Column, Document, Drawing, Fact, Facts, Judgement, Section, Table, about
 from photogram.show.sketch.svg import element, svg_of
 from photogram.words import Words
 
@@ -26,6 +27,8 @@ def page_html(page: Document) -> bytes:
     links = [each.link for table in tables for each in table.columns if each.link and each.link.here]
     known = {target for link in links for target in link.targets}
     places = [("verdict", page.first), *((each.key, each.title) for each in page.sections if each.title)]
+    heading = element("h3", escape(page.words("page.advice")))
+    steps = _list("ol", (_coded(str(sentence)) for sentence in page.advice))
     text = _file("report.html").format(
         language=page.words.language,
         version=_photocore.__version__,
@@ -36,12 +39,22 @@ def page_html(page: Document) -> bytes:
         what=element("p", escape(page.what), class_="what") if page.title else "",
         head=_facts("facts", page.head),
         judgements="".join(map(_judgement, page.judgements)),
-        advice=_advice(page),
+        advice=element("div", heading + steps, class_="advice") if steps else "",
         highlights=_facts("highlights", page.highlights, "b"),
         sections="\n".join(_section(each, known, page.words) for each in page.sections),
         script=_file("script.js"),
     )
     return text.encode("utf-8", errors="replace")
+
+
+def reproducibility(
+    phases: Mapping[str, float], run: Sequence[Fact] = (), more: Sequence[parts.Part] = ()
+) -> Section:
+    """Return the last section: versions, the `run` of a command, and seconds in phases of the engine."""
+    made = [Fact("photogram", _photocore.__version__), Fact("Python", platform.python_version()), *run]
+    times = [Fact.of(phase, seconds, "s", decimals=3) for phase, seconds in phases.items()]
+    whole = [Facts("Made by", made), *more, Facts("Time spent in the adjustment", times)]
+    return Section("reproducibility", "Reproducibility", whole, about("reproducibility"))
 
 
 def _file(name: str) -> str:
@@ -82,12 +95,6 @@ def _judgement(one: Judgement) -> str:
     return element("div", mark + element("h2", escape(one.headline)) + lines, class_=f"verdict {one.tone}")
 
 
-def _advice(page: Document) -> str:
-    steps = _list("ol", (_coded(str(sentence)) for sentence in page.advice))
-    heading = element("h3", escape(page.words("page.advice")))
-    return element("div", heading + steps, class_="advice") if steps else ""
-
-
 def _section(section: Section, known: Set[str], words: Words) -> str:
     title = element("h2", escape(section.title)) if section.title else ""
     intro = element("p", escape(section.intro), class_="intro") if section.intro else ""
@@ -100,7 +107,7 @@ def _part(part: parts.Part, within: str, known: Set[str], words: Words) -> str:
     match part:
         case Table():
             return _table(part, within, known)
-        case parts.Facts():
+        case Facts():
             again = " again" * (part.caption == within)
             caption = element("div", escape(part.caption), class_=f"caption{again}")
             return _facts("facts", part.facts, caption=caption)

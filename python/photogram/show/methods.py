@@ -53,11 +53,10 @@ class Documented(Brief):
 
     def to_html(self) -> bytes:
         """Return the HTML report, one self-contained file (docs/report.md)."""
-        from photogram.show.html import page_html
-        from photogram.show.run import reproducibility
+        from photogram.show.html import page_html, reproducibility
 
         page = self.document()
-        return page_html(page.with_sections(reproducibility(None, page.phases)))
+        return page_html(page.with_sections(reproducibility(page.phases)))
 
 
 class Tabular(Documented):
