@@ -127,7 +127,6 @@ def photo_components(block: Block) -> tuple[str, ...]:
 
 
 def adjusted(result: Result) -> Adjusted:
-    """Return the adjusted values of a result by types and names."""
     block = result.block
     photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
     unknowns_of_photo, count = photo_components(block), len(photos)

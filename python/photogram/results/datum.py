@@ -167,7 +167,6 @@ def _levelled(block: Block, held: int) -> Phrase | None:
 
 
 def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None) -> DatumRow:
-    """Return the reference of relative cofactors for the core."""
     if (photo is None) == (points is None):
         raise InputError(phrase("error.exclusive", first="photo", second="points"))
     if photo is not None:

@@ -99,7 +99,7 @@ def _largest_radius(xy: Floats, camera: Camera) -> float:
     """Return the largest distance of images from the principal point; ideal if forward."""
     if not len(xy):
         return 0.0
-    if _is_backward(camera):
+    if camera.direction == "backward":
         names = ("xp", "yp") if "xp" in camera.names else ("cx", "cy")
         principal_point = [camera.parameters.get(name, 0.0) for name in names]
         return float(np.hypot(*(xy - principal_point).T).max())
@@ -115,7 +115,7 @@ def compared_places(camera: Camera, xy: Floats) -> Callable[[Camera], Floats]:
 
     They are images of the rays of `camera` if forward, and corrected measurements if backward.
     """
-    if _is_backward(camera):
+    if camera.direction == "backward":
         return lambda changed: _photocore.camera_correct(changed.model, changed.values, xy)
     rays = camera.rays(xy)
     return lambda changed: changed.project(rays)
@@ -163,11 +163,11 @@ def distortion_curve(
     covariance = camera.covariance
     distance = next(k for k, name in enumerate(camera.names) if name in DISTANCES)
     c = float(camera.values[distance])
-    part = curve[-1] / r0
-    with_distance = np.column_stack([partials, -both / c if _is_backward(camera.camera) else both / c])
+    part, backward = curve[-1] / r0, camera.camera.direction == "backward"
+    with_distance = np.column_stack([partials, -both / c if backward else both / c])
     balanced = partials - np.outer(both / r0, partials[-1])
     return DistortionCurve(
-        direction="backward" if _is_backward(camera.camera) else "forward",
+        direction=camera.camera.direction,
         radii=at,
         values=curve[:-1],
         sd=curve_deviations(covariance, terms, partials)[:-1],
@@ -175,7 +175,7 @@ def distortion_curve(
         balanced=(curve - part * both)[:-1],
         sd_balanced=curve_deviations(covariance, terms, balanced)[:-1],
         balanced_at=r0,
-        balanced_distance=c / (1.0 + part) if _is_backward(camera.camera) else c * (1.0 + part),
+        balanced_distance=c / (1.0 + part) if backward else c * (1.0 + part),
         observed=observed,
     )
 
@@ -206,7 +206,7 @@ def radial_part(camera: Camera) -> Camera:
 def added_along(camera: Camera, radii: Floats) -> Floats:
     """Return the correction of radii along x, of measured or ideal coordinates."""
     zero = np.zeros_like(radii)
-    if _is_backward(camera):
+    if camera.direction == "backward":
         corrected = _photocore.camera_correct(camera.model, camera.values, np.column_stack([radii, zero]))
         return np.asarray(corrected[:, 0] - radii)
     argument = radii / camera.scale
@@ -215,10 +215,6 @@ def added_along(camera: Camera, radii: Floats) -> Floats:
     middle = camera.project([[0.0, 0.0, -1.0]])[0, 0]
     images = camera.project(np.column_stack([across, zero, back]))[:, 0]
     return np.asarray(np.abs(images - middle) - radii)
-
-
-def _is_backward(camera: Camera) -> bool:
-    return camera.direction == "backward"
 
 
 def _is_fisheye(camera: Camera) -> bool:

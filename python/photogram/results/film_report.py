@@ -63,7 +63,6 @@ def mark_residuals(result: Result) -> MarkResiduals:
 
 
 def mean_mark_residuals(result: Result) -> list[VectorField]:
-    """Return mean residuals of the read marks of each camera."""
     residuals, block, marks = mark_residuals(result), result.block, result.fiducials
     of = np.zeros(len(block.photo_ids), dtype=np.int64)
     if block.photo_cameras is not None:

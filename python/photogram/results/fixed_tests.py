@@ -219,7 +219,6 @@ class Scores:
 
     @classmethod
     def of(cls, factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> Scores:
-        """Return the scores by the factor of the normal equations."""
         return cls(partials, factor.project_images(partials, threads=0, progress=None), residuals)
 
     @cached_property

@@ -136,7 +136,6 @@ def used_fact(name: str, used: Bools, code: str = "used") -> Fact:
 def size_section(
     result: AdjustedNetwork, size: Sequence[Fact], good: Sequence[Fact], tables: Sequence[quantity.Table] = ()
 ) -> Section:
-    """Return the sizes of the network, and its accuracy."""
     parts: list[Part] = [
         Facts("Size", [*size, Fact.of("Degrees of freedom", result.degrees_of_freedom)]),
         Facts("Fit", [*good, *_images_facts(result)]),

@@ -114,7 +114,6 @@ def _cameras(result: Result) -> list[CameraImages]:
 
 
 def block_patterns(result: Result) -> list[Systematic]:
-    """Return the tests of patterns of a block; see :func:`patterns`."""
     axes = [axis.name for axis in point_axes(result.block)]
     return patterns(result, _cameras(result), axes, lambda own: fall_by_lens(result, own))
 

@@ -58,12 +58,8 @@ class Inseparable:
     # in 95 of 100 cases; infinite if they are inseparable
     factor: float
 
-    @property
-    def sentence(self) -> Phrase:
-        return Phrase("inseparable", vars(self))
-
     def __str__(self) -> str:
-        return str(self.sentence)
+        return str(Phrase("inseparable", vars(self)))
 
 
 class Reliability(Tabular):

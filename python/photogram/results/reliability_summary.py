@@ -77,7 +77,6 @@ class ReliabilitySummary:
         return self.tests.testable(self.suspects.row_starts)
 
     def parts(self) -> list[Part]:
-        """Return the parts of a section."""
         listed, sentences = self.listed, list[str]()
         if listed.two_rays:
             sentences.append(about("reliability-two-rays", n=listed.two_rays))

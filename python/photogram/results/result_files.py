@@ -164,7 +164,6 @@ class Saved:
         return self.decoder.fields(self.summary["kept"][name], kind)
 
     def state(self) -> _photocore.BlockState:
-        """Return the final state of the core."""
         unknowns = read_sheet(self.folder / f"{_STATE}.parquet").numbers("unknown")
         rest = self.decoder.value(self.summary["kept"][_STATE])
         try:

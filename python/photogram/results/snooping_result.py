@@ -265,7 +265,6 @@ def rivals_of(rivals: Iterable[Rival], figures: int) -> str:
 
 
 def estimated_errors(entry: Removal) -> str:
-    """Return the estimated errors of the components of a removed group."""
     rows = zip(entry.components, entry.error, entry.units, entry.error_sd, strict=True)
     return ", ".join(
         about("estimated-error", component=component, error=error, unit=f" {unit}".rstrip(), sd=sd)

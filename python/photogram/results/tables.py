@@ -401,7 +401,6 @@ TABLES: dict[str, Callable[[Any], list[Quantity]]] = {
 
 
 def table_frame(result: Any, what: str) -> pd.DataFrame:
-    """Return a table of a result as a data frame, by the type of its items."""
     import pandas as pd  # slow
 
     return pd.DataFrame(frame(TABLES[what](result)))

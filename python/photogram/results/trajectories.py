@@ -189,7 +189,6 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
 
 
 def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
-    """Return the trajectories of photos and records of a block, by their names."""
     found = {id(each.given): each for each in result.unknowns}
     once = cache(result.covariances)
 
@@ -210,7 +209,6 @@ def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
 def restarted_motion(
     block: Block, adjusted: Iterable[AdjustedTrajectory], turns: Mapping[str, Floats] | None = None
 ) -> Block:
-    """Return a block with adjusted free coefficients of trajectories."""
     turns = turns or {}
     found = {id(each.given): each for each in adjusted}
     # A prior observes the given value of its unknown.

@@ -97,7 +97,6 @@ RULES = (
 
 
 def judged(found: Statement) -> Judged:
-    """Return the verdict of all findings."""
     texts, asprs, test = found.texts, found.standards.asprs, found.standards.lengths
     whole = None if test is None else test.together
     overall = found.of_all and _whole(found.of_all)

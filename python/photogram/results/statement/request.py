@@ -31,7 +31,6 @@ POSITIVE = partial(number, rule="positive")
 
 
 def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> InputError:
-    """Return the error for an invalid value."""
     return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
 
 

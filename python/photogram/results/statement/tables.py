@@ -68,7 +68,6 @@ def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> 
 
 
 def check_points(statement: Statement) -> Table:
-    """Return the check points with their differences and tests."""
     texts, own, columns = statement.texts, statement.compared, Columns(statement.texts)
     names, unit = own.names, statement.result.block.linear_unit
     tests = point_tests(own) if statement.of_all is None else statement.of_all.points
@@ -157,7 +156,6 @@ def test_lengths(texts: Texts, test: LengthTest) -> Table:
 
 
 def quality_measures(statement: Statement) -> Table:
-    """Return the measures of ISO 19157."""
     texts, columns, rows = statement.texts, Columns(statement.texts), statement.standards.iso_19157
     keys, elements, values, scopes = zip(*rows, strict=True) if rows else ((),) * 4
     listed = [own if isinstance(own, list) else [own] for own in values]
