@@ -1,7 +1,4 @@
-"""Explanations of an adjustment that failed or fits badly.
-
-The explaining modules are imported on demand, because most adjustments fit.
-"""
+"""Explanations of an adjustment that failed or fits badly."""
 
 from __future__ import annotations
 
@@ -11,10 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from photogram.diagnosis.names import with_exchanges
+from photogram.diagnosis.registry import hints_at
 from photogram.errors import AdjustmentError, OutOfMemoryError
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.film_reduction import as_seen
 from photogram.results.fixed_tests import is_suspected
 from photogram.results.result import Result
 
@@ -34,10 +31,9 @@ def errors_explained(block: Block | FirstValues) -> Iterator[None]:
         raise
     except AdjustmentError as error:
         from photogram.diagnosis.mistakes import Adjuster
-        from photogram.diagnosis.shutters import readout_hints
 
         block = block if isinstance(block, Block) else block.usable()
-        found = _of_block(block) or readout_hints(block, Adjuster({}, (block, error)))
+        found = hints_at("data", block) or hints_at("misfit", block, Adjuster({}, (block, error)))
         error.args = ("\n".join([str(error), *(f"  hint: {hint}" for hint in found)]), *error.args[1:])
         raise
 
@@ -55,38 +51,18 @@ def explained(result: Result) -> list[Message]:
     """Return mistakes in data conventions that explain a failed or bad adjustment."""
     if result.loss is not None:
         return []
-    found = _of_block(result.block) if _bad(result) else []
+    found = hints_at("data", result.block) if _bad(result) else []
     if result.WHOLE and not found and (not result.converged or is_suspected(result)):
         from photogram.diagnosis.mistakes import Adjuster
-        from photogram.diagnosis.shutters import readout_hints, rolling_hints
 
-        found = readout_hints(result.block, Adjuster({}, (result.block, result))) or rolling_hints(result)
+        found = hints_at("misfit", result.block, Adjuster.of(result)) or hints_at("residuals", result)
     return found
 
 
 def remarks(result: Result) -> list[Message]:
     """Return hints on a good result: readout directions, clock offsets, fiducial marks."""
-    if not (result.converged and (result.unknowns or result.block.observations)):
-        return []
-    from photogram.diagnosis.clocks import known_offsets
-    from photogram.diagnosis.film_lenses import lens_hints
-    from photogram.diagnosis.film_marks import axis_hints, mark_hints
-    from photogram.diagnosis.film_scans import line_hints, seam_hints
-    from photogram.diagnosis.mistakes import Adjuster
-    from photogram.diagnosis.shutters import backward_readouts
-
-    # A film in two pieces, or one that has changed along one axis, also makes marks fail.
-    adjusted = Adjuster({}, (result.block, result))
-    films = seam_hints(result) or axis_hints(result, adjusted) or mark_hints(result)
-    films += [*lens_hints(result, adjusted), *line_hints(result)]
-    return [*backward_readouts(result), *known_offsets(result), *films]
-
-
-def _of_block(block: Block) -> list[Message]:
-    from photogram.diagnosis.conventions import hints
-    from photogram.diagnosis.trajectory_hints import flown_hints
-
-    return [*hints(as_seen(block)), *flown_hints(block)]
+    is_special = result.converged and bool(result.unknowns or result.block.observations)
+    return hints_at("fit", result) if is_special else []
 
 
 def _bad(result: Result) -> bool:

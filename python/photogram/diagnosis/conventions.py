@@ -35,6 +35,7 @@ from photogram.diagnosis.views import View
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block, checked
+from photogram.network.film_reduction import as_seen
 from photogram.network.motion import at_rest
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
@@ -92,7 +93,8 @@ def hints(block: Block) -> list[Message]:
     The block must have positions and attitudes of photos, which may be rough; otherwise InputError is raised.
     Photos on trajectories are skipped, because a single pose is undefined.
     """
-    rest = at_rest(block) if isinstance(block, Block) else block
+    block = as_seen(block)
+    rest = at_rest(block)
     if rest is not block and not len(rest.image_xy):
         return []
     with np.errstate(all="ignore"):

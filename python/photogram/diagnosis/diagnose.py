@@ -19,17 +19,15 @@ from photogram.arguments.objects import kind_error
 from photogram.diagnosis.after_adjustment import diagnosis_of
 from photogram.diagnosis.blunders import Edited, blunder_section, edit
 from photogram.diagnosis.control import control
-from photogram.diagnosis.control_sets import wrong_control
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Finding, Section, Words, finding, note
 from photogram.diagnosis.gross import Suspects, gross
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
-from photogram.diagnosis.lenses import half_pixel, lenses_estimated, wrong_terms
-from photogram.diagnosis.mistakes import Adjuster, Mistake
+from photogram.diagnosis.lenses import half_pixel, lenses_estimated
+from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.orientation import orientation, spare_explained
-from photogram.diagnosis.positions import wrong_positions
+from photogram.diagnosis.registry import at, hints_at
 from photogram.diagnosis.residuals import residuals
-from photogram.diagnosis.shutters import rolling_hints
 from photogram.diagnosis.stations import stations, two_ray_heights
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectories import flown_checked
@@ -49,13 +47,6 @@ __all__ = ["Manner", "check_block", "diagnose"]
 FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
 HARDLY = 10.0  # Multiple of the usual residual that coarse stations can cause before the adjustment
 MOST_SETS = 5  # Maximum number of successive corrections of sets
-
-LENS = Mistake("lens", wrong_terms)
-SETS = (
-    Mistake("observed-positions", wrong_positions),
-    Mistake("control-set", wrong_control, "control-misfit"),
-)
-"""Mistakes of sets that adjustments decide: lenses before predictions, positions and control after them."""
 
 
 @dataclass(frozen=True)
@@ -169,9 +160,10 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     words, adjusted = manner.words, Adjuster(manner.options)
     lens: list[Finding] = []
     given = block
-    if (terms := LENS.search(block, adjusted)) is not None:
-        lens.append(terms.finding(LENS.kind))
-        given = terms.best[0].change(block)
+    for mistake in at("lens"):
+        if (terms := mistake(given, adjusted)) is not None:
+            lens.append(terms.finding(mistake.kind))
+            given = terms.best[0].change(given)
     view = View.of(lenses_estimated(given, lens, adjusted))
     sets, upright, oriented, exact = orientation(view, words)
     sets.findings[:0] = lens
@@ -188,7 +180,8 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
     if edited.first is not None:
-        rolls = [finding("grave", each.phrase) for each in rolling_hints(edited.first) if each.phrase]
+        hints = hints_at("residuals", edited.first)
+        rolls = [finding("grave", each.phrase) for each in hints if each.phrase]
         # A rolling shutter can look like errors of a lens, of control or of single observations.
         sets.findings, exact = [*rolls, *sets.findings], exact and not rolls
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
@@ -233,7 +226,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
     start = view
     for _ in range(MOST_SETS):
         good = of_photos(kept_images(view.block, ~view.images(suspects.images)), ~suspects.photos)
-        mistakes = ((each, each.search(good, adjusted)) for each in SETS)
+        mistakes = ((each, each(good, adjusted)) for each in at("set"))
         mistake, found = next((pair for pair in mistakes if pair[1] is not None), (None, None))
         if mistake is None or found is None:
             break

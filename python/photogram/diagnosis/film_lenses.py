@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from photogram.diagnosis.lenses import radial_scaled
-from photogram.diagnosis.mistakes import Adjuster, Proposal, explain_test
+from photogram.diagnosis.mistakes import Proposal, explain_test
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -26,7 +26,7 @@ WITHIN, INDICATED = 3.0, 1e-3
 distance of an indicated one from the origin, mm."""
 
 
-def lens_hints(result: Result, adjusted: Adjuster) -> list[Message]:
+def lens_hints(result: Result) -> list[Message]:
     """Return mistakes in weighted lenses of films whose test as a group rejects."""
     of_photos = result.block.photo_cameras
     if of_photos is None or result.loss is not None:
@@ -39,7 +39,7 @@ def lens_hints(result: Result, adjusted: Adjuster) -> list[Message]:
         for _, (place,) in tests.beyond(CHANCE / len(of_films)):
             row = int(tests.rows[place])
             proposals, statistic = _proposals(result.block, row), float(tests.values[place])
-            if row in of_films and (meant := explain_test(result, proposals, adjusted, statistic)):
+            if row in of_films and (meant := explain_test(result, proposals, statistic)):
                 proposal, changed = meant
                 of_point = proposal.parameters and _of_point(result.block.cameras[row], changed.cameras[row])
                 found.append(Message(of_point or proposal.message))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.diagnosis.mistakes import Adjuster, Proposal, explain_test
+from photogram.diagnosis.mistakes import Proposal, explain_test
 from photogram.diagnosis.tested_values import FOUND
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
@@ -123,7 +123,7 @@ CHANCE = 1e-3  # Probability of a hint in correct data
 DOUBTFUL = 0.05  # Level of the test of the marks of any photo
 
 
-def axis_hints(result: Result, adjusted: Adjuster) -> list[Message]:
+def axis_hints(result: Result) -> list[Message]:
     """Report photos with unmodelled film changes along one axis."""
     read = result.block.observations.of_type(Fiducial)
     count = Counter(each.photo for each in read)
@@ -135,7 +135,7 @@ def axis_hints(result: Result, adjusted: Adjuster) -> list[Message]:
     }
     excess = _excess(result) if conformal else 0.0
     proposal = Proposal("axis", phrase("film-check.axis"), partial(_freed, films=conformal))
-    meant = explain_test(result, [proposal], adjusted, excess) if excess else None
+    meant = explain_test(result, [proposal], excess) if excess else None
     if meant is None:
         return []
     limit, changes, found = critical_chi_square(CHANCE / len(conformal), 2), meant[1].film[:, 4:], []

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, Self
 
 from photogram.adjustment.adjustment import adjust
 from photogram.diagnosis.findings import Finding, Level, finding, likely
@@ -51,6 +51,11 @@ class Adjuster:
             raise result
         return result
 
+    @classmethod
+    def of(cls, result: Result) -> Self:
+        """Return an adjuster that has this result."""
+        return cls({}, (result.block, result))
+
     def tried(self, block: Block) -> Result | None:
         """Adjust a block; None if that fails."""
         try:
@@ -74,15 +79,6 @@ class Proposal:
     exact: bool = True  # Whether the correction has no rough values
     parameters: int = 0  # Estimated by the adjustment of the changed block
     points: Sequence[str] = ()  # Points that it concerns; empty if it concerns all
-
-
-@dataclass(frozen=True)
-class Mistake:
-    """An entry of a registry: the kind of its findings, and the search for it."""
-
-    kind: str
-    search: Callable[[Block, Adjuster], Explained | None]
-    of: str = "residuals"  # that it explains
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,12 +147,13 @@ def explain(
 
 
 def explain_test(
-    result: Result, proposals: Iterable[Proposal], adjusted: Adjuster, statistic: float
+    result: Result, proposals: Iterable[Proposal], statistic: float
 ) -> tuple[Proposal, Result] | None:
     """Return the first proposal that explains a rejected test of a set, with its adjustment.
 
     `statistic` is T of the set: the decrease of the sum of squares without all its values.
     """
+    adjusted = Adjuster.of(result)
     for proposal in proposals:
         changed = adjusted.converged(proposal.change(result.block))
         if changed is not None and omega(result) - omega(changed) > MOST * statistic:

@@ -17,9 +17,8 @@ from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.findings import Section, note, note_all, note_verdict
 from photogram.diagnosis.misfits import Misfits
 from photogram.diagnosis.mistakes import Adjuster
-from photogram.diagnosis.shutters import readout_hints
+from photogram.diagnosis.registry import hints_at
 from photogram.diagnosis.structure import structure_section
-from photogram.diagnosis.trajectory_hints import flown_hints
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import counted
 from photogram.network.block import Block, flown_by
@@ -48,7 +47,8 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
         note(section, "grave", phrase("check.no-adjustment", reason=str(error)))
-        note_all(section, "convention", "grave", flown_hints(block) or readout_hints(block, adjusted))
+        hints = hints_at("data", block) or hints_at("misfit", block, adjusted)
+        note_all(section, "convention", "grave", hints)
         return [structure, section], None
     note_all(section, "convention", "grave", explained(result))
     note_all(section, "moving", "look", remarks(result))
