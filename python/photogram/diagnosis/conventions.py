@@ -9,7 +9,6 @@ The criterion is the ratio of the misfit m under a hypothesis to the misfit of t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -18,6 +17,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.hypotheses import attitude_readings, hypotheses, turns
 from photogram.diagnosis.mistakes import Adjuster, Proposal
+from photogram.diagnosis.predictions import EACH, PASSES, SUSPICION, Predicted, predict
 from photogram.diagnosis.regression import (
     LEAST,
     MOST,
@@ -42,49 +42,10 @@ from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 from photogram.words import phrase
 
-SUSPICION = 0.35  # Misfit m above which photos are examined
-PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
-"""Largest ratio of the median misfit if the result is below ROUGH; otherwise initial poses are rough."""
-EACH = 0.5
-"""Largest ratio for each photo that did not fit, and for the median residual of control."""
-AS_GOOD = 1.5  # Another hypothesis is as good if its misfit is below this multiple of the least
 SLIGHT = float(np.radians(1.0))  # Attitudes closer than this to the resected ones are correct
 CLEARLY = 5.0  # A rival reading must be closer to the resected attitudes by this factor
 BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
 """Factor between metres and millimetres; limits of the median, and of the logarithm of each distance."""
-
-
-class Verdict:
-    """Hypotheses that pass, best first; several if the data do not decide.
-
-    `photos` lists the photos with the mistake, empty for all photos; `distance` is their principal distance,
-    if they are all photos with it. `change` and `exact` belong to the first hypothesis.
-    """
-
-    def __init__(
-        self,
-        found: list[tuple[float, Proposal]],
-        given: float,
-        photos: Sequence[str] = (),
-        what: str = "images",
-        distance: float | None = None,
-    ) -> None:
-        found.sort(key=lambda each: each[0])
-        least = found[0][0]
-        best = [each for misfit, each in found if misfit <= AS_GOOD * least]
-        # The same mistake may occur in several forms.
-        best = list({str(each.message): each for each in reversed(best)}.values())[::-1]
-        self.names = [each.name for each in best]
-        self.change, self.exact = best[0].change, best[0].exact
-        self.photos, self.distance = photos, distance
-        self.before, self.after = given, least
-        self.message = phrase(
-            f"convention.{'likely' if len(best) == 1 else 'one-of'}",
-            causes=[each.message for each in best],
-            photos=phrase("convention.photos", n=len(photos), photos=list(photos)) if photos else "",
-            misfit=phrase(f"convention.misfit.{what}", misfit=least),
-            before=phrase("convention.before", misfit=given) if given < UNKNOWN else "",
-        )
 
 
 def hints(block: Block) -> list[Message]:
@@ -93,8 +54,7 @@ def hints(block: Block) -> list[Message]:
     The block must have positions and attitudes of photos, which may be rough; otherwise InputError is raised.
     Photos on trajectories are skipped, because a single pose is undefined.
     """
-    block = as_seen(block)
-    rest = at_rest(block)
+    rest = at_rest(as_seen(block)) if isinstance(block, Block) else block
     if rest is not block and not len(rest.image_xy):
         return []
     with np.errstate(all="ignore"):
@@ -105,7 +65,7 @@ def hints(block: Block) -> list[Message]:
         return [*(found or readings(block)), *latitudes(block), *bars]
 
 
-def verdicts(block: Block) -> list[Verdict]:
+def verdicts(block: Block) -> list[Predicted]:
     """Return verdicts on observations compared with predictions; see :func:`hints`."""
     photos = eligible(block)
     if not len(photos):
@@ -115,15 +75,15 @@ def verdicts(block: Block) -> list[Verdict]:
     looked = view(block, chosen)
     if np.median(seen) > SUSPICION:
         fits = regressions(looked, chosen)
-        found = passing(hypotheses(looked, fits), looked, fits.misfit, partial(misfits, photos=chosen))
-        if found:
-            return [Verdict(found, float(np.median(fits.misfit)))]
+        tried, misfit = hypotheses(looked, fits), partial(misfits, photos=chosen)
+        if (found := predict(tried, looked, fits.misfit, misfit)) is not None:
+            return [found]
     worst = photos[np.argsort(-seen)][:MOST]
     some = _of_groups(block, photos) or _single(block, np.sort(worst[np.sort(-seen)[:MOST] < -SUSPICION]))
     return some or (_of_control(looked, chosen) if np.median(seen) <= SUSPICION else [])
 
 
-def _of_groups(block: Block, photos: Indices) -> list[Verdict]:
+def _of_groups(block: Block, photos: Indices) -> list[Predicted]:
     """Try turned images of all photos with the same principal distance."""
     distances, found = block.known_distances("hints"), []
     for distance in np.unique(distances) if np.ptp(distances) else ():
@@ -131,53 +91,32 @@ def _of_groups(block: Block, photos: Indices) -> list[Verdict]:
         looked = view(block, own)
         given = misfits(looked, own)
         if len(own) and np.median(given) > SUSPICION:
-            fitting = passing(
-                turns(block, distances == distance), looked, given, partial(misfits, photos=own)
-            )
             names = [block.photo_ids[photo] for photo in np.flatnonzero(distances == distance).tolist()]
-            if fitting:
-                found.append(Verdict(fitting, float(np.median(given)), names, distance=float(distance)))
+            of = {"photos": names, "distance": float(distance)}
+            tried, misfit = turns(block, distances == distance), partial(misfits, photos=own)
+            if (fitting := predict(tried, looked, given, misfit, **of)) is not None:
+                found.append(fitting)
     return found
 
 
-def passing(
-    tried: Iterable[Proposal], looked: Block, given: Floats, misfits_of: Callable[[Block], Floats]
-) -> list[tuple[float, Proposal]]:
-    """Return the hypotheses under which photos fit, with their remaining misfit.
-
-    `given` are (k,) misfits of the photos in the block `looked`. `misfits_of` returns the misfits of a
-    changed block.
-    """
-    found: dict[str, tuple[float, Proposal]] = {}
-    for hypothesis in tried:
-        left = misfits_of(hypothesis.change(looked))
-        ratio, median = left / given, float(np.median(left))
-        limit = PASSES_ROUGH if median > ROUGH else PASSES
-        each = (ratio < EACH) | (np.maximum(left, given) < SUSPICION)
-        if np.median(ratio) < limit and each.all() and median < SUSPICION:
-            now = (median, hypothesis)
-            found[hypothesis.name] = min(found.get(hypothesis.name, now), now, key=lambda each: each[0])
-    return list(found.values())
-
-
-def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
+def _of_control(looked: Block, photos: Indices) -> list[Predicted]:
     """Find hypotheses for rays that intersect well but miss the given points."""
     given = control_misfit(looked)
     if not given_points(looked)[looked.image_points].any() or given <= SUSPICION:
         return []
-    fitting = []
-    for hypothesis in hypotheses(looked):
-        meant = hypothesis.change(looked)
-        left = control_misfit(meant)
-        fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
+    before = float(np.median(control_residuals(looked)))
+
+    def misfit(meant: Block) -> Floats:
         # Most observations must improve, not only the ones of a few distant points.
-        before, after = (float(np.median(control_residuals(each))) for each in (looked, meant))
-        if fits and after < EACH * before and np.median(misfits(meant, photos)) < SUSPICION:
-            fitting.append((left, hypothesis))
-    return [Verdict(fitting, given)] if fitting else []
+        improves = float(np.median(control_residuals(meant))) < EACH * before
+        fits = improves and np.median(misfits(meant, photos)) < SUSPICION
+        return np.array([control_misfit(meant) if fits else UNKNOWN])
+
+    found = predict(hypotheses(looked), looked, np.array([given]), misfit)
+    return [] if found is None else [found]
 
 
-def _single(block: Block, photos: Indices) -> list[Verdict]:
+def _single(block: Block, photos: Indices) -> list[Predicted]:
     """Try photos one by one, with the other photos unchanged."""
     by_names: dict[tuple[str, ...], tuple[dict[str, float], float, list[int]]] = {}
     for photo in photos.tolist():
@@ -193,7 +132,7 @@ def _single(block: Block, photos: Indices) -> list[Verdict]:
     for fitting, given, alike in by_names.values():
         tried = turns(block, np.isin(np.arange(len(block.photo_ids)), alike))
         best = [(fitting[each.name], each) for each in tried if each.name in fitting]
-        found.append(Verdict(best, given, [block.photo_ids[photo] for photo in alike]))
+        found.append(Predicted(best, given, [block.photo_ids[photo] for photo in alike]))
     return found
 
 

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.conventions import Verdict, distances_in_millimetres, latitudes, readings, verdicts
+from photogram.diagnosis.conventions import distances_in_millimetres, latitudes, readings, verdicts
 from photogram.diagnosis.findings import Finding, Section, Words, finding, note, note_all
 from photogram.diagnosis.hypotheses import KAPPA, TURNS
+from photogram.diagnosis.predictions import Predicted
 from photogram.diagnosis.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius
@@ -91,13 +92,13 @@ def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: 
     return section
 
 
-def _side_of(found: Verdict) -> str:
+def _side_of(found: Predicted) -> str:
     """Return the mistake of a verdict that concerns the sides of cameras; empty if it does not."""
     concerns = {*found.names} & {*TURNS}
     return next((name for name in found.names if name in TURNS or name == SENSE), "") if concerns else ""
 
 
-def _kind(side: str, found: Verdict) -> str:
+def _kind(side: str, found: Predicted) -> str:
     if side == SENSE:
         return "sense-of-rotation"
     of_single = found.photos and found.distance is None

@@ -20,9 +20,9 @@ import numpy as np
 from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.clocks import differences
-from photogram.diagnosis.conventions import SUSPICION, Verdict, passing
 from photogram.diagnosis.hypotheses import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
+from photogram.diagnosis.predictions import SUSPICION, Predicted, predict
 from photogram.diagnosis.regression import UNKNOWN, given_points, relative, spread
 from photogram.errors import InputError
 from photogram.messages import Message
@@ -43,30 +43,27 @@ from photogram.words import Phrase, phrase
 def flown_hints(block: Block) -> list[Message]:
     """Return mistakes in tables and times of trajectories, and in scan line numbers."""
     with np.errstate(all="ignore"):
-        return [Message(each.message) for each in (*_of_images(block), *_of_records(block))]
+        found = (_of_images(block) if block.timed else None, _of_records(block))
+        return [Message(each.message) for each in found if each is not None]
 
 
-def _of_images(block: Block) -> list[Verdict]:
-    if not block.timed:
-        return []
+def _of_images(block: Block) -> Predicted | None:
     looked, photos = flown_view(block)
     given = flown_misfits(looked, photos)
     if not len(photos) or np.median(given) <= SUSPICION:
-        return []
-    found = passing(flown_hypotheses(looked, photos), looked, given, partial(flown_misfits, photos=photos))
-    return [Verdict(found, float(np.median(given)))] if found else []
+        return None
+    return predict(flown_hypotheses(looked, photos), looked, given, partial(flown_misfits, photos=photos))
 
 
-def _of_records(block: Block) -> list[Verdict]:
+def _of_records(block: Block) -> Predicted | None:
     given = _records_misfit(block)
     if not given[0] > SUSPICION:
-        return []
+        return None
     tried = (
         Proposal(f"records {seconds:+g} s", message, partial(shifted_records, seconds=seconds))
         for message, seconds in shifts("records")
     )
-    found = passing(tried, block, given, _records_misfit)
-    return [Verdict(found, float(given[0]), what="records")] if found else []
+    return predict(tried, block, given, _records_misfit, what="records")
 
 
 def _records_misfit(block: Block) -> Floats:
