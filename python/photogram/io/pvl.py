@@ -101,8 +101,11 @@ class _Reader:
         self.token = self._next()
         return taken
 
-    def is_sign(self, sign: str) -> bool:
-        return self.token.kind == "sign" and self.token.text == sign
+    def skip(self, sign: str) -> bool:
+        """Move past a sign if it is next; return whether it was."""
+        if there := self.token.kind == "sign" and self.token.text == sign:
+            self.token = self._next()
+        return there
 
     def _next(self) -> _Token:
         while (found := _TOKEN.match(self.text, self.at)) is not None:
@@ -128,18 +131,16 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
         if (ended := _ENDS.get(key.lower())) is not None:
             _close(reader, open_groups, ended, key, start)
             continue
-        if not reader.is_sign("="):
+        if not reader.skip("="):
             raise reader.error(phrase("pvl.value", key=key), start)
-        reader.take()
         if (kind := _BEGINS.get(key.lower())) is None:
             open_groups[-1].items.append((key, _value(reader, key)))
         else:
             begun = Group(str(_scalar(reader, key)), kind, reader.line(start))
             open_groups[-1].inside.append(begun)
             open_groups.append(begun)
-        if reader.is_sign(";"):
-            reader.take()
-        if reader.is_sign("="):
+        reader.skip(";")
+        if reader.skip("="):
             raise reader.error(phrase("pvl.value", key=key), start)
     if reader.token.kind not in ("word", "end"):
         raise reader.error(phrase("pvl.text", text=reader.token.text))
@@ -153,12 +154,9 @@ def _close(reader: _Reader, open_groups: list[Group], kind: str, key: str, start
     if len(open_groups) == 1 or open_groups[-1].kind != kind:
         raise reader.error(phrase("pvl.end", key=key), start)
     ended = open_groups.pop()
-    if reader.is_sign("="):
-        reader.take()
-        if str(_scalar(reader, key)).lower() != ended.name.lower():
-            raise reader.error(phrase("pvl.open", kind=kind, name=ended.name), start)
-    if reader.is_sign(";"):
-        reader.take()
+    if reader.skip("=") and str(_scalar(reader, key)).lower() != ended.name.lower():
+        raise reader.error(phrase("pvl.open", kind=kind, name=ended.name), start)
+    reader.skip(";")
 
 
 def _value(reader: _Reader, key: str, depth: int = 0) -> Value:
@@ -173,13 +171,10 @@ def _list(reader: _Reader, key: str, depth: int) -> list[Value]:
     start = reader.token.start
     closing = _OPENING[reader.take().text]
     values: list[Value] = []
-    while not reader.is_sign(closing):
-        if values:
-            if not reader.is_sign(","):
-                raise reader.error(phrase("pvl.list", key=key), start)
-            reader.take()
+    while not reader.skip(closing):
+        if values and not reader.skip(","):
+            raise reader.error(phrase("pvl.list", key=key), start)
         values.append(_value(reader, key, depth + 1))
-    reader.take()
     return values
 
 
