@@ -120,9 +120,10 @@ def _of_page(page: Document) -> Iterator[str]:
 
 
 def _of_part(part: Part) -> Iterator[str]:
-    if isinstance(part, quantity.Table) and not part.visible:
-        return
-    part = written(part)
+    if isinstance(part, quantity.Table):
+        if not part.visible:
+            return
+        part = written(part)
     if isinstance(part, Facts):
         for fact in part.facts:
             yield f"{fact.name} {fact.value} {fact.unit}"

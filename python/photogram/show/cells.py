@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -45,6 +46,7 @@ def formatted(document: Document, draw: Draw = lambda drawing: drawing) -> Docum
 
     return replace(
         document,
+        title=re.sub(r"\s*\.{4,}\s*", " – ", document.title),  # Leaders of the title cards of GIANT
         judgements=[replace(one, lines=[*map(sentence, one.lines)]) for one in document.judgements],
         advice=[*map(sentence, document.advice)],
         sections=visible(document.sections),

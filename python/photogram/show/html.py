@@ -22,7 +22,7 @@ LONG = 16  # Characters; longer words may be broken
 
 def page_html(page: Document) -> bytes:
     """Return a page as self-contained HTML (UTF-8)."""
-    page = formatted(replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title), details=()), inlined)
+    page = formatted(replace(page, details=()), inlined)
     tables = (part for part in page.parts(layers=True) if isinstance(part, Table))
     links = [each.link for table in tables for each in table.columns if each.link and each.link.here]
     known = {target for link in links for target in link.targets}

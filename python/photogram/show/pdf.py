@@ -33,7 +33,7 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
     `author` is a property of the file.
     """
     titled = formatted(replace(page, title=page.title or page.what, details=()), inlined)
-    footer = f"{page.what} – {page.title}" if page.title else page.what
+    footer = f"{page.what} – {titled.title}" if page.title else page.what
     texts = {
         "advice_heading": page.words("page.advice"),
         "numbers": page.words("page.numbers", number="{number}", total="{total}"),
