@@ -50,30 +50,27 @@ def shaped(
 ) -> NDArray[np.float64]:
     """Return a read-only array of the given shape, with values of one of the `RULES`.
 
-    A size None is any number of rows; otherwise a single number is broadcast, and with `one_row` also a
-    single row. Words, truth values and complex numbers are rejected, even if NumPy would convert them. If
-    `missing` is True, NaN is valid, and masked values become NaN.
+    A first size of None is any number of rows; otherwise a single number is broadcast, and with `one_row`
+    also a single row. Words, truth values and complex numbers are rejected, even if NumPy would convert them.
+    If `missing` is True, NaN is valid, and masked values become NaN.
     """
     array = numbers(name, value, missing=missing)
-    sizes = array.shape if array.ndim == len(shape) else (-1,) * len(shape)
-    wanted = tuple(own if size is None else size for own, size in zip(sizes, shape, strict=True))
-    if -1 not in wanted and (array.ndim == 0 or (one_row and array.shape == wanted[1:])):
-        array = np.full(wanted, array)
-        array.flags.writeable = False
+    wanted: Any = array.shape[:1] + shape[1:] if shape[:1] == (None,) else shape
     if array.shape != wanted:
-        raise argument_error(name, "shape", shape=str(shape).replace("None", "n"), actual=array.shape)
-    if rule:
-        _require_rule(name, array, RULES[rule](array) | (missing & np.isnan(array)), rule)
+        if wanted is shape and (array.ndim == 0 or (one_row and array.shape == shape[1:])):
+            array = np.full(wanted, array)
+            array.flags.writeable = False
+        else:
+            raise argument_error(name, "shape", shape=str(shape).replace("None", "n"), actual=array.shape)
+    if rule and not (good := RULES[rule](array)).all():
+        for first in np.argwhere(~(good | (missing & np.isnan(array)))).tolist():
+            where = f"{name}[{', '.join(map(str, first))}]" if first else name
+            raise _rule_error(where, rule, float(array[tuple(first)]))
     return frozen(array)
 
 
-def _require_rule(name: str, values: Any, good: NDArray[np.bool_], rule: str) -> None:
-    """Reject the first value that does not follow a rule."""
-    if not good.all():
-        first = np.argwhere(~good)[0].tolist()
-        where = f"{name}[{', '.join(map(str, first))}]" if first else name
-        code = "not-negative" if rule == "sd" else rule
-        raise argument_error(where, code, value=float(values[tuple(first)]))
+def _rule_error(name: str, rule: str, value: float) -> InputError:
+    return argument_error(name, "not-negative" if rule == "sd" else rule, value=value)
 
 
 def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
@@ -254,9 +251,9 @@ def number(name: str, value: object, rule: str = "") -> float:
             converted = float(value if _is_real(value) else None)  # type: ignore[arg-type]
         except (TypeError, OverflowError):
             raise argument_error(name, "number", value=value) from None
-    if rule:
-        values = np.asarray(converted)
-        _require_rule(name, values, np.asarray(RULES[rule](values)), rule)
+    # Positive finite numbers follow every rule.
+    if rule and not 0 < converted < math.inf and not RULES[rule](converted):
+        raise _rule_error(name, rule, converted)
     return converted
 
 

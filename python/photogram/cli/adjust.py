@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -25,6 +25,7 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, Result
     from photogram.formats import Project
+    from photogram.messages import Message
     from photogram.results.snooping_result import Snooped
     from photogram.show.page import Section as Chapter
     from photogram.words import Phrase
@@ -164,11 +165,10 @@ def _snooped(
     snooping: SnoopOptions,
 ) -> Snooped:
     """Remove gross errors of a block without images excluded by initial values."""
-    from photogram import Result, adjust, snoop
-    from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
+    from photogram import adjust, snoop
+    from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.formats import adjusting
     from photogram.messages import Message
-    from photogram.results.features import with_features
 
     aside: tuple[Phrase | str, ...] = ()
     if started is not None and (started.set_aside.any() or started.missing):
@@ -185,25 +185,26 @@ def _snooped(
             threads=threads,
             progress=progress,
         )
+        messages = []
+        if project.options.loss is not None:
+            messages.append(Message.of("command.robust-start", source=source(job, project, "loss")))
+        if adjusting(project, adjust) is not adjust:
+            messages.append(Message.of("command.no-rejection"))
         result = cast("Result", found.result).with_max_bias_ratio(project.options.max_bias_ratio)
-        result = diagnosed(result)
-    assert isinstance(result, Result)
-    _check_control(job, project, result)
-    messages = []
-    if project.options.loss is not None:
-        messages.append(Message.of("command.robust-start", source=source(job, project, "loss")))
-    if adjusting(project, adjust) is not adjust:
-        messages.append(Message.of("command.no-rejection"))
-    result = replace(result, set_aside=aside, messages=[*messages, *result.messages])
-    return replace(found, result=with_features(result, project.features))
+        result = _completed(job, project, replace(result, set_aside=aside), messages)
+    return replace(found, result=result)
 
 
-def _check_control(job: Job, project: Project, result: Result) -> None:
-    """Reject a result without a required datum of control."""
+def _completed(job: Job, project: Project, result: Result, messages: Sequence[Message]) -> Result:
+    """Return a result with explanations, messages and features; reject one without a required datum."""
     from photogram import InputError
+    from photogram.diagnosis.after_adjustment import diagnosed
+    from photogram.results.features import with_features
 
+    result = diagnosed(result)
     if project.options.datum == "control" and result.datum.is_chosen:
         raise InputError(phrase("command.no-datum", source=source(job, project, "datum")))
+    return with_features(replace(result, messages=[*messages, *result.messages]), project.features)
 
 
 def adjusted_block(
@@ -217,10 +218,9 @@ def adjusted_block(
 ) -> Result:
     """Adjust a block by settings of its project and options of the user."""
     from photogram import FirstValues, adjust, adjust_started
-    from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
+    from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.formats import adjusting
     from photogram.formats.supplements import repeated_remarks
-    from photogram.results.features import with_features
 
     if division is None:
         options = replace(project.options, ordering=ordering, covariance="verdict")
@@ -233,11 +233,8 @@ def adjusted_block(
         with errors_explained(block):
             call = partial(adjusting(project, adjust_once), threads=threads, progress=progress)
             result = adjust_started(block, by=call) if isinstance(block, FirstValues) else call(block)
-        result = diagnosed(result)
-    _check_control(job, project, result)
-    again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
-    told = replace(result, messages=[*project.messages, *again, *result.messages])
-    return with_features(told, project.features)
+        again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
+        return _completed(job, project, result, [*project.messages, *again])
 
 
 def result_at(
