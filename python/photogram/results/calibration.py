@@ -23,7 +23,13 @@ import numpy as np
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances, photo_components
-from photogram.results.distortion import INTERIOR, DistortionCurve, distortion_curve, lens_field
+from photogram.results.distortion import (
+    INTERIOR,
+    DistortionCurve,
+    distortion_curve,
+    lens_field,
+    observed_rows,
+)
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
 from photogram.results.network_tables import image_axes
 from photogram.results.parts import AdjustedCamera
@@ -340,7 +346,7 @@ def _terms_together(groups: Sequence[TermsTest]) -> Table:
 
 def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
     axes = (replace(image_axes(unit)[0], name=""),)
-    rows = curve.rows(RADII)
+    rows = observed_rows(curve, RADII)
     added = "measured" if curve.direction == "backward" else "ideal"
     column: Any = partial(Quantity, axes=axes, kind="deviation", decimals=3)
     columns = [

@@ -78,10 +78,11 @@ class DistortionCurve:
     balanced_distance: float
     observed: float
 
-    def rows(self, count: int) -> Indices:
-        """Return the indices of up to `count` equidistant radii with images."""
-        inside = np.flatnonzero(self.radii <= self.observed * (1 + 1e-9))
-        return np.asarray(inside[np.unique(np.linspace(0, len(inside) - 1, count).round().astype(int))])
+
+def observed_rows(curve: DistortionCurve, count: int) -> Indices:
+    """Return the indices of up to `count` equidistant radii with images."""
+    inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
+    return np.asarray(inside[np.unique(np.linspace(0, len(inside) - 1, count).round().astype(int))])
 
 
 def rows_of_images(result: Result, camera: AdjustedCamera) -> Indices:

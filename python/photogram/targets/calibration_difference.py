@@ -146,17 +146,10 @@ class CameraDifference(Brief):
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the difference."""
         rows = [
-            ("motion", str(self.motion)),
+            ("motion", str(motion_of(self))),
             ("difference", str(phrase("difference.sizes", rms=self.rms, largest=self.largest))),
         ]
         return self.title, rows + [("", each) for each in self.remarks]
-
-    @property
-    def motion(self) -> Phrase:
-        """Rotation in degrees, and the translation unless all points are infinitely far."""
-        x, y, z = (float(each) for each in self.translation)
-        fields = {"degrees": float(self.rotation), "x": x, "y": y, "z": z, "unit": self.unit}
-        return Phrase(f"difference.{'motion' if self.fitted.finite else 'rotation'}", fields)
 
     @property
     def sentences(self) -> list[str]:
@@ -178,6 +171,13 @@ class CameraDifference(Brief):
         if self.covariances is None:
             said.append(phrase("difference.untested"))
         return [*map(str, said)]
+
+
+def motion_of(found: CameraDifference) -> Phrase:
+    """Return the rotation in degrees, and the translation unless all points are infinitely far."""
+    x, y, z = (float(each) for each in found.translation)
+    fields = {"degrees": float(found.rotation), "x": x, "y": y, "z": z, "unit": found.unit}
+    return Phrase(f"difference.{'motion' if found.fitted.finite else 'rotation'}", fields)
 
 
 def compared(

@@ -22,7 +22,7 @@ from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table
 from photogram.summaries import Rows
-from photogram.targets.calibration_difference import CameraDifference
+from photogram.targets.calibration_difference import CameraDifference, motion_of
 from photogram.targets.lens_fit import (
     GRID,
     KNOTS,
@@ -101,7 +101,7 @@ class Conversion(Documented):
         rows = [
             ("difference", str(phrase("conversion.sizes", rms=self.rms, largest=self.largest, at=at))),
             ("largest at", str(phrase("conversion.where", column=column, row=row))),
-            ("motion of the axes", str(found.motion if turned else phrase("conversion.unturned"))),
+            ("motion of the axes", str(motion_of(found) if turned else phrase("conversion.unturned"))),
             *self.camera.brief()[1],
         ]
         if self.covariance is not None:

@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
 from photogram.network.hull import hull, outside
-from photogram.results.distortion import distortion_curve
+from photogram.results.distortion import distortion_curve, observed_rows
 from photogram.results.features import Features, quantity_columns, through, unit_deviations
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
@@ -141,7 +141,7 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
         tables.append(Table("correlations", title, [columns.text("parameter", names), *numbers]))
     curve = distortion_curve(statement.result, camera)
     if curve is not None:
-        unit, rows = statement.result.block.image_unit, curve.rows(MAX_RADII)
+        unit, rows = statement.result.block.image_unit, observed_rows(curve, MAX_RADII)
         decimals = declared.decimals_for(curve.sd[rows])
         distortion = [
             columns.number("radius", curve.radii[rows], unit=unit),
