@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
-
-import orjson
 
 from photogram import _photocore
 from photogram.absolute_orientation.tables import (
@@ -133,23 +131,18 @@ def _members(result: Orientation) -> dict[str, object]:
 
 def to_json(result: Orientation) -> bytes:
     """Return the result as JSON (UTF-8); points are stations without control."""
-    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}\n"])
+    return without_points(result) + point_rows(*result.transform_points()) + json.CLOSED
 
 
-def without_points(result: Orientation) -> Iterator[bytes]:
-    """Yield the document up to its first point, for any number of points."""
-    yield json.to_json(record(result.document())).removesuffix(b"\n}\n")
-    yield b',\n  "points": ['
+def without_points(result: Orientation) -> bytes:
+    """Return the document up to its first point, for any number of points."""
+    return json.opened(record(result.document()), "points")
 
 
 def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> bytes:
-    """Return points as JSON objects, one per line, separated by commas."""
+    """Return the members of points."""
     rows = zip(ids, positions.tolist(), covariances.tolist(), strict=True)
-    objects = (
-        orjson.dumps({"id": name, "position": position, "covariance": covariance})
-        for name, position, covariance in rows
-    )
-    return b"\n    " + b",\n    ".join(objects) if len(positions) else b""
+    return json.elements({"id": name, "position": place, "covariance": own} for name, place, own in rows)
 
 
 def orientation_findings(result: Orientation) -> Findings:

@@ -21,6 +21,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.delimited import LONGEST_RECORD, cells
 from photogram.io.files import reading
+from photogram.io.json import CLOSED
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.io.writing import OutputSet
@@ -118,7 +119,7 @@ def transform_file(
         if not done:
             raise InputError(phrase("orientation.empty"), file=source)
         if json:
-            json.write(b"\n  ]\n}\n")
+            json.write(CLOSED)
     return done
 
 

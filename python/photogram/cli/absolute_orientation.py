@@ -101,7 +101,7 @@ def absolute_orientation(
             rows = None
             if documents.json:
                 rows = Document(
-                    documents.json, b"".join(without_points(result)), point_rows(*result.transform_points())
+                    documents.json, without_points(result), point_rows(*result.transform_points())
                 )
                 written.insert(0, documents.json)
             if decimals is None:

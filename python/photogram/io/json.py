@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,20 @@ def to_json(document: object) -> bytes:
     Arrays of NumPy become lists, dataclasses objects, numeric keys text, and NaN and infinite numbers null.
     """
     return orjson.dumps(document, default=_rows, option=_FORM)
+
+
+CLOSED = b"\n  ]\n}\n"  # End of a document whose last member is a list of any length
+
+
+def opened(document: Mapping[str, object], name: str) -> bytes:
+    """Return a document up to the first element of the list that is its last member."""
+    return to_json(document).removesuffix(b"\n}\n") + f',\n  "{name}": ['.encode()
+
+
+def elements(rows: Iterable[Mapping[str, object]]) -> bytes:
+    """Return elements of this list, one per line, separated by commas."""
+    lines = b",\n    ".join(map(orjson.dumps, rows))
+    return b"\n    " + lines if lines else b""
 
 
 def _rows(value: object) -> object:
