@@ -11,13 +11,14 @@ from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.results.parts import Iteration
 from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
 from photogram.statistics.reliability import TESTABLE
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -184,22 +185,28 @@ class Orientation(Documented, Judged):
         found = [str(message) for message in self.messages]
         if not self.grave and (outliers := self._outliers_named()):
             found.insert(0, outliers)
-        found[:0] = [f"{message}; do not use these values" for message in self.grave]
+        found[:0] = [str(phrase("orientation.grave", message=message)) for message in self.grave]
         if self.test is not None and (failed := self.test.problem()):
             found.insert(0, failed)
         if not self.converged:
-            found.insert(0, f"the orientation has {self.status}: do not use these values")
+            found.insert(0, str(phrase("orientation.status", status=self.status)))
         return found
 
     def _outliers_named(self) -> str:
         ground, unit = self.residuals_ground, self.stations.ground_unit
-        symbol = "w" if self.decided_by_w else "t"
+        fields = {"symbol": "w" if self.decided_by_w else "t", "unit": unit}
         named = [
-            f"{self.stations.ids[row]} {'XYZ'[axis]} ({symbol} {self.tested[row, axis]:.3g},"
-            f" wrong by about {ground[row, axis] / self.redundancy[row, axis]:.3g} {unit})"
+            phrase(
+                "orientation.outlier",
+                station=self.stations.ids[row],
+                axis="XYZ"[axis],
+                value=float(self.tested[row, axis]),
+                error=float(ground[row, axis] / self.redundancy[row, axis]),
+                **fields,
+            )
             for row, axis in self.outliers
         ]
-        return f"control beyond the limit {self.limit:.2f} of its test: {listed(named)}" if named else ""
+        return str(phrase("orientation.outliers", limit=self.limit, names=named)) if named else ""
 
     @property
     def weighted(self) -> bool:

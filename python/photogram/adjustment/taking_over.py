@@ -38,7 +38,10 @@ def large_turns(result: Result) -> dict[str, Floats]:
 
 def taken_over(turns: dict[str, Floats]) -> Message:
     """Return the note on tables that were updated by rotations."""
-    parts = [f"{name} ({np.linalg.norm(turn):.2f} rad)" for name, turn in turns.items()]
+    parts = [
+        phrase("adjust.rotations.table", name=name, angle=float(np.linalg.norm(turn)))
+        for name, turn in turns.items()
+    ]
     return Message(phrase("adjust.rotations.tables", tables=parts))
 
 

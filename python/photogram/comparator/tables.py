@@ -172,11 +172,8 @@ def cases(calibration: Calibration) -> Table:
     ]
     note, test = "", calibration.case_test
     if test is not None and test.f_max_limit is not None:
-        same = "are" if test.f_max <= test.f_max_limit else "are not"
-        note = (
-            f"F-max = {test.f_max:.2f}, limit {test.f_max_limit:.2f}: the cases {same} of one population"
-            " (95 percent)."
-        )
+        code = f"cases.{'alike' if test.f_max <= test.f_max_limit else 'different'}"
+        note = about(code, value=test.f_max, limit=test.f_max_limit)
     return Table("cases", "Cases", columns, note)
 
 
@@ -218,10 +215,7 @@ def outliers(screening: Screening) -> Table:
         of_each(found, "instead", kind="name"),
         Quantity(instead, kind="name", head="Point that is expected there"),
     ]
-    note = (
-        f"Beyond {screening.limit:.2f} the test rejects. They change corrected coordinates by"
-        f" {screening.change_um:.2f} µm (root mean square)."
-    )
+    note = about("screening.outliers", limit=screening.limit, change=screening.change_um)
     return Table("screening.outliers", "Points", columns, note)
 
 

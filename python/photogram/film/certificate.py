@@ -171,12 +171,13 @@ class Certificate(Documented, Judged):
         """Return a short summary of the certificate."""
         rows = [
             ("marks", listed(list(self.places) or self._of_distances())),
-            ("distances", f"{len(self.distances)}"),
+            ("distances", str(phrase("brief.points", n=len(self.distances)))),
             ("verdict", self.verdict.headline),
         ]
         if self.c is not None:
-            rows.insert(0, ("c", f"{self.c:.4f} mm"))
-        return f"Certificate {self.name}, {self.day or 'without a date'}", rows
+            rows.insert(0, ("c", str(phrase("brief.c", c=self.c))))
+        code = f"brief.certificate{'' if self.day else '.undated'}"
+        return str(phrase(code, name=self.name, day=str(self.day or ""))), rows
 
     def check(self) -> tuple[DistanceDifference, ...]:
         """Compare distances with coordinates and explain differences beyond 0.010 mm."""

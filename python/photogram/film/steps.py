@@ -12,7 +12,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
 from photogram.show.judgement import judged, verdict_table
 from photogram.show.methods import Documented
-from photogram.show.page import Document, Fact, Section
+from photogram.show.page import Document, Fact, Section, about
 from photogram.show.quantity import Axis, Quantity, Table
 from photogram.summaries import Rows
 from photogram.words import phrase
@@ -63,7 +63,7 @@ class StepsCompared(Documented):
 
     def brief(self) -> tuple[str, Rows]:
         """Return the comparison in a line."""
-        return "Films inside the adjustment, and fitted before", [("points", self.sentence)]
+        return about("films.compared"), [("points", self.sentence)]
 
     def document(self) -> Document:
         """Return the document of the comparison (JSON members: docs/film.md)."""
@@ -155,6 +155,6 @@ def _facts(found: StepsCompared) -> list[Fact]:
         test = result.global_test
         if test is not None:
             low, high = test.limits
-            expected = f"expected {low:.3g} to {high:.3g}"
+            expected = about("expected", low=low, high=high)
             facts.append(Fact.of(f"Unit variance, {name}", test.variance, note=expected, figures=4))
     return [*facts, Fact("Points compared", counted(len(found.rows), "point"))]

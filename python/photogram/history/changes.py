@@ -139,7 +139,7 @@ class _Hypotheses:
 
     columns: Floats
     kinds: tuple[tuple[str, int | None], ...]
-    words: tuple[str, ...]
+    words: tuple[Phrase, ...]
 
 
 def history(
@@ -206,21 +206,23 @@ def _hypotheses(
 ) -> _Hypotheses:
     """Return the hypotheses; with two occasions, only a step."""
     k = len(t)
-    found: list[tuple[Floats, tuple[str, int | None], str]] = []
+    found: list[tuple[Floats, tuple[str, int | None], Phrase]] = []
     for i in range(1, k):
         if t[i] > t[i - 1]:
-            words = f"steps by {{}} between {named[i - 1]} and {named[i]}"
+            words = phrase("history.step", before=named[i - 1], after=named[i])
             found.append(((np.arange(k) >= i).astype(float), ("step", i), words))
     if k > 2 and t[-1] > t[0]:
-        found.append((t - t.mean(), ("drift", None), f"drifts by {{}} a {unit}"))
+        found.append((t - t.mean(), ("drift", None), phrase("history.drift", unit=unit)))
         # The first or the last occasion alone is a step.
-        found += [(np.eye(k)[i], ("single", i), f"of {named[i]} is off by {{}}") for i in range(1, k - 1)]
+        inner = range(1, k - 1)
+        found += [(np.eye(k)[i], ("single", i), phrase("history.single", day=named[i])) for i in inner]
     for name, (given, of_what) in regressors.items():
         u = np.asarray(given, dtype=np.float64)
         if u.shape != (k,) or not np.isfinite(u).all():
             raise argument_error(name, "numbers", count=k, value=value_field(given))
         if k > 2 and np.ptp(u) > 0:
-            found.append((u - u.mean(), (name, None), f"changes with the {name} by {{}} a {of_what}"))
+            words = phrase("history.regressor", name=name, unit=of_what)
+            found.append((u - u.mean(), (name, None), words))
     if not found:
         raise InputError(phrase("history.equal-times", count=k))
     return _Hypotheses(
@@ -266,8 +268,10 @@ def _series(
     for row, (column, value) in enumerate(accepted, 1):
         kind, at = hypotheses.kinds[column]
         size, sd = float(fit.parameters[row]), math.sqrt(float(fit.cofactors[row, row]))
-        told = f"{size:.4g} ± {sd:.2g} {unit}".rstrip()
-        sentence = f"{name} {hypotheses.words[column].format(told)} (t = {value:.3g})"
+        words = hypotheses.words[column]
+        told = phrase("history.size", size=size, sd=sd, unit=f" {unit}".rstrip())
+        what = Phrase(words.code, {**words.fields, "size": told})
+        sentence = str(phrase("history.changed", quantity=name, what=what, t=value))
         changes.append(Change(kind, size, sd, value, _log10_p(value, freedom), at, sentence))
     return Series(
         name=name,

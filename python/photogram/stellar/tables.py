@@ -12,6 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.io.angles import ARCSEC, degrees_minutes_seconds
 from photogram.lazy_dataclasses import fields
+from photogram.show.page import about
 from photogram.show.quantity import Axis, Quantity, Table, component, of_each
 from photogram.stellar.camera_tables import (
     ARC_SECONDS,
@@ -387,7 +388,7 @@ def histograms(result: Result) -> list[Table]:
             column(found.counts, None, "Number", 0),
             column(found.expected, None, "Normal", 2),
         ]
-        note = f"mean {found.mean:.4f} µm, standard deviation {found.sd:.4f} µm"
+        note = about("histogram", mean=float(found.mean), sd=float(found.sd))
         tables.append(Table(f"histogram-{name}", f"Residuals in {name}", columns, note))
     return tables
 
