@@ -46,7 +46,6 @@ if TYPE_CHECKING:
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
-CHECK_SD = "standard deviation of the given {} of a check point; NaN where not known"
 _TABLES = {
     "control": "control",
     "check_points": "check",
@@ -106,6 +105,7 @@ def parts_of_block(*, geographic: bool, unit: str, image_unit: str) -> dict[str,
     lengths = ("rad", "rad", unit) if geographic else (unit,) * 3
     turns = ("rad",) * 3
     both, units = (*places, *_ANGLES), (*lengths, *turns)
+    check_sd = "standard deviation of the given {} of a check point; NaN if unknown"
     photos = [
         Part("photo_positions", places, lengths, "adjusted {}"),
         Part("photo_attitudes", _ANGLES, turns, "adjusted {}, M = M_kappa M_phi M_omega"),
@@ -127,7 +127,7 @@ def parts_of_block(*, geographic: bool, unit: str, image_unit: str) -> dict[str,
         "points": [
             *point_parts("block", places, lengths),
             Part("point_last_corrections", places, lengths, "last correction of {}", prefix="last_change_"),
-            Part("block.point_check_sd", places, lengths, CHECK_SD, prefix="check_sd_"),
+            Part("block.point_check_sd", places, lengths, check_sd, prefix="check_sd_"),
         ],
         "images": image_parts("block", image_unit),
     }

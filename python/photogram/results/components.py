@@ -206,7 +206,6 @@ class Bin:
 
     @classmethod
     def of(cls, each: GroupSum, value: float, factor: float) -> Self:
-        """Return the bin of a group with the weights of the function."""
         if each.test is None:
             return cls(value, each.count, each.redundancy, math.nan, (math.nan, math.nan))
         found, quantile = factor * each.squares / each.redundancy, _photocore.chi_square_quantile

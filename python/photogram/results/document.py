@@ -99,7 +99,6 @@ def _size_section(result: Result) -> Section:
 
 
 def _differences(result: Result) -> Table:
-    """Return the rms of differences between adjusted and given coordinates."""
     kinds: dict[str, Callable[[Result], list[Quantity]]] = {
         "control points": control,
         "unheld components": declared.unheld,

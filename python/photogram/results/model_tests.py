@@ -323,7 +323,6 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
 
 
 def _camera(result: Result, name: str | None, terms: Sequence[str]) -> tuple[AdjustedCamera, list[int]]:
-    """Return a camera, and the rows of its terms."""
     _require_block(result)
     cameras = {each.name: each for each in result.cameras}
     if name is None and len(cameras) != 1:

@@ -129,7 +129,6 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
 
 
 def used_fact(name: str, used: Bools, code: str = "used") -> Fact:
-    """Return the number of used items of a type."""
     return Fact(name, about(code, n=np.count_nonzero(used), all=used.size))
 
 
@@ -190,7 +189,6 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
 
 
 def _precision_table(result: AdjustedNetwork) -> quantity.Table:
-    """Return the distribution of standard deviations of values."""
     terms, rows = result._terms, list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
@@ -230,7 +228,6 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
 
 
 def _worst_table(tests: Tests, places: Indices) -> quantity.Table:
-    """Return the table of the largest test values by indices."""
     names = []
     for kind, row, part in places.tolist():
         each = tests.components[kind]

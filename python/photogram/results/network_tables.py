@@ -84,7 +84,6 @@ def names(terms: Terms, kind: str, rows: Indices, member: str = "", *, here: boo
 
 
 def part(each: Quantity, of: slice) -> Quantity:
-    """Return some components of a quantity."""
     return replace(each, values=each.values[:, of], axes=each.axes[of])
 
 
@@ -192,7 +191,6 @@ test_value = partial(
 
 
 def iteration_table(iterations: Sequence[Iteration]) -> list[Quantity]:
-    """Return sums after corrections, largest changes, damping."""
     rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in iterations]
     number, squares, change, damping = np.array(rows).reshape(-1, 4).T
     return [

@@ -219,7 +219,6 @@ def _bands(**sds: Floats) -> dict[str, Floats]:
 
 
 def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> plots.Curves:
-    """Return the plotted distortion of a camera: the curve, and its balanced form."""
     unit = str(camera.camera.unit)
     balanced = about("curve.balanced", at=curve.balanced_at, c=curve.balanced_distance, unit=unit)
     return plots.Curves(

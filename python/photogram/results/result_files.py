@@ -140,21 +140,17 @@ class Saved:
     decoder: Decoder  # Decoder of the document
     sheets: Mapping[str, Sheet]  # The tables of photos, points and images
 
-    @property
-    def scale(self) -> float:
-        """Divisor of covariances that gives cofactors."""
-        variance = self.summary["variance_of_unit_weight"]
-        return 1.0 if variance is None else float(variance)
-
     def arrays(
         self, parts: Mapping[str, Sequence[Part]], given: str
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the arrays of a result and of the given network, by the names of fields."""
         own: dict[str, Any] = {}
         others: dict[str, Any] = {}
+        variance = self.summary["variance_of_unit_weight"]
+        scale = 1.0 if variance is None else float(variance)
         for table, each in ((table, each) for table, own_parts in parts.items() for each in own_parts):
             if each.form != "derived":
-                found = each.array(self.sheets[table], self.scale)
+                found = each.array(self.sheets[table], scale)
                 name = each.field.removeprefix(f"{given}.")
                 (own if name == each.field else others)[name] = found
         return own, others

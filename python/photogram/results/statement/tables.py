@@ -63,7 +63,6 @@ class Columns:
 
 
 def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> Section:
-    """Return an annex with the title and the key of its letter."""
     return Section(f"annex-{letter}", texts(f"annex.{letter}"), parts, intro, annex=True)
 
 

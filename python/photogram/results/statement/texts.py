@@ -71,7 +71,6 @@ class Texts(Words):
         return self.numeral(fixed(value, decimals))
 
     def significant(self, value: float, figures: int = 3) -> str:
-        """Return a number with at least a number of significant figures."""
         if not math.isfinite(value) or value == 0:
             return self.number(value, 0)
         return self.number(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
