@@ -343,9 +343,10 @@ def _fitting(
     def fitted(name: str, definition: Definition) -> Feature:
         try:
             return _fitted(result, covariances, name, definition, k, freedom)
-        except InputError as error:
+        except (InputError, AdjustmentError) as error:
+            kind = InputError if isinstance(error, InputError) else AdjustmentError
             what = phrase("fit.named", name=name)
-            raise InputError(phrase("error.at", what=what, message=message_of(error))) from None
+            raise kind(phrase("error.at", what=what, message=message_of(error))) from None
 
     return fitted, Features((), k, coverage, freedom, remarks)
 
