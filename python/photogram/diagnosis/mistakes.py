@@ -139,7 +139,9 @@ def explain(
     if members is not None:
         single = members(block)
         if found is None or min(omegas) + CLEARLY > single:
-            omegas = [min(own, members(each)) for own, each in zip(omegas, blocks, strict=True)]
+            # A mistake in the set is larger than errors of its members: its correction reduces the sum.
+            pairs = zip(omegas, blocks, strict=True)
+            omegas = [min(own, members(each)) if own < given else own for own, each in pairs]
             found = best_of(min(single, given))
     if found is None:
         return None
