@@ -84,10 +84,10 @@ def _with_hints(result: Result) -> Result:
 def diagnosis_of(result: Result) -> Diagnosis:
     """Return the diagnosis and verdict of an adjustment that failed or fits badly."""
     from photogram.diagnosis.diagnosis import Diagnosis
-    from photogram.diagnosis.findings import Section, note_all, note_verdict
+    from photogram.diagnosis.findings import note_all, note_verdict, section_of
 
     found = diagnosed(result)
-    section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
+    section = section_of("explained")
     hints = [each for each in found.messages if str(each) in found.hints]
     note_all(section, "convention", "grave", hints)
     note_all(section, "exchanged-points", "grave", found.exchanged)

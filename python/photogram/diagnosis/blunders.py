@@ -14,7 +14,7 @@ import numpy as np
 from photogram.adjustment.snooping import snoop_block
 from photogram.arguments.types import Bools, Indices
 from photogram.diagnosis.control_sets import without_outliers
-from photogram.diagnosis.findings import Finding, Section
+from photogram.diagnosis.findings import Finding, Section, section_of
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.misfits import Misfits, list_test_values
 from photogram.diagnosis.mistakes import Adjuster
@@ -62,17 +62,9 @@ class Edited:
         return self.last is not None and self.last.converged and self.spread < HOPELESS
 
 
-def blunder_section() -> Section:
-    """Return an empty list of gross errors."""
-    return Section(
-        "Blunders (adjustment, 3-sigma rule)",
-        "A residual beyond three of its standard deviations is suspect; what is taken out is named below.",
-    )
-
-
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     """Adjust a block and remove gross errors."""
-    edited = Edited(None, None, "", blunder_section())
+    edited = Edited(None, None, "", section_of("blunders"))
     block, suspected = _fitting(block, suspects, adjusted, edited)
     first = edited.first if edited.first is not None and edited.first.converged else None
     fits = first is not None and not any(own.any() for own in outliers(first).values())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.diagnosis.blunders import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note
+from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note, section_of
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -14,9 +14,7 @@ MANY = 0.2  # Part of the control points above which a common cause is more prob
 
 def control(edited: Edited, words: Words) -> Section:
     """Return the section on control that does not fit, with remedies."""
-    section = Section(
-        "Control", "Control fails by misidentification, poor transfer of the point, or bad coordinates."
-    )
+    section = section_of("control")
     result = edited.last
     if result is None:
         return section

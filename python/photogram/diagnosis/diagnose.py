@@ -17,10 +17,10 @@ from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import argument_error
 from photogram.arguments.objects import kind_error
 from photogram.diagnosis.after_adjustment import diagnosis_of
-from photogram.diagnosis.blunders import Edited, blunder_section, edit
+from photogram.diagnosis.blunders import Edited, edit
 from photogram.diagnosis.control import control
 from photogram.diagnosis.diagnosis import Diagnosis
-from photogram.diagnosis.findings import Finding, Section, Words, finding, note
+from photogram.diagnosis.findings import Finding, Section, Words, finding, note, section_of
 from photogram.diagnosis.gross import Suspects, gross
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated
@@ -135,9 +135,7 @@ def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
 
 
 def _started(block: Block) -> tuple[Block | None, Section]:
-    section = Section(
-        "Initial values", "Photos without positions or attitudes are oriented from their image observations."
-    )
+    section = section_of("initial-values")
     try:
         found: FirstValues = first_values(block)
         usable = found.usable()
@@ -247,7 +245,7 @@ def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) 
     if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
         return edit(view.block.with_fixed_photos(), suspects, adjusted)
     reason = f"{manner.intersect_only}, and the stations are not adjusted ones"
-    return Edited(None, None, reason, blunder_section(), asked=False)
+    return Edited(None, None, reason, section_of("blunders"), asked=False)
 
 
 def _after_adjustment(view: View, edited: Edited, words: Words) -> list[Section]:

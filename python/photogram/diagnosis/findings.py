@@ -22,6 +22,7 @@ __all__ = [
     "note",
     "note_all",
     "note_verdict",
+    "section_of",
     "small_unit",
 ]
 
@@ -102,6 +103,12 @@ class Section:
             self.parts[-1] = Facts("", [*self.parts[-1].facts, fact])
         else:
             self.parts.append(Facts("", [fact]))
+
+
+def section_of(code: str, **fields: str) -> Section:
+    """Return an empty section with its title and reason."""
+    title, why = (str(phrase(f"check-section.{code}.{part}", **fields)) for part in ("title", "why"))
+    return Section(title, why)
 
 
 def finding(

@@ -12,7 +12,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.diagnosis.findings import Finding, Level, Section, finding, note
+from photogram.diagnosis.findings import Finding, Level, Section, finding, note, section_of
 from photogram.diagnosis.robust import fit, mad_sd
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -52,10 +52,7 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
 
     `unit` is the printed unit of image coordinates.
     """
-    section = Section(
-        "Gross errors (intersection from the initial stations)",
-        "Large patterned residuals are normal before the adjustment; a break in the pattern is an error.",
-    )
+    section = section_of("gross")
     rays, bad = _bad_photos(Rays.of(block, unit=unit), section)
     met = rays.intersect()
     departure = _departures(rays, met.residuals)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection
 
 from photogram.diagnosis.blunders import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note, small_unit
+from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note, section_of, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
@@ -19,10 +19,7 @@ VARIANCE = (0.5, 2.0)  # Variance of unit weight of realistic standard deviation
 
 def key_numbers(edited: Edited, words: Words) -> Section:
     """Return the section of key numbers."""
-    section = Section(
-        "Key numbers",
-        "The variance of unit weight approaches 1 when residuals and standard deviations agree.",
-    )
+    section = section_of("key-numbers")
     first, last = edited.first, edited.last
     if first is None or last is None:
         level: Level = "grave" if edited.asked else "look"

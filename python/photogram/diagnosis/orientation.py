@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.conventions import distances_in_millimetres, latitudes, readings, verdicts
-from photogram.diagnosis.findings import Finding, Section, Words, finding, note, note_all
+from photogram.diagnosis.findings import Finding, Section, Words, finding, note, note_all, section_of
 from photogram.diagnosis.hypotheses import KAPPA, TURNS
 from photogram.diagnosis.predictions import Predicted
 from photogram.diagnosis.views import View
@@ -27,10 +27,7 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
 
     Returns the sections on conventions and on sides, the corrected view, and whether the correction is exact.
     """
-    section = Section(
-        "Units, axes and angles (images against their predictions)",
-        "Another unit, axis or sense of angles makes every observation look wrong: it is looked for first.",
-    )
+    section = section_of("conventions")
     start, exact = view, True
     explanations: list[Finding] = []
     blocks: list[Block] = []  # Before the first mistake in sides, and after the last one of several photos
@@ -67,10 +64,7 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
 
 def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: Words) -> Section:
     """Return the section on sides of cameras, with points above cameras and rays that do not meet."""
-    section = Section(
-        "Sides of the cameras (intersection from the initial stations)",
-        "A point computed above its camera means a wrong sign of the principal distance, or a wrong kappa.",
-    )
+    section = section_of("sides")
     given, whole = blocks or [view.seen, view.seen]
     rays = Rays.of(given)
     met = rays.intersect()

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.diagnosis.findings import Section, note, small_unit
+from photogram.diagnosis.findings import Section, note, section_of, small_unit
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
@@ -25,11 +25,7 @@ SHOWN = 5
 
 def residuals(result: Result, spread: float) -> Section:
     """Describe residuals and test patterns; `spread` is the robust sd of test values."""
-    section = Section(
-        "Patterns of the residuals",
-        "Residuals should have no pattern. They grow with the number of rays: two rays leave all parallax"
-        " along the flight line to the height.",
-    )
+    section = section_of("patterns")
     _by_rays(result, section)
     _sums(result, section)
     plain = without_lenses(result.block)

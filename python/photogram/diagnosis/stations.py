@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Level, Section, note
+from photogram.diagnosis.findings import Level, Section, note, section_of
 from photogram.diagnosis.robust import MAD_TO_SD, fit
 from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
@@ -30,10 +30,7 @@ QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
 
 def stations(block: Block, result: Result | None) -> Section:
     """Compare stations with the smooth path of their strip and initial values."""
-    section = Section(
-        "Stations",
-        "An aircraft flies straight and level as far as it can: a departure from its path wants a reason.",
-    )
+    section = section_of("stations")
     which = "initial"
     if result is not None:
         _moved(block, result, section)
@@ -189,10 +186,7 @@ DEPARTURE = 6.0  # Departures from the plane in robust standard deviations of al
 
 def two_ray_heights(result: Result) -> Section:
     """Compare two-ray point heights with the plane of their nearest neighbours."""
-    section = Section(
-        "Heights of two-ray points",
-        "With two rays an error along the flight line becomes an error of height and leaves no residual.",
-    )
+    section = section_of("two-ray-heights")
     block = result.block
     if not flown(block):
         section.remark("the photos do not look down: there is no ground that heights are above")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.diagnosis.findings import Section, Words, note
+from photogram.diagnosis.findings import Section, Words, note, section_of
 from photogram.network.block import Block
 from photogram.network.structuring import FEWEST_TIES, structure, ties
 from photogram.results.document import bandwidths
@@ -15,15 +15,7 @@ from photogram.words import phrase
 
 def structure_section(block: Block, result: Result | None, words: Words) -> Section:
     """Report rays, ties and bandwidth, photos with few ties, and separate parts."""
-    section = Section(
-        "Structure",
-        "Points tie photos together"
-        + (
-            f"; the order of {words.order} makes the bandwidth of the 1987 program."
-            if words.bandwidth
-            else "."
-        ),
-    )
+    section = section_of("bandwidth" if words.bandwidth else "structure", order=words.order)
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     counts = np.bincount(block.image_photos, minlength=len(block.photo_ids))
     for number, points in zip(*np.unique(rays, return_counts=True), strict=True):

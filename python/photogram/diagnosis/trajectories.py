@@ -14,7 +14,7 @@ import numpy as np
 from photogram.adjustment.snooping import snoop
 from photogram.diagnosis.after_adjustment import explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.findings import Section, note, note_all, note_verdict
+from photogram.diagnosis.findings import Section, note, note_all, note_verdict, section_of
 from photogram.diagnosis.misfits import Misfits
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.registry import hints_at
@@ -38,10 +38,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     at_rest = {name for name, moves in zip(block.photo_ids, timed.tolist(), strict=True) if not moves}
     # Photos on a trajectory may be tied by other observations than points.
     structure.findings = [each for each in structure.findings if at_rest.issuperset(each.photos)]
-    section = Section(
-        "Adjustment",
-        "Photos on trajectories are no pictures with one pose: units, axes and angles are not tried on them.",
-    )
+    section = section_of("moving")
     section.remark(f"{flown_by(block)}: of {counted(len(timed), 'photo')} {int(timed.sum())} are on one")
     try:
         result = adjusted(block)
