@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Result, adjust
+from photogram import Message, Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.formats import ReadOptions, read
-from photogram.messages import Message
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 

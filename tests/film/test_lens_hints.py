@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, Result, adjust
+from photogram import Block, Message, Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.formats import read
-from photogram.messages import Message
 from test_film import project
 
 ARCHIVE = files("photogram") / "examples" / "archive"
