@@ -19,6 +19,7 @@ from itertools import permutations, product
 
 import numpy as np
 
+from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats
 from photogram.diagnosis.control_sets import doubtful
 from photogram.diagnosis.hypotheses import FOOT
@@ -111,7 +112,7 @@ def _of_catalogue(block: Block, given: list[Position], adjusted: Adjuster) -> It
 
 def _free(block: Block, given: list[Position], code: str, adjusted: Adjuster) -> Iterator[Proposal]:
     """Yield the proposal of a common height offset, shift or lever arm, free in an adjustment."""
-    arm = np.median([_arm(each) for each in given], axis=0)
+    arm = np.median([arm_of(each) for each in given], axis=0)
     unknown: Shift | LeverArm
     if code == "lever-arm":
         unknown = LeverArm("of all", arm, sd=np.inf)
@@ -136,9 +137,10 @@ def _free(block: Block, given: list[Position], code: str, adjusted: Adjuster) ->
     yield Proposal(code, message, partial(_with, positions=meant), parameters=int((sd > 0).sum()))
 
 
-def _arm(position: Position) -> Floats:
+def arm_of(position: Position) -> Floats:
+    """Return the given lever arm of an observed position."""
     arm = position.lever_arm
-    return np.asarray(position.observed[3:6]) if not isinstance(arm, LeverArm) else arm.position
+    return arm.position if isinstance(arm, LeverArm) else shaped("lever arm", arm, (3,))
 
 
 def _code_of_arm(given: Floats, meant: Floats) -> str:

@@ -17,11 +17,11 @@ from functools import partial
 
 import numpy as np
 
-from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.clocks import differences
 from photogram.diagnosis.hypotheses import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
+from photogram.diagnosis.positions import arm_of
 from photogram.diagnosis.predictions import SUSPICION, Predicted, predict
 from photogram.diagnosis.regression import UNKNOWN, given_points, relative, spread
 from photogram.errors import InputError
@@ -36,7 +36,6 @@ from photogram.network.projecting import camera_of, projected
 from photogram.network.rays import meet_rays
 from photogram.network.subset import kept_images
 from photogram.network.trajectories import Table, Trajectory
-from photogram.network.unknowns import LeverArm
 from photogram.words import Phrase, phrase
 
 
@@ -69,8 +68,8 @@ def _of_records(block: Block) -> Predicted | None:
 def _records_misfit(block: Block) -> Floats:
     """(1,) m of positions on trajectories; 0 without any, very large if most are outside."""
     records: dict[int, list[tuple[Moment, Position]]] = {}
-    for each in block.observations:
-        if isinstance(each, Position) and (moment := each.moment) is not None:
+    for each in block.observations.of_type(Position):
+        if (moment := each.moment) is not None:
             records.setdefault(id(moment.trajectory), []).append((moment, each))
     apart, places, inside = [np.zeros((0, 3))], [np.zeros((0, 3))], 0
     for own in records.values():
@@ -79,15 +78,8 @@ def _records_misfit(block: Block) -> Floats:
         times = np.array([at.time for at, _ in own]) + clocks
         ends = trajectory.reach
         inside += int(np.count_nonzero((times >= ends[0]) & (times <= ends[1])))
-        given = (np.array([each.position for each in part]) for part in trajectory.coefficients)
-        centres, turned, *_ = trajectory.flown(np.clip(times, *ends), *given)
-        arms = [
-            each.lever_arm.position
-            if isinstance(each.lever_arm, LeverArm)
-            else shaped("lever arm", each.lever_arm, (3,))
-            for _, each in own
-        ]
-        computed = centres + np.einsum("nij,nj->ni", turned.reshape(-1, 3, 3), np.array(arms))
+        centres, turned = given_poses(trajectory, np.clip(times, *ends))
+        computed = centres + np.einsum("nij,nj->ni", turned, np.array([arm_of(each) for _, each in own]))
         places.append(np.array([np.asarray(each.position) for _, each in own]))
         apart.append(places[-1] - computed)
     observed = np.concatenate(places)
