@@ -44,7 +44,11 @@ def diagnosed(result: Result) -> Result:
     Mistakes in conventions (`hints`) and exchanged names (`exchanged`) enter the verdict. Hints are also
     messages.
     """
-    return with_exchanges(_with_hints(result))
+    found, said = explained(result), remarks(result)
+    if found or said:
+        messages = [*found, *said, *result.messages]
+        result = replace(result, hints=tuple(map(str, found)), messages=messages)
+    return with_exchanges(result)
 
 
 def explained(result: Result) -> list[Message]:
@@ -68,17 +72,6 @@ def remarks(result: Result) -> list[Message]:
 def _bad(result: Result) -> bool:
     variance = result.variance_of_unit_weight
     return not (result.converged and (variance is None or variance <= BAD**2))
-
-
-def _with_hints(result: Result) -> Result:
-    found, said = explained(result), remarks(result)
-    if not (found or said):
-        return result
-    return replace(
-        result,
-        hints=tuple(map(str, found)),
-        messages=[*found, *said, *result.messages],
-    )
 
 
 def diagnosis_of(result: Result) -> Diagnosis:

@@ -35,7 +35,6 @@ class View:
     # the same as in `block`
     seen: Block
     rows: Indices  # (k,) rows in `block` of the observations of `seen`
-    unseen: int = 0  # Number of observations that no camera can have made
 
     @classmethod
     def of(cls, block: Block) -> Self:
@@ -43,11 +42,10 @@ class View:
         if not block.cameras and not block.mounts:
             return cls(block, block, np.arange(len(block.image_xy)))
         plain, visible = seen_without_lenses(block)
-        unseen = int((~visible).sum())
-        block = kept_images(block, np.flatnonzero(visible)) if unseen else block
+        block = block if visible.all() else kept_images(block, np.flatnonzero(visible))
         mounted = np.isin(block.photo_ids, [each.photo for each in block.mounts])
         rows = np.flatnonzero(~mounted[block.image_photos])
-        return cls(block, kept_images(plain.replace(mounts=()), rows), rows, unseen)
+        return cls(block, kept_images(plain.replace(mounts=()), rows), rows)
 
     @property
     def unit(self) -> str:
