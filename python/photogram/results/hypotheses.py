@@ -21,7 +21,7 @@ from photogram.results.hypothesis_checks import Joint, set_with_checks, single_c
 from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
-from photogram.statistics.findings import ALTERNATIVES, Tested
+from photogram.statistics.findings import ALTERNATIVES, NEARLY, Tested
 from photogram.words import Phrase, phrase
 
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
@@ -38,7 +38,6 @@ OF_CAMERAS = frozenset(
 SHARES = ("gnss-next", "gnss-previous", "camera-exchanged")  # Their parameter is 0 or 1
 DETECTED = 4.13  # Standard deviations of an error that a test detects: root of lambda0
 WHOLE = 0.1  # Standard deviation of this parameter if it is 1
-NEARLY = 0.99  # Part of T that such an error explains, second-order terms excluded
 EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common error explains
 ABSURD = 5.0  # Standard deviations of plausible sizes beyond which an error has no plausible size
 ABSURD_PART, UNKNOWN_PART = 0.9, 0.7

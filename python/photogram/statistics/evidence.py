@@ -17,7 +17,7 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Agreement, Findings, Systematic, Tested, Text
+from photogram.statistics.findings import NEARLY, Agreement, Findings, Systematic, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
@@ -238,7 +238,7 @@ class Evidence:
             return False
         # An error in common with fewer parameters explains the same residuals better, unless it is a lens.
         rivals = 0.0 if self.common_code == MISSING_LENS else 2 * self.found.odds
-        if fall < rivals + LENS_PARAMETERS * math.log(max(self.number, 2)):
+        if fall < max(rivals + LENS_PARAMETERS * math.log(max(self.number, 2)), rivals / NEARLY):
             return False
         too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
         return fall > EXPLAINED * too_much and single < SINGLE * too_much

@@ -252,6 +252,8 @@ MOST: Mapping[Text, float] = {
     CONTROL_POINTS: 1 / 3,
 }  # Largest removable shares
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
+
+NEARLY = 0.97  # Least ratio of decreases of the sum of squares that second-order terms of an error explain
 EVIDENCE = 2.0  # Difference of log likelihoods that decides: 1.92 at the ends of a 95 percent interval
 LARGEST_FACTOR = 30.0  # Largest plausible factor of the standard deviations of a type
 NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least

@@ -2,7 +2,7 @@
 //! the principal distance of some photos.
 
 use super::super::trial::Trial;
-use super::catalogue::{CameraError, Catalogue, put};
+use super::catalogue::{Catalogue, put};
 use crate::adjustment::{Equation, Shared};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{Camera, CameraModel};
@@ -29,8 +29,8 @@ pub(super) const POINTS: [&str; 4] = ["cx", "cy", "xp", "yp"];
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     for photos in equal_cameras(catalogue).into_iter().take(MOST_CAMERAS) {
-        of_camera(catalogue, trial, trial.camera_of_photo[photos[0]], &photos);
-        of_sets(catalogue, trial, &photos);
+        let distance = of_camera(catalogue, trial, trial.camera_of_photo[photos[0]], &photos);
+        of_sets(catalogue, trial, &photos, distance);
     }
 }
 
@@ -55,7 +55,8 @@ pub(super) fn equal_cameras(catalogue: &Catalogue<'_>) -> Vec<Vec<usize>> {
     groups.into_iter().map(|own| own.2).collect()
 }
 
-fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos: &[usize]) {
+/// The parameters of a camera; the column of the principal distance, if it is fixed.
+fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos: &[usize]) -> Option<usize> {
     let own: Camera = catalogue.stations.photos[photos[0]].camera.clone();
     let fixed = trial.fixed_parameters(photos[0], own.parameter_names().len());
     let fixed: Vec<(usize, &'static str)> =
@@ -69,6 +70,8 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
     let mut hypotheses =
         vec![("camera-f", distances, DISTANCE * own.scale()), ("camera-point", points, POINT * width)];
     hypotheses.extend(others.take(MOST_TERMS).map(|&own| ("camera-term", vec![own], f64::NAN)));
+    let count = own.parameter_names().iter().filter(|own| DISTANCES.contains(&own.0)).count();
+    let (mut whole, mut exchanged) = (None, None);
     for (code, parameters, size) in hypotheses.into_iter().filter(|own| !own.1.is_empty()) {
         let names: Vec<&'static str> = parameters.iter().map(|own| own.1).collect();
         // One error of both principal distances; another scale of one axis is an affinity.
@@ -77,27 +80,27 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
         let columns = catalogue.add((code, Some(camera)), &names, &plausible);
         for &photo in photos {
             let own = parameters.iter().zip(columns.iter().cycle());
-            let errors = own.map(|(own, &column)| CameraError { parameter: own.0, column, factor: 1.0 });
-            catalogue.cameras[photo].extend(errors);
+            catalogue.cameras[photo].extend(own.map(|(own, &column)| (own.0, column)));
+        }
+        match (code, &columns[..], &parameters[..]) {
+            ("camera-f", &[column], own) if own.len() == count => whole = Some(column),
+            ("camera-point", &[first, second], &[(x, _), (y, _)]) => {
+                let between = own.parameters()[y] - own.parameters()[x];
+                let exchange = [(first, between), (second, -between)];
+                exchanged = (between != 0.0).then_some(exchange);
+            }
+            _ => {}
         }
     }
-    if let [(x, _), (y, _)] = of(&POINTS)[..] {
-        let between = own.parameters()[y] - own.parameters()[x];
-        if between != 0.0 {
-            let column = catalogue.add(("camera-exchanged", Some(camera)), &["share"], &[SHARE])[0];
-            let errors = [(x, between), (y, -between)].map(|(parameter, factor)| CameraError {
-                parameter,
-                column,
-                factor,
-            });
-            photos.iter().for_each(|&photo| catalogue.cameras[photo].extend(errors));
-        }
+    if let Some(columns) = exchanged {
+        catalogue.add_combination(("camera-exchanged", Some(camera)), "share", SHARE, &columns);
     }
+    whole
 }
 
 /// The principal distance, fixed or free, of the photos of a strip, of the first and the second half of the photos, and of one of several
 /// cameras with equal parameters.
-fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize]) {
+fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize], whole: Option<usize>) {
     let camera: Camera = catalogue.stations.photos[photos[0]].camera.clone();
     let named = camera.parameter_names().iter().enumerate();
     let distances: Vec<usize> = named.filter(|own| DISTANCES.contains(&own.1.0)).map(|own| own.0).collect();
@@ -119,11 +122,17 @@ fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize]) {
         if distances.is_empty() || !(2..=MOST_SETS).contains(&sets.len()) {
             continue;
         }
+        let (mut first, size) = (None, DISTANCE * camera.scale());
         for set in sets {
-            let column = catalogue.add((code, Some(set)), &["f"], &[DISTANCE * camera.scale()])[0];
+            if let ("camera-f-half", Some(first), Some(whole)) = (code, first, whole) {
+                // The second half is the rest.
+                catalogue.add_combination((code, Some(set)), "f", size, &[(whole, 1.0), (first, -1.0)]);
+                continue;
+            }
+            let column = catalogue.add((code, Some(set)), &["f"], &[size])[0];
+            first = Some(column);
             for &(photo, _) in of.iter().filter(|own| own.1 == set) {
-                let error = |&parameter| CameraError { parameter, column, factor: 1.0 };
-                catalogue.cameras[photo].extend(distances.iter().map(error));
+                catalogue.cameras[photo].extend(distances.iter().map(|&parameter| (parameter, column)));
             }
         }
     }
@@ -147,8 +156,8 @@ impl Catalogue<'_> {
             shared.values.clear();
             self.write_camera_partials((image, local), &mut shared.values);
         }
-        for (own, values) in columns.iter().zip(shared.values.chunks_exact(2)) {
-            put(partials, own.column, own.factor * values[row] / equation.sd);
+        for (&(_, column), values) in columns.iter().zip(shared.values.chunks_exact(2)) {
+            put(partials, column, values[row] / equation.sd);
         }
     }
 
@@ -163,8 +172,8 @@ impl Catalogue<'_> {
         each_camera!(&station.camera, camera => {
             let (_, computed) = camera.compare(&sight, observed.xy);
             let by_parameters = computed.by_parameters.each_ref().map(|row| row.as_ref());
-            for own in &self.cameras[observed.photo] {
-                values.extend(by_parameters.map(|row| row[own.parameter]));
+            for &(parameter, _) in &self.cameras[observed.photo] {
+                values.extend(by_parameters.map(|row| row[parameter]));
             }
         });
     }

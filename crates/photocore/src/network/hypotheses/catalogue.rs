@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::super::model::{Bundle, Owner};
 use super::super::stations::Stations;
@@ -19,8 +19,19 @@ pub(super) struct Cause {
     pub parameters: Vec<&'static str>,
     /// Standard deviations of the parameters before the data are used; empty if unknown.
     pub plausible: Vec<f64>,
-    /// The columns of the catalogue that are the parameters.
-    pub columns: Vec<usize>,
+    /// The columns of the catalogue that each parameter changes, with its factors.
+    pub columns: Vec<Vec<(usize, f64)>>,
+}
+
+impl Cause {
+    /// Columns of the catalogue by some parameters.
+    pub fn directions(&self, count: usize, parameters: &[usize]) -> DMatrix<f64> {
+        let mut directions = DMatrix::zeros(count, parameters.len());
+        for (k, &parameter) in parameters.iter().enumerate() {
+            self.columns[parameter].iter().for_each(|&(column, factor)| directions[(column, k)] = factor);
+        }
+        directions
+    }
 }
 
 /// Observations that see a displacement of unknowns.
@@ -32,16 +43,6 @@ pub(super) enum Seen {
     Positions,
     /// Attitudes of photos.
     Attitudes,
-}
-
-/// Error of a parameter of the camera of a photo.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CameraError {
-    /// The parameter of the camera.
-    pub parameter: usize,
-    pub column: usize,
-    /// d(parameter of the camera) / d(parameter of the hypothesis).
-    pub factor: f64,
 }
 
 /// Deformations of the images of a photo, relative to its principal point.
@@ -70,8 +71,8 @@ pub(super) struct Catalogue<'a> {
     fixed: HashMap<usize, Vec<(usize, f64)>>,
     /// Errors of observations that are no images of local points, in unit weight: columns and values.
     single: HashMap<EquationOf, Vec<(usize, f64)>>,
-    /// Parameters of the camera of each photo.
-    pub(super) cameras: Vec<Vec<CameraError>>,
+    /// Parameters of the camera of each photo, and their columns.
+    pub(super) cameras: Vec<Vec<(usize, usize)>>,
     /// Column of the readout time of the camera of each photo.
     pub(super) shutters: Vec<Option<usize>>,
     /// Deformations of the images of each photo.
@@ -113,8 +114,21 @@ impl<'a> Catalogue<'a> {
         let columns: Vec<usize> = (self.count..self.count + parameters.len()).collect();
         self.count += parameters.len();
         let (parameters, plausible) = (parameters.to_vec(), plausible.to_vec());
-        self.causes.push(Cause { code, set, parameters, plausible, columns: columns.clone() });
+        let own = columns.iter().map(|&column| vec![(column, 1.0)]).collect();
+        self.causes.push(Cause { code, set, parameters, plausible, columns: own });
         columns
+    }
+
+    /// Adds a hypothesis of one parameter that changes several of these columns.
+    pub fn add_combination(
+        &mut self,
+        (code, set): (&'static str, Option<usize>),
+        parameter: &'static str,
+        plausible: f64,
+        columns: &[(usize, f64)],
+    ) {
+        let (parameters, plausible) = (vec![parameter], vec![plausible]);
+        self.causes.push(Cause { code, set, parameters, plausible, columns: vec![columns.to_vec()] });
     }
 
     /// Adds an error of some observations as a parameter.

@@ -60,33 +60,34 @@ impl Trial {
         let at_checks = sample.at_checks(&catalogue, &sums.effects, of_sets, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
-            let seen: Vec<usize> = (0..cause.columns.len())
-                .filter(|&k| sums.squares[(cause.columns[k], cause.columns[k])] > 0.0)
-                .collect();
+            let sees = |own: &(usize, f64)| sums.squares[(own.0, own.0)] > 0.0;
+            let seen: Vec<usize> =
+                (0..cause.columns.len()).filter(|&k| cause.columns[k].iter().any(sees)).collect();
             if seen.is_empty() {
                 continue;
             }
-            let own: Vec<usize> = seen.iter().map(|&k| cause.columns[k]).collect();
+            let own = cause.directions(sums.score.len(), &seen);
             let plausible: Vec<f64> = seen.iter().filter_map(|&k| cause.plausible.get(k).copied()).collect();
             let judged = Judged::new(
-                &DVector::from_iterator(own.len(), own.iter().map(|&k| sums.score[k])),
-                &sums.squares.select_rows(&own).select_columns(&own),
-                &sums.redundancy.select_rows(&own).select_columns(&own),
+                &own.tr_mul(&sums.score),
+                &own.tr_mul(&(&sums.squares * &own)),
+                &own.tr_mul(&(&sums.redundancy * &own)),
                 &plausible,
                 &criteria,
             );
-            let mut error = DVector::zeros(sums.score.len());
-            own.iter().zip(judged.error.iter().flatten()).for_each(|(&k, &value)| error[k] = value);
-            errors.push(error);
+            errors.push(match &judged.error {
+                Some(error) => &own * DVector::from_column_slice(error),
+                None => DVector::zeros(sums.score.len()),
+            });
             all.push(Hypothesis {
                 code: cause.code,
                 about: About::Set(cause.set),
                 parameters: seen.iter().map(|&k| cause.parameters[k]).collect(),
-                observations: own.iter().map(|&k| sums.observations[k]).max().unwrap_or(0),
+                observations: observations(&own, &sums.observations),
                 plausible,
                 judged,
                 effect: None,
-                at_checks: at_checks.select_columns(&own).transpose().as_slice().to_vec(),
+                at_checks: (&at_checks * own.rows(0, of_sets)).transpose().as_slice().to_vec(),
             });
             columns.push(own);
         }
@@ -108,10 +109,8 @@ impl Trial {
             };
             own.effect = own.judged.error.is_some().then_some(effect);
         }
-        let block = |i: usize, j: usize| -> Vec<f64> {
-            let places = columns[i].iter().flat_map(|&i| columns[j].iter().map(move |&j| (i, j)));
-            places.map(|place| sums.redundancy[place]).collect()
-        };
+        let taken: Vec<DMatrix<f64>> = columns.iter().map(|own| &sums.redundancy * own).collect();
+        let block = |i: usize, j: usize| taken[j].tr_mul(&columns[i]).as_slice().to_vec();
         let roots: Vec<DMatrix<f64>> = (0..sets).map(|k| whitening(&block(k, k))).collect();
         let correlation = |k: usize| {
             let (i, j) = (k / sets, k % sets);
@@ -121,4 +120,10 @@ impl Trial {
         all.extend(singles.into_iter().map(|single| single.hypothesis));
         Ok(Hypotheses { all, sets, correlations })
     }
+}
+
+/// The number of observations that depend on some parameters, from the numbers by column.
+fn observations(directions: &DMatrix<f64>, counts: &[usize]) -> usize {
+    let changed = (0..counts.len()).filter(|&column| directions.row(column).iter().any(|own| *own != 0.0));
+    changed.map(|column| counts[column]).max().unwrap_or(0)
 }
