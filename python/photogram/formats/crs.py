@@ -124,7 +124,8 @@ def enu_origin(crs: str) -> tuple[float, float, float] | None:
 
 def east_north_up(origin: tuple[float, float, float]) -> Floats:
     """Return (3, 3) rows: east, north and up at a position, geocentric."""
-    return local_frames([[*np.radians(origin[1::-1]), 0.0]])[0]
+    found: Floats = local_frames([[*np.radians(origin[1::-1]), 0.0]])[0]
+    return found
 
 
 def _geocentric_of(origin: tuple[float, float, float]) -> Floats:

@@ -331,8 +331,8 @@ def read_measurements(path: Path, options: ReadOptions) -> DbatBuilder:
     ]
     for photo in sorted({photo for (_, photo), _ in images}):
         content.numbered_photo(photo, str(photo), camera, content.place)
-    for (point, photo), xy in images:
-        content.image(photo, point, *xy, sd=(math.nan, math.nan))
+    for (point, photo), (x, y) in images:
+        content.image(photo, point, x, y, sd=(math.nan, math.nan))
     beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
     if path.name.endswith(MEASURED) and beside.is_file():
         for place, own in _cells(beside, "id,name,photos (used),", 6):

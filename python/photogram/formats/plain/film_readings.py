@@ -93,15 +93,15 @@ class Seen:
         known = np.flatnonzero(np.isfinite(places))
         yield Expected(known, places[known])
         found = ((other, q) for other in self._neighbours(photo, own) if (q := placed(other)) is not None)
-        other, places = next(found, (None, None))
-        if other is None or places is None:
+        other, film = next(found, (None, None))
+        if other is None or film is None:
             return
         theirs = self.images.points[self._rows(other)]
         rows, there = (
             np.array([np.flatnonzero(each == point)[0] for point in np.intersect1d(own, theirs)])
             for each in (own, theirs)
         )
-        q = places[there]
+        q = film[there]
         _, turned, distance = self._pose(other)
         rays = np.column_stack([q.real, q.imag, np.full(len(q), distance)])
         places = _projected(rays @ turned.T @ axes, c)
