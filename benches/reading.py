@@ -16,8 +16,7 @@ import numpy as np
 from photogram import formats
 from photogram.formats.colmap.content import Camera, Images, Model, Points
 from photogram.formats.colmap.files import binary_files, read_model
-from photogram.formats.isis.network import ControlNetwork, measures_of, points_of
-from photogram.formats.isis.reading import read_network
+from photogram.formats.isis.network import ControlNetwork, measures_of, points_of, read_network
 from photogram.formats.isis.writing import binary_network, network_text
 from photogram.io.delimited import read_columns
 from photogram.io.places import Place
