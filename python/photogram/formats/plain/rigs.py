@@ -10,9 +10,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.builder import FrameOf, Rig
-from photogram.formats.plain.schema import AXES, TABLES
+from photogram.formats.plain.schema import TABLES
 from photogram.formats.plain.tables import Tables, columns_of_records, indices_of, made
-from photogram.formats.plain.unknowns import read_unknowns, unknown_columns, value_columns
+from photogram.formats.plain.unknowns import read_unknowns, read_values, unknown_columns, value_columns
 from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
@@ -31,7 +31,7 @@ ZERO = 1e-6  # Largest difference of the first sensor's pose from zero
 def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
     """Read rigs; the first sensor of each defines the frame."""
     table = tables.rows("rigs")
-    values, matrices = tables.vectors(table, AXES), tables.turns(table)
+    values, matrices = (read_values(tables, table, column) for column in _SENSOR.values)
     deviations = np.column_stack([tables.sd(table, name, math.inf) for name in _SENSOR.sd])
     found: dict[str, tuple[str, dict[str, Sensor]]] = {}
     clocked: dict[str, dict[str, Clock]] = {}

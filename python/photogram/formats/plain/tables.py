@@ -260,16 +260,6 @@ class Tables:
         """(3, 3) transformation from photo axes of the settings to internal axes."""
         return Y_DOWN if self.settings.photo == "y_down" else np.eye(3)
 
-    def turns(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) axes of one photo in another, as columns."""
-        found: Floats = self.flip @ self.matrices(table)
-        return found
-
-    def vectors(self, table: ColumnTable, names: Sequence[str], default: float = math.nan) -> Floats:
-        """Return (rows, 3) vectors in the axes of photos."""
-        found: Floats = table.vectors(names, default) @ self.flip
-        return found
-
     def sd(self, table: ColumnTable, column: str, default: float = math.nan) -> Floats:
         """Return (rows,) standard deviations of a column in internal units."""
         if column.removeprefix("sd_") in ANGULAR:
@@ -444,9 +434,7 @@ class Transform:
             if self.frame.kind != "geographic" and is_geographic(table):
                 raise table.head.error(phrase("plain.degrees"))
             if self.frame.kind == "geographic":
-                return np.column_stack(
-                    [np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]]
-                ), own
+                return np.column_stack([np.radians(values[:, :2]), values[:, 2]]), own
             return values, own
         from photogram.formats.crs import amid, to_frame
 

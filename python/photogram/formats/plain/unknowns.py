@@ -33,7 +33,8 @@ TURNS = ("attitude", "turn", "mounting")  # Kinds of columns with rotations
 def read_values(tables: Tables, table: ColumnTable, column: Column) -> Floats:
     """Return (rows, k) numbers or (rows, 3, 3) rotations of a quantity in internal axes; NaN without."""
     if column.kind in TURNS:
-        return tables.matrices(table) if column.kind == "attitude" else tables.turns(table)
+        matrices = tables.matrices(table)
+        return matrices if column.kind == "attitude" else tables.flip @ matrices
     values = table.vectors(column.names, column.number)
     return values @ tables.flip if column.kind == "body" else values
 
