@@ -129,11 +129,13 @@ def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, In
     return matrices, np.flatnonzero(differences > NORMALISED)
 
 
-def _rigid(pose: Sequence[float], place: Place) -> tuple[Floats, Floats]:
-    translation = np.array(pose[4:])
-    if not np.isfinite(translation).all():
-        raise place.error(phrase("format.finite", name="the translation"))
-    return _rotations(np.array([pose[:4]]), [place])[0][0], translation
+def _rigid(poses: Sequence[Sequence[float]], places: Sequence[Place]) -> list[tuple[Floats, Floats]]:
+    """Return rotations and translations of poses."""
+    table = np.array(poses, dtype=float).reshape(-1, 7)
+    finite = np.isfinite(table[:, 4:]).all(axis=1)
+    if not finite.all():
+        raise places[int(np.argmin(finite))].error(phrase("format.finite", name="the translation"))
+    return list(zip(_rotations(table[:, :4], places)[0], table[:, 4:], strict=True))
 
 
 def _composed(
@@ -147,11 +149,11 @@ def _composed(
     sensors, rigs = _mounted_sensors(model, cameras)
     rows = {number: row for row, number in enumerate(model.images.numbers.tolist())}
     frames, seen, unknown = [], set(), 0
-    for frame in model.frames:
+    poses = _rigid([each.pose for each in model.frames], [each.place for each in model.frames])
+    for frame, (turn, shift) in zip(model.frames, poses, strict=True):
         place = frame.place
         if frame.rig not in numbers:
             raise place.error(phrase("format.undefined", what="rig", name=str(frame.rig)))
-        turn, shift = _rigid(frame.pose, place)
         photos: dict[str, int] = {}
         for sensor, image in ((own.number, own.image) for own in frame.data if own.kind == CAMERA):
             if image not in rows:
@@ -188,7 +190,7 @@ def _mounted_sensors(
         for number, pose in ((own.number, own.pose) for own in rig.sensors if own.kind == CAMERA):
             if number not in cameras:
                 raise rig.place.error(phrase("format.undefined", what="camera", name=str(number)))
-            rigid = poses[rig.number, number] = _rigid(pose, rig.place) if pose else None
+            rigid = poses[rig.number, number] = _rigid([pose], [rig.place])[0] if pose else None
             if rigid is not None:
                 name = f"rig {rig.number}, camera {number}"
                 sensors[cameras[number]] = Sensor.from_colmap(name, *rigid)
