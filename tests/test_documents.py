@@ -20,6 +20,7 @@ from photogram.show.methods import Documented
 from photogram.show.page import (
     Column,
     Document,
+    Drawing,
     Fact,
     Facts,
     Judgement,
@@ -274,3 +275,9 @@ def test_details_are_in_the_report_and_in_json_but_not_on_the_page():
     assert made.table("details") is declared
     assert "All points" in text(made)
     assert b"All points" not in html.page_html(made)
+
+
+def test_a_section_of_plots_only_is_not_in_the_text():
+    plots = [Drawing(f"plot-{k}", "", "", lambda: None) for k in range(2)]
+    section = Section("pictures", "Pictures", [Layers("layers", plots)])
+    assert titled_lines(Document("Survey", "", sections=[section])) == []

@@ -110,7 +110,9 @@ def _chosen(section: Section, keys: Collection[str]) -> Sequence[Part]:
 
 
 def _spaced(parts: Iterable[list[str]]) -> list[str]:
-    return "\n\n".join("\n".join(lines) for lines in parts if lines).split("\n")
+    """Return lines of parts, with a blank line between two; parts without lines are omitted."""
+    paragraphs = ["\n".join(lines) for lines in parts if lines]
+    return "\n\n".join(paragraphs).split("\n") if paragraphs else []
 
 
 def part_lines(part: Part, title: str = "") -> list[str]:
