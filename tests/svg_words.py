@@ -3,9 +3,13 @@
 from itertools import combinations
 from xml.etree import ElementTree
 
-from photogram.show.sketch.layout import overlap
 from photogram.show.sketch.letters import width
 from photogram.show.sketch.svg import svg_of
+
+
+def overlap(one, other):
+    """Return whether two boxes (left, upper, right, lower) have a common area."""
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def elements(sketch):

@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.show.sketch.marks import Line, Mark, Markers, Names, Panel, band, bars, horizontal_line, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, Names, Panel, band, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
@@ -66,7 +66,8 @@ def _histogram(values: Floats, unit_weight: float) -> Panel:
     counts, edges = np.histogram(values, number, (-reach, reach))
     density = counts / (len(values) * np.diff(edges))
     x = np.linspace(-reach, reach, 241)
-    marks: list[Mark] = [bars(edges, density, SKY, 0.6, f"{len(values):,} test values")]
+    across, up = np.repeat(edges, 2)[1:-1], np.repeat(density, 2)
+    marks: list[Mark] = [band(across, 0.0 * up, up, SKY, 0.6, f"{len(values):,} test values")]
     normal = np.column_stack([x, _bell(x, 1.0)])
     marks.append(Line(normal, label="normal, standard deviations as given"))
     if abs(unit_weight - 1.0) > 0.02:

@@ -217,14 +217,10 @@ def free_names(
             inside = room[0] <= left and right <= room[2] and room[1] <= low and top <= room[3]
             if not inside or ((obstacles > [left, low]) & (obstacles < [right, top])).all(axis=1).any():
                 continue
-            if not any(overlap(box, other) for other in taken):
+            if all(right <= a or c <= left or top <= b or d <= low for a, b, c, d in taken):
                 taken.append(box)
                 yield row, box
                 break
-
-
-def overlap(one: Box, other: Box) -> bool:
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def _largest(groups: Any, values: Any) -> Floats:

@@ -164,12 +164,6 @@ def band(across: Floats, low: Floats, high: Floats, colour: str, opacity: float,
     return Polygons(np.concatenate([lower, upper[::-1]])[np.newaxis], colour, opacity, label=label)
 
 
-def bars(edges: Floats, heights: Floats, colour: str, opacity: float, label: str) -> Polygons:
-    """Return a histogram of (n + 1,) edges and (n,) heights from 0 as a band."""
-    across, up = np.repeat(edges, 2)[1:-1], np.repeat(heights, 2)
-    return band(across, np.zeros(len(up)), up, colour, opacity, label)
-
-
 def boxes(low: Floats, high: Floats) -> Floats:
     """Return (n, 4, 2) outlines of boxes from lower left to upper right."""
     corners = [low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])]
