@@ -410,9 +410,9 @@ def hypotheses(
     )
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
     groups = _groups(suspects, found["group"], found["index"])
-    for row, (checked, counted, others, ratio, at, change, changes) in found["effects"].items():
+    for row, (checked, counted, others, ratio, at, most, changes) in found["effects"].items():
         of_checks, of_points = np.split(changes, [checks])
-        effects[row] = Effect(checked, counted, others, ratio, at, change, of_points)
+        effects[row] = Effect(checked, counted, others, ratio, at, most, of_points)
         if not known or joint is None:
             continue
         group = int(groups[row])
