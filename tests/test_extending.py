@@ -16,24 +16,17 @@ FORMATS = Path("python/photogram/collection/formats")
 PACKAGE = [
     path
     for path in (ROOT / "python" / "photogram").rglob("*.py*")
-    if path.suffix in (".py", ".pyi")
-    and path.parent.name != "stellar"
-    and path != ROOT / "python" / "photogram" / "network" / "lens.py"
-    and ROOT / "python" / "photogram" / "formats" not in path.parents
-    and ROOT / "python" / "photogram" / "targets" / "output" not in path.parents
-    and path != ROOT / "python" / "photogram" / "film" / "certificate_file.py"
+    if path.suffix in (".py", ".pyi") and ROOT / "python" / "photogram" / "formats" not in path.parents
 ]
-"""Without the calibration by stars, whose plots have a radial axis, the known lenses of planetary cameras, of
-which one has that name, certificates, which have a table of it, and the files of other programs, which say
-what lenses and formats are called."""
+"""Without the files of other programs, which say what lenses and formats are called."""
 CRATE = [path for path in (ROOT / "crates" / "photocore" / "src").rglob("*.rs") if path.name != "golden.rs"]
 BINDING = [*(ROOT / "crates" / "photogram-py" / "src").rglob("*.rs")]
 EXTENSIONS = {
     "lens": (
-        CAMERAS / "radial.rs",
+        CAMERAS / "equirectangular.rs",
         CAMERAS / "mod.rs",
-        "radial::Radial;",
-        r"\bRadial\b(?! distortion)|\"radial\"",
+        "equirectangular::Equirectangular;",
+        r"\bEquirectangular\b|\"equirectangular\"",
         [*CRATE, *BINDING, *PACKAGE],
     ),
     "format": (FORMATS / "bundler.py", FORMATS / "registry.py", '"bundler",', r"bundler", PACKAGE),

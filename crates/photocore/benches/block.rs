@@ -110,7 +110,7 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
 
 /// Returns the block with one camera for all photographs, with free focal length and two free radial terms.
 fn with_shared_camera(block: &Network) -> Network {
-    let camera = Bal { focal_length: -PRINCIPAL_DISTANCE, radial: [0.0; 2] };
+    let camera = Bal { parameters: [-PRINCIPAL_DISTANCE, 0.0, 0.0] };
     Network { cameras: vec![Camera::new(camera.into(), vec![f64::INFINITY; 3])], ..block.clone() }
 }
 

@@ -146,7 +146,7 @@ fn a_camera_has_a_name_and_as_many_parameters_as_its_model() {
 
 #[test]
 fn a_lens_beyond_which_nothing_is_seen_says_so() {
-    let barrel = Bal { focal_length: 1000.0, radial: [-0.3, 0.0] };
+    let barrel = Bal { parameters: [1000.0, -0.3, 0.0] };
     // r (1 - 0.3 r^2) increases to r = 1.054.
     let edge = 1000.0 * (1.0f64 / 0.9).sqrt() * 2.0 / 3.0;
     assert!(barrel.direction([edge - 1.0, 0.0]).is_some());

@@ -40,7 +40,7 @@ fn image(unknowns: [C; 12]) -> [C; 2] {
 /// Returns a photo with nine parameters: rotation vector, translation, f, k1, k2.
 fn bal_photo([a, b, c, x, y, z, f, k1, k2]: [f64; 9]) -> geometry::View<Bal> {
     let orientation = Orientation::from_vectors([a, b, c].into(), [x, y, z].into());
-    geometry::View { orientation, camera: Bal { focal_length: f, radial: [k1, k2] } }
+    geometry::View { orientation, camera: Bal { parameters: [f, k1, k2] } }
 }
 
 fn ground(position: [f64; 3]) -> GroundPoint {
@@ -139,7 +139,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
     };
     let coarse_camera = |i: usize| {
         let [focal_length, k1, k2] = [6, 7, 8].map(|k| coarse(i, k));
-        Camera::new(Bal { focal_length, radial: [k1, k2] }.into(), vec![f64::INFINITY; 3])
+        Camera::new(Bal { parameters: [focal_length, k1, k2] }.into(), vec![f64::INFINITY; 3])
     };
     let coarse_point = |i: usize| {
         let exact = position(i);

@@ -33,7 +33,7 @@ fn noise(index: usize) -> f64 {
 const BROWN: [f64; 11] = [-1000.0, 3.0, -5.0, -5e-8, 2e-13, 0.0, 1e-6, -2e-6, 3e-4, -2e-4, 300.0];
 
 fn cameras() -> Vec<Camera> {
-    let bal = |focal_length, radial| geometry::Camera::from(Bal { focal_length, radial });
+    let bal = |f, [k1, k2]: [f64; 2]| geometry::Camera::from(Bal { parameters: [f, k1, k2] });
     vec![
         Camera::new(bal(1000.0, [0.05, -0.02]), vec![FREE; 3]),
         // Weighted, free, fixed.

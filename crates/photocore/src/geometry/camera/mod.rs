@@ -81,8 +81,6 @@ macro_rules! cameras {
 
 cameras! { $
     perspective::Perspective;
-    bal::Bal;
-    radial::Radial;
     equirectangular::Equirectangular;
     brown_forward::BrownForward;
     plate::Plate;
@@ -109,6 +107,8 @@ cameras! { $
         SimplePinhole;
         Pinhole;
         SimpleRadial;
+        Radial;
+        Bal;
         Opencv;
         FullOpencv;
         OpencvPinhole;

@@ -63,7 +63,8 @@ pub struct Equidistant;
 impl RayProjection for Equidistant {
     #[inline(always)]
     fn project([x, y, z]: [f64; 3], _: [f64; 2]) -> Seen {
-        let (rho, square) = (x.hypot(y), x * x + y * y);
+        let square = x * x + y * y;
+        let rho = square.sqrt();
         let distance = square + z * z;
         // theta / rho, and (Z / d - theta / rho) / rho^2.
         let (h, bend) = if rho < SMALL * z {

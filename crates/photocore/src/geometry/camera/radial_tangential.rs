@@ -31,13 +31,14 @@ pub struct RadialTangential {
 pub struct DistortionTerms {
     /// Highest powers of N and D.
     pub powers: [usize; 2],
-    /// Whether thin-prism terms exist.
+    /// Whether tangential and thin-prism terms exist.
+    pub tangential: bool,
     pub prism: bool,
 }
 
 impl DistortionTerms {
     /// All terms.
-    pub const ALL: Self = Self { powers: ALL_POWERS, prism: true };
+    pub const ALL: Self = Self { powers: ALL_POWERS, tangential: true, prism: true };
 }
 /// p3, p4 of the profile 1 + p3 q + p4 q^2, which multiplies the tangential terms (Brown 1966).
 pub type Profile = [f64; 2];
@@ -78,15 +79,19 @@ impl RadialTangential {
         let reciprocal = d.recip();
         let factor = n * reciprocal;
         let slope = 2.0 * (by_n - factor * by_d) * reciprocal;
-        let cross = slope * a * b + 2.0 * (t1 * b + t2 * a);
-        let mut xy = [
-            a * factor + t1 * (square + 2.0 * a * a) + 2.0 * t2 * a * b,
-            b * factor + t2 * (square + 2.0 * b * b) + 2.0 * t1 * a * b,
-        ];
-        let mut by_place = [
-            [factor + slope * a * a + 6.0 * t1 * a + 2.0 * t2 * b, cross],
-            [cross, factor + slope * b * b + 6.0 * t2 * b + 2.0 * t1 * a],
-        ];
+        let (mut xy, cross) = ([a * factor, b * factor], slope * a * b);
+        let mut by_place = [[factor + slope * a * a, cross], [cross, factor + slope * b * b]];
+        if terms.tangential {
+            let cross = cross + 2.0 * (t1 * b + t2 * a);
+            xy = [
+                xy[0] + t1 * (square + 2.0 * a * a) + 2.0 * t2 * a * b,
+                xy[1] + t2 * (square + 2.0 * b * b) + 2.0 * t1 * a * b,
+            ];
+            by_place = [
+                [by_place[0][0] + 6.0 * t1 * a + 2.0 * t2 * b, cross],
+                [cross, by_place[1][1] + 6.0 * t2 * b + 2.0 * t1 * a],
+            ];
+        }
         if terms.prism {
             for (k, [first, second]) in [[s1, s2], [s3, s4]].into_iter().enumerate() {
                 let along = 2.0 * (first + 2.0 * second * square);
@@ -171,8 +176,9 @@ impl Distorted {
 /// Role of a camera parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
-    /// Both focal lengths; the focal length of columns; of rows.
+    /// Both focal lengths; both with y upwards; the focal length of columns; of rows.
     F,
+    FUp,
     Fx,
     Fy,
     /// Principal point.
@@ -210,24 +216,23 @@ pub(super) enum Action {
 impl Role {
     pub const fn unit(self) -> Unit {
         match self {
-            Self::F | Self::Fx | Self::Fy | Self::Cx | Self::Cy | Self::W | Self::H | Self::B1 | Self::B2 => {
-                Unit::Image
-            }
             Self::Skew | Self::Own(_) | Self::N(_) | Self::D(_) | Self::T(_) | Self::S(_) | Self::P(_) => {
                 Unit::One
             }
+            _ => Unit::Image,
         }
     }
 }
 
 /// Returns the lens terms of the given roles.
 pub(super) const fn terms(roles: &[Role]) -> DistortionTerms {
-    let mut terms = DistortionTerms { powers: [0, 0], prism: false };
+    let mut terms = DistortionTerms { powers: [0, 0], tangential: false, prism: false };
     let mut i = 0;
     while i < roles.len() {
         match roles[i] {
             Role::N(power) if power > terms.powers[0] => terms.powers[0] = power,
             Role::D(power) if power > terms.powers[1] => terms.powers[1] = power,
+            Role::T(_) => terms.tangential = true,
             Role::S(_) => terms.prism = true,
             _ => {}
         }
@@ -263,6 +268,7 @@ impl Parts {
     pub fn take(&mut self, role: Role, value: f64) {
         match role {
             Role::F => (self.focal[0], self.focal[1]) = (self.focal[0] + value, self.focal[1] + value),
+            Role::FUp => (self.focal[0], self.focal[1]) = (self.focal[0] + value, self.focal[1] - value),
             Role::Fx | Role::B1 => self.focal[0] += value,
             Role::Fy => self.focal[1] += value,
             Role::Cx => self.origin[0] += value,
@@ -297,7 +303,7 @@ impl Parts {
         }
         let straight = RadialFactor::NONE;
         let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens };
-        let first = first.bend_by(ab, DistortionTerms { prism: false, ..terms });
+        let first = first.bend_by(ab, DistortionTerms { tangential: false, prism: false, ..terms });
         let last = RadialTangential { radial: straight, ..self.lens };
         let last = last.bend_by(first.xy, DistortionTerms { powers: [0, 0], ..terms });
         let (to, from) = (last.by_place, first.by_place);
@@ -323,6 +329,7 @@ impl Parts {
         let through = |m: &Matrix2, v: [f64; 2]| self.moved(super::inverse::times(m, v));
         match role {
             Role::F => [a, b],
+            Role::FUp => [a, -b],
             Role::Fx => [a + self.skew * b, 0.0],
             Role::Fy => [0.0, b],
             Role::Cx => [1.0, 0.0],

@@ -56,7 +56,7 @@ macro_rules! cameras_of_vision {
             const NAME: &'static str = $said;
             const PARAMETERS: &'static [(&'static str, Unit)] = &[$(($parameter, $role.unit())),*];
             const CONSTANTS: usize = $constants;
-            const DOWN: bool = true;
+            const DOWN: bool = !matches!(Self::ROLES[0], FUp);
             $(const $lanes: bool = true;)?
             const FORMULA: &'static str = $formula;
 
@@ -138,6 +138,15 @@ cameras_of_vision! {
     SimpleRadial[4] = "simple_radial", Central, Whole, 0,
         central!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k r^2)"),
         ["f": F, "cx": Cx, "cy": Cy, "k": N(1)], IN_LANES;
+    /// RADIAL of COLMAP: two radial terms.
+    Radial[5] = "radial", Central, Whole, 0,
+        "p = (P1, -P2) / -P3, image = (cx, cy) + f (1 + k1 p^2 + k2 p^4) p",
+        ["f": F, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
+    /// Camera of Bundler and of "Bundle Adjustment in the Large" (Agarwal, Snavely, Seitz and Szeliski 2010): image coordinates are pixels
+    /// from the principal point, x to the right and y up.
+    Bal[3] = "bal", Central, Whole, 0,
+        "p = -(P1, P2) / P3, image = f (1 + k1 p^2 + k2 p^4) p",
+        ["f": FUp, "k1": N(1), "k2": N(2)];
     /// OPENCV of COLMAP: two radial and two tangential terms; p1, p2 are P2, P1 of photogrammetry.
     Opencv[8] = "opencv", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",
