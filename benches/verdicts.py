@@ -213,6 +213,11 @@ def _bar(survey: Survey, size: float) -> Survey:
     return replace(survey, bars=[(i, j, length + size), *others])
 
 
+def _bars(survey: Survey, size: float) -> Survey:
+    """Change the scale of all distances."""
+    return replace(survey, bars=[(i, j, length * (1 + size)) for i, j, length in survey.bars])
+
+
 def _twice(survey: Survey, _: float) -> Survey:
     count = len(survey.poses)
     return replace(
@@ -324,6 +329,7 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
         _gnss(lambda s, d: np.array([rotation(*pose[3:]).T @ [0.0, d, 0.0] for pose in s.poses])),
     ),
     "one distance": ("observation", lambda s: len(s.bars) > 0, _bar),
+    "all distances": ("distance-scale", lambda s: len(s.bars) > 1, _bars),
     "principal distance": ("camera-f", lambda s: True, lambda s, d: replace(s, focal=s.focal + d)),
     "GNSS of one strip": (
         "gnss-set",
@@ -345,6 +351,11 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
         lambda s: True,
         _images(lambda s, d: np.full(s.xy.shape, d * math.sqrt(0.5))),
     ),
+    "principal point exchanged": (
+        "camera-exchanged",
+        lambda s: True,
+        _images(lambda s, _: np.full(s.xy.shape, (WIDTH - HEIGHT) / 2) * [-1.0, 1.0]),
+    ),
     "radial distortion": ("camera-radial", lambda s: True, _images(_radial)),
     "rolling shutter": ("readout-time", lambda s: s.kind == "aerial", _images(_readout)),
     "affinity": (
@@ -361,6 +372,11 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
         "camera-f-strip",
         lambda s: s.kind == "aerial" and np.ptp(s.poses[:, 1]) > 15,
         _images(lambda s, d: _by_distance(s, d, s.poses[:, 1] < s.poses[0, 1] + 15)),
+    ),
+    "distance of half of the photos": (
+        "camera-f-half",
+        lambda s: s.kind == "close range",
+        _images(lambda s, d: _by_distance(s, d, np.arange(len(s.poses)) < len(s.poses) // 2)),
     ),
     "GNSS of the next photo": ("gnss-next", lambda s: s.gnss is not None, _gnss(_next)),
     "control bent": ("bending", lambda s: s.kind == "aerial" and len(s.control) > 4, _bent),
@@ -397,6 +413,9 @@ GIVEN = {
     "camera-radial": 0.005,
     "camera-affinity": 1e-3,
     "camera-f-strip": 10.0,
+    "camera-f-half": 10.0,
+    "camera-exchanged": 1.0,
+    "distance-scale": 0.002,
     "gnss-next": 1.0,
     "bending": 0.1,
     "readout-time": 0.05,

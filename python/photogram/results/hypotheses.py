@@ -74,6 +74,7 @@ whose causes (terms of distortion) are hypotheses of their own; two flights, whi
 class Effect:
     """Effects of an undetected error on points, by the most changed coordinates."""
 
+    changes: Floats  # (d, 3) changes of the `drawn` points
     checked: bool  # Whether check points detect it
     points: int  # beyond the limit
     # Points without those that the error belongs to, beyond the limit although check points exist
@@ -81,7 +82,6 @@ class Effect:
     ratio: float  # largest change, standard deviations
     at: tuple[int, int] | None  # point and coordinate of this change
     change: float  # largest change in the linear unit
-    changes: Floats  # (d, 3) changes of the `drawn` points
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,7 +329,7 @@ class Hypotheses:
     def external_reliability(self, rows: Indices | None = None) -> Table:
         """Return the declared table of undetected errors and their effects, of all hypotheses or of some."""
         rows = np.arange(len(self.code)) if rows is None else rows
-        none = Effect(False, 0, 0, math.nan, None, math.nan, np.empty((0, 3)))
+        none = Effect(np.empty((0, 3)), False, 0, 0, math.nan, None, math.nan)
         effects = [self.effects.get(row, none) for row in rows.tolist()]
         ids = self.suspects.given.point_ids
         at = [each.at and f"{self.axes[each.at[1]].name} of {ids[each.at[0]]}" for each in effects]
@@ -410,9 +410,9 @@ def hypotheses(
     )
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
     groups = _groups(suspects, found["group"], found["index"])
-    for row, (checked, counted, others, ratio, at, most, changes) in found["effects"].items():
+    for row, (*sizes, changes) in found["effects"].items():
         of_checks, of_points = np.split(changes, [checks])
-        effects[row] = Effect(checked, counted, others, ratio, at, most, of_points)
+        effects[row] = Effect(of_points, *sizes)
         if not known or joint is None:
             continue
         group = int(groups[row])
