@@ -57,8 +57,8 @@ def shaped(
     array = numbers(name, value, missing=missing)
     wanted: Any = array.shape[:1] + shape[1:] if shape[:1] == (None,) else shape
     if array.shape != wanted:
-        if wanted is shape and (array.ndim == 0 or (one_row and array.shape == shape[1:])):
-            array = np.broadcast_to(array, wanted).copy()
+        if None not in shape and (array.ndim == 0 or (one_row and array.shape == shape[1:])):
+            array = np.full(wanted, array)
             array.flags.writeable = False
         else:
             raise argument_error(name, "shape", shape=str(shape).replace("None", "n"), actual=array.shape)
