@@ -270,20 +270,17 @@ class _Reader:
         """Return prior observations of a film; empty if it is free."""
         kind = self.kinds[photo.film]
         roll = None if film.roll is not None else kind.roll
-        names = [
-            name
-            for name, sd, held in zip(FILM[3:], kind.sd_size, film.size.deviations == 0, strict=True)
-            if not held and math.isfinite(sd)
-        ]
+        fixed = film.size.deviations == 0
+        sd = {name: kind.sd_size[k] for k, name in enumerate(FILM[3:]) if not fixed[k]}
+        sd = {name: own for name, own in sd.items() if math.isfinite(own)}
         sizes = 0.0 if roll is not None else float(kind.roll.position[0]), 0.0, 0.0
         values = dict(zip(FILM, (*film.placement.position.tolist(), *sizes), strict=True))
         own = photo.name, film.placement, film.size, roll
         if (covariance := self.covariances.over("film", photo.name, FILM)) is not None:
             return [KnownFilm(*own, FILM, list(values.values()), covariance=covariance)]
-        if not names:
+        if not sd:
             return []
-        sd = dict(zip(FILM[3:], kind.sd_size, strict=True))
-        return [KnownFilm(*own, names, [values[n] for n in names], sd=[sd[n] for n in names])]
+        return [KnownFilm(*own, [*sd], [values[name] for name in sd], sd=[*sd.values()])]
 
 
 def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[Message]) -> Cameras:
