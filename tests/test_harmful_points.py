@@ -13,7 +13,7 @@ from photogram import Block, adjust, diagnose, simulate, snoop
 from photogram.diagnosis.key_numbers import held_values
 from photogram.network import project
 from photogram.results import network_sections
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 
 def weakest_points(result):
@@ -99,7 +99,7 @@ def test_a_point_that_its_rays_do_not_determine_is_left_out(made):
     xy = np.array([10.0, 20.0])
     result = adjust(with_point(known, {0: xy, twin: xy}))
     assert result.converged
-    assert result.dropped == {"X": "its rays do not determine it"}
+    assert result.dropped == {"X": "not-determined"}
     assert "left out, its rays do not determine it: X" in [str(each) for each in result.messages]
     assert np.isfinite(result.point_sd[:-1][result.point_rays[:-1] > 0]).all()
 
@@ -156,7 +156,7 @@ def test_a_point_whose_rays_part_is_left_out(made, metres, given):
     block = with_point(made.block, images, at if given else None)
     result = diagnose(block, adjust(block)).result
     assert result.converged
-    assert result.dropped == {"X": "its rays do not meet: it ran off"}
+    assert result.dropped == {"X": "ran-off"}
     assert "left out, its rays do not meet: it ran off: X" in [str(each) for each in result.messages]
     assert not result.hints
     other = adjust(made.block)
@@ -184,7 +184,7 @@ def test_control_given_at_the_place_of_a_station_is_left_out(made):
     sd[-1] = 0.05
     result = adjust(block.replace(point_sd=sd))
     assert result.converged
-    assert result.dropped == {"X": "given at the place of a station that sees it"}
+    assert result.dropped == {"X": "at-station"}
     np.testing.assert_allclose(result.photo_sd, adjust(made.block).photo_sd, rtol=1e-9)
 
 
@@ -210,9 +210,10 @@ def test_control_beside_a_station_with_a_wrong_image_is_left_out(metres):
         without, block = beside_station(seed, metres, wrong=True)
         result = adjust(block)
         assert result.converged
-        reason = "given beside a station that sees it, and its images do not fit"
+        reason = "near-station"
         assert result.dropped == {"X": reason}
-        assert f"left out, {reason}: X" in [str(each) for each in result.messages]
+        sentence = str(phrase(f"reason.{reason}"))
+        assert f"left out, {sentence}: X" in [str(each) for each in result.messages]
         np.testing.assert_allclose(result.photo_positions, adjust(without).photo_positions, atol=1e-3)
         lines = {(each.code, each.fields.get("point")) for each in result.verdict.lines}
         assert ("line.point-left-out", "X") in lines

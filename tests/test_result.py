@@ -143,7 +143,7 @@ def test_kinds_and_rays(result):
     rays = np.bincount(result.block.image_points, minlength=len(result.block.point_ids))
     rays[-1] = 0
     np.testing.assert_array_equal(result.point_rays, rays)
-    assert dict(result.dropped) == {"SINGLE": "pass point on one photo"}
+    assert dict(result.dropped) == {"SINGLE": "pass-point-on-one-photo"}
 
 
 @pytest.mark.giant("14", "22 column 12 acts without propagation")
@@ -345,7 +345,9 @@ def test_members_of_the_document(result, document):
         "camera": sums.camera, "ground": sums.ground, "plates": sums.plates, "observations": 0.0,
         "total": sums.total
     }  # fmt: skip
-    assert document["dropped_points"] == [{"id": "SINGLE", "reason": "pass point on one photo"}]
+    assert document["dropped_points"] == [
+        {"id": "SINGLE", "code": "pass-point-on-one-photo", "reason": "pass point on one photo"}
+    ]
     assert [iteration["number"] for iteration in document["iterations"]] == [
         iteration.number for iteration in result.iterations
     ]

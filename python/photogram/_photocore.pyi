@@ -1030,7 +1030,7 @@ class Node:
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
-        """Excluded points, with reasons."""
+        """Excluded points, with the codes of the reasons."""
 
     @property
     def initial(self) -> _Floats:
@@ -1827,7 +1827,7 @@ class BlockSolution(_NetworkSolution):
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
-        """Excluded points, with reasons."""
+        """Excluded points, with the codes of the reasons."""
 
     @property
     def sums_of_squares(self) -> tuple[float, float, float, float]:

@@ -106,7 +106,7 @@ def test_rejected_points_differ_from_points_that_were_never_photographed():
     result = adjust_started(first_values(block.replace(image_xy=xy)))
     reasons = {block.point_ids[point]: REJECTED, "UNSEEN": NOT_PHOTOGRAPHED}
     assert {name: reason for name, reason in result.dropped.items() if name in reasons} == reasons
-    (said,) = [str(each) for each in result.messages if NOT_PHOTOGRAPHED in str(each)]
+    (said,) = [str(each) for each in result.messages if "not photographed" in str(each)]
     assert block.point_ids[point] not in said.split(": ")[-1].split(", ")
 
 

@@ -377,5 +377,5 @@ def test_section_11_a_singular_point_is_named(small_block):
         image_sd=np.array(0.01),
     )
     result = adjust(singular)
-    assert result.dropped["FAR"] == "its rays do not determine it"
+    assert result.dropped["FAR"] == "not-determined"
     assert "left out, its rays do not determine it: FAR" in [str(each) for each in result.messages]

@@ -228,7 +228,9 @@ def test_points_that_say_nothing_are_named(result):
     names = ("image_photos", "image_points", "image_xy", "image_sd")
     fewer = block.replace(**{name: getattr(block, name)[images] for name in names})
     found = photogram.adjust(fewer, unit_variance="unity").statement(budgets=())
-    assert json.loads(found.to_json())["not_usable"] == [{"point": "C05", "reason": "no images"}]
+    assert json.loads(found.to_json())["not_usable"] == [
+        {"point": "C05", "code": "no-images", "reason": "no images"}
+    ]
     assert any("C05" in each for each in found.judged.remarks)
 
 

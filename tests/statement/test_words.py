@@ -86,7 +86,7 @@ def test_every_verdict_datum_frame_and_reason_has_a_sentence(result):
     rust = "".join(path.read_text(encoding="utf-8") for path in (CRATE / "network").rglob("*.rs"))
     reasons = set(re.findall(r'Reason::\w+ => "([^"]+)"', rust))
     assert len(reasons) == 8
-    assert not lacking("reason", reasons | {"no images", "left out"})
+    assert not lacking("reason", reasons | {"rejected", "no-images", "left-out"})
     assert not lacking("quantity", (set(adjusted(result).things) - {"step"}) | {"distance", "linear"})
 
 

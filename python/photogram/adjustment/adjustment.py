@@ -304,7 +304,7 @@ def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message
     for point, reason in dropped.items():
         by_reason.setdefault(reason, []).append(point)
     messages += [
-        Message(phrase("adjust.left-out", reason=reason, points=", ".join(points)))
+        Message(phrase("adjust.left-out", reason=phrase(f"reason.{reason}"), points=", ".join(points)))
         for reason, points in by_reason.items()
     ]
     of_points = enumerate(block.observations.column("points") if dropped else [])

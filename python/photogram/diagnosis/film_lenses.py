@@ -29,7 +29,7 @@ distance of an indicated one from the origin, mm."""
 def lens_hints(result: Result) -> list[Message]:
     """Return mistakes in weighted lenses of films whose test as a group rejects."""
     of_photos = result.block.photo_cameras
-    if of_photos is None or result.loss is not None:
+    if of_photos is None or result.loss is not None or not result.films:
         return []
     of_films = {int(of_photos[row]) for row, _ in result.films}
     found = []

@@ -23,6 +23,7 @@ from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.page import Document, Fact, Section, about, conventions
 from photogram.show.quantity import Quantity, Table, chosen, for_people, members, named, records
 from photogram.statistics.freedom import root_mean
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -84,7 +85,9 @@ def _size_section(result: Result) -> Section:
     variance, more = result.variance_of_unit_weight, list[Fact]()
     if result.dropped:
         reasons = Counter(result.dropped.values()).items()
-        note = ", ".join(about("dropped", n=count, reason=reason) for reason, count in reasons)
+        note = ", ".join(
+            about("dropped", n=count, reason=Phrase(f"reason.{reason}")) for reason, count in reasons
+        )
         more.append(Fact.of("Points left out", len(result.dropped), note=note))
     note = about(f"unit-variance.{result.unit_variance}")
     good = [Fact.of("Variance of unit weight", variance, note=note, decimals=6)]
@@ -198,7 +201,10 @@ def _members(result: Result) -> dict[str, Any]:
         and members(test, "variance", "limits", "level", "probability") | {"rejected": side},
         **({} if result.features is None else {"features": features_members(result.features)}),
         "observations_beside_images": _beside_images(result),
-        "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
+        "dropped_points": [
+            {"id": name, "code": code, "reason": str(phrase(f"reason.{code}"))}
+            for name, code in result.dropped.items()
+        ],
     }
 
 

@@ -37,10 +37,8 @@ if TYPE_CHECKING:
     from photogram import Result
 
 HARMFUL = {
-    "its rays do not meet: it ran off": Phrase("harmful.off"),
-    "ran into the station of a photo": Phrase("harmful.station"),
-    "given at the place of a station that sees it": Phrase("harmful.at-station"),
-    "given beside a station that sees it, and its images do not fit": Phrase("harmful.near-station"),
+    reason: Phrase(f"harmful.{reason}")
+    for reason in ("ran-off", "ran-into-station", "at-station", "near-station")
 }
 """Reasons of the core for excluding points that would distort others, and messages on their images."""
 

@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
-NOT_PHOTOGRAPHED = "not photographed"
-REJECTED = "all its image observations are rejected"
+NOT_PHOTOGRAPHED, REJECTED = "not-photographed", "rejected"
 """Reasons for excluding a point without image observations: without any, or none was used."""
 
 
@@ -49,7 +48,7 @@ _OF_DATUM = ("photo_positions", "photo_attitudes", "photo_cofactors", "point_pos
 
 
 def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str, str]:
-    """Return the excluded points by name, with the reasons."""
+    """Return the excluded points by name, with the codes of the reasons."""
     reasons = {block.point_ids[point]: reason for point, reason in solution.dropped}
     rejected = [name for name in block.rejected_points if reasons.get(name) == NOT_PHOTOGRAPHED]
     return reasons | dict.fromkeys(rejected, REJECTED)
@@ -90,7 +89,9 @@ class Result(OnFilm, AdjustedNetwork):
         The adjusted common unknowns of observations, and of photos on frames, in the order of
         `block.unknowns`.
     dropped
-        Excluded points, with the reason.
+        Excluded points, with the code of the reason: `not-photographed`, `rejected` (no image observation was
+        used), `pass-point-on-one-photo`, `control-point-on-one-photo`, `not-determined` (by its rays),
+        `ran-off`, `ran-into-station`, `at-station`, `near-station`.
     datum
         The datum of coordinates and standard deviations.
     hints

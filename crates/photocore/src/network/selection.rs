@@ -42,17 +42,17 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// Returns the name of the reason in results.
-    pub fn name(self) -> &'static str {
+    /// Returns the code of the reason in results.
+    pub fn code(self) -> &'static str {
         match self {
-            Reason::NotPhotographed => "not photographed",
-            Reason::PassPointOnOnePhoto => "pass point on one photo",
-            Reason::ControlPointOnOnePhoto => "control point on one photo",
-            Reason::RanIntoStation => "ran into the station of a photo",
-            Reason::NotDetermined => "its rays do not determine it",
-            Reason::RanOff => "its rays do not meet: it ran off",
-            Reason::AtStation => "given at the place of a station that sees it",
-            Reason::NearStation => "given beside a station that sees it, and its images do not fit",
+            Reason::NotPhotographed => "not-photographed",
+            Reason::PassPointOnOnePhoto => "pass-point-on-one-photo",
+            Reason::ControlPointOnOnePhoto => "control-point-on-one-photo",
+            Reason::RanIntoStation => "ran-into-station",
+            Reason::NotDetermined => "not-determined",
+            Reason::RanOff => "ran-off",
+            Reason::AtStation => "at-station",
+            Reason::NearStation => "near-station",
         }
     }
 }

@@ -106,7 +106,7 @@ impl Node {
 
     #[getter]
     fn dropped(&self) -> Vec<(usize, &'static str)> {
-        self.node.dropped().iter().map(|dropped| (dropped.point, dropped.reason.name())).collect()
+        self.node.dropped().iter().map(|dropped| (dropped.point, dropped.reason.code())).collect()
     }
 
     #[getter]

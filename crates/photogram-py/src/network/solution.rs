@@ -205,7 +205,7 @@ impl BlockSolution {
             adjusted_unknowns: found.commons.into_iter().map(unknown_row).collect(),
             weak_cameras: found.weak.cameras,
             cameras: found.cameras.into_iter().map(camera_row).collect(),
-            dropped: found.dropped.iter().map(|dropped| (dropped.point, dropped.reason.name())).collect(),
+            dropped: found.dropped.iter().map(|dropped| (dropped.point, dropped.reason.code())).collect(),
             sums_of_squares: (sums.camera, sums.ground, sums.plates, sums.observations),
             redundancies: found
                 .redundancies

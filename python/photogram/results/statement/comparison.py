@@ -63,7 +63,7 @@ class Compared:
     # s2 and its degrees of freedom: infinite if the unit weight is known
     scale: float
     second: float
-    not_usable: tuple[tuple[str, str], ...] = ()  # Unusable points and the reasons
+    not_usable: tuple[tuple[str, str], ...] = ()  # Unusable points and the codes of the reasons
     # Number of all check points; every `step`th is used, because the joint covariance is dense
     known: int = 0
     step: int = 1
@@ -171,7 +171,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         scale=result.covariance_scale,
         second=result.freedom_of_scale,
         not_usable=tuple(
-            (name, "no images" if (why := result.dropped.get(name, "left out")) == NOT_PHOTOGRAPHED else why)
+            (name, "no-images" if (why := result.dropped.get(name, "left-out")) == NOT_PHOTOGRAPHED else why)
             for name in np.array(block.point_ids, dtype=object)[unused]
         ),
         known=len(checks.rows),

@@ -247,8 +247,8 @@ def _factor(factor: float, interval: tuple[float, float]) -> dict[str, Any]:
 
 def _remarks(found: Statement) -> Iterator[Sentence]:
     texts, of_all, standards = found.texts, found.of_all, found.standards
-    for name, reason in found.compared.not_usable[:NAMED]:
-        yield "unusable", {"point": name, "reason": texts.word("reason", reason)}
+    for name, code in found.compared.not_usable[:NAMED]:
+        yield "unusable", {"point": name, "reason": texts.word("reason", code)}
     for key in texts.missing:
         yield "language.missing", {"sentence": key}
     if not found.result.photo_given_sd.any():

@@ -22,6 +22,7 @@ from photogram.results.statement.texts import Texts
 from photogram.show.page import Part, Section, about, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, column, frame, members, members_of_each
 from photogram.statistics.freedom import coverage_factor
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result, Statement
@@ -179,8 +180,8 @@ def files_of_statement(statement: Statement) -> dict[str, bytes]:
     """Return the tables of a statement as CSV text, by the names of files."""
     unit = statement.result.block.linear_unit
     columns = frame(check_points(statement).columns)
-    for name, reason in statement.compared.not_usable:
-        values = {"point": name, "used": "no", "reason": reason, "cover": ""}
+    for name, code in statement.compared.not_usable:
+        values = {"point": name, "used": "no", "reason": str(phrase(f"reason.{code}")), "cover": ""}
         columns = {key: [*column, values.get(key, math.nan)] for key, column in columns.items()}
     files = {
         "check_points.csv": csv_text(columns, [about("statement.check-points", unit=unit)]),
@@ -231,7 +232,10 @@ def statement_members(found: Statement) -> dict[str, Any]:
         "without": {"points": dict(asked.without), "figures": figures_member(found.of_rest)}
         if asked.without
         else None,
-        "not_usable": [{"point": name, "reason": reason} for name, reason in found.compared.not_usable],
+        "not_usable": [
+            {"point": name, "code": code, "reason": str(phrase(f"reason.{code}"))}
+            for name, code in found.compared.not_usable
+        ],
         "budgets": {each.quantity: budget_member(each) for each in found.taken_apart},
         "asprs": None if standards.asprs is None else standards.asprs.member(asked, lengths_in(unit)),
         "nssda": standards.nssda_member if "nssda" in asked.standards else None,
