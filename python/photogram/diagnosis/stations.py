@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.findings import Level, Section, note, section_of
 from photogram.diagnosis.robust import MAD_TO_SD, fit
@@ -138,8 +139,12 @@ def _moved(given: Block, result: Result, section: Section) -> None:
     own = [rows[name] for name in block.photo_ids]
     axes, base = local_axes(given), _base(given)
     shifts = axes.positions(result.photo_positions) - axes.positions(given.photo_positions)[own]
-    turns = result.photo_attitudes - given.photo_attitudes[own]
-    turns = np.angle(np.exp(1j * turns))
+    # Rotation vectors, because angles also differ for equal attitudes near phi = 90 degrees.
+    before, after = (
+        geometry.photo_axes(attitudes, block.photo_to_ground)
+        for attitudes in (given.photo_attitudes[own], result.photo_attitudes)
+    )
+    turns = _photocore.rotation_vectors(np.ascontiguousarray(before.transpose(0, 2, 1) @ after))
     unit = block.linear_unit
     # Photos on frames do not have poses of their own.
     mounted = np.isin(block.photo_ids, [each.photo for each in block.mounts])
