@@ -262,8 +262,7 @@ class Pattern:
         """`rms_sd` of all new points for known readout times; None if they are known."""
         if self.known is None or not self.new_points.any():
             return None
-        sd = (self.known.point_sd * self._point_units)[self.new_points]
-        return _triple(_rms, sd)
+        return _triple(_rms, (self.known.point_sd * self._point_units)[self.new_points])
 
     @cached_property
     def control(self) -> list[ControlQuality]:
