@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from photogram.plots.picture_data import Pictured
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
+    from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -85,6 +86,13 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.document import collection_document
 
         return collection_document(self)
+
+    @cached_property
+    def reliability_summary(self) -> ReliabilitySummary | None:
+        """The reliability summary of reports; see `AdjustedNetwork`."""
+        from photogram.results.evaluation import reliability_summary
+
+        return reliability_summary(self)
 
     @property
     def given(self) -> Collection:
