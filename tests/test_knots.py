@@ -97,7 +97,7 @@ def test_cameras_with_knots_are_values(camera, knots):
     assert camera != camera.replace(knots=2 * knots)
     assert camera.is_held
     assert not camera.replace(knot_sd=[0.2, 0.1]).is_held
-    assert "11 x 8, held" in repr(camera)
+    assert "11 x 8, fixed" in repr(camera)
     with pytest.raises(ValueError, match="read-only"):
         camera.knots[0, 0, 0] = 1.0
 
