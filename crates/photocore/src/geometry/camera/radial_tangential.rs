@@ -76,9 +76,14 @@ impl RadialTangential {
         let ([t1, t2], [[s1, s2], [s3, s4]]) = (self.tangential, self.prism);
         let square = a * a + b * b;
         let [n, d, by_n, by_d] = self.radial.at(square, terms.powers);
-        let reciprocal = d.recip();
-        let factor = n * reciprocal;
-        let slope = 2.0 * (by_n - factor * by_d) * reciprocal;
+        // A compiler does not remove factors of 0 and 1.
+        let (reciprocal, factor, slope) = if terms.powers[1] == 0 {
+            (1.0, n, 2.0 * by_n)
+        } else {
+            let reciprocal = d.recip();
+            let factor = n * reciprocal;
+            (reciprocal, factor, 2.0 * (by_n - factor * by_d) * reciprocal)
+        };
         let (mut xy, cross) = ([a * factor, b * factor], slope * a * b);
         let mut by_place = [[factor + slope * a * a, cross], [cross, factor + slope * b * b]];
         if terms.tangential {
@@ -247,6 +252,8 @@ pub(super) struct Parts {
     pub focal: [f64; 2],
     pub shear: f64,
     pub skew: f64,
+    /// Whether the camera has one of these parameters.
+    pub sheared: bool,
     pub origin: [f64; 2],
     pub own: [f64; 2],
     pub lens: RadialTangential,
@@ -260,7 +267,7 @@ impl Parts {
         let lens =
             RadialTangential { radial: RadialFactor::NONE, tangential: [0.0; 2], prism: [[0.0; 2]; 2] };
         let (origin, own) = ([0.0; 2], [0.0; 2]);
-        Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens, profile: [0.0; 2] }
+        Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, sheared: false, origin, own, lens, profile: [0.0; 2] }
     }
 
     /// Sets the value of a parameter.
@@ -275,8 +282,8 @@ impl Parts {
             Role::Cy => self.origin[1] += value,
             Role::W => self.origin[0] += 0.5 * value,
             Role::H => self.origin[1] += 0.5 * value,
-            Role::B2 => self.shear += value,
-            Role::Skew => self.skew = value,
+            Role::B2 => (self.shear, self.sheared) = (self.shear + value, true),
+            Role::Skew => (self.skew, self.sheared) = (value, true),
             Role::Own(k) => self.own[k] = value,
             Role::N(power) => self.lens.radial.numerator[power] = value,
             Role::D(power) => self.lens.radial.denominator[power] = value,
@@ -312,14 +319,16 @@ impl Parts {
     }
 
     #[inline(always)]
-    fn image(&self, [a, b]: [f64; 2]) -> [f64; 2] {
-        [self.focal[0] * a + self.shear * b + self.origin[0], self.focal[1] * b + self.origin[1]]
+    fn image(&self, ab: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.moved(ab);
+        [x + self.origin[0], y + self.origin[1]]
     }
 
     /// Transforms a change of a, b to a change of the image.
     #[inline(always)]
     fn moved(&self, [a, b]: [f64; 2]) -> [f64; 2] {
-        [self.focal[0] * a + self.shear * b, self.focal[1] * b]
+        let x = self.focal[0] * a;
+        [if self.sheared { x + self.shear * b } else { x }, self.focal[1] * b]
     }
 
     /// Returns the partials of the image with respect to a parameter.
