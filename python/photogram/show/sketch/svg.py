@@ -157,7 +157,9 @@ def _markers(mark: marks.Markers, placed: Placed) -> str:
     found = []
     for colour, own in groups:
         places = dict.fromkeys(map(tuple, (own + start).round(1).tolist()))  # Without duplicates
-        data = "".join([f"M{x} {y}{sign}" for x, y in places])
+        # Typst omits paths without extent.
+        own_sign = "h.01" if sign == "h0" and len(places) == 1 else sign
+        data = "".join([f"M{x} {y}{own_sign}" for x, y in places])
         fill = (mark.face or colour) if sign.endswith("z") else ""
         found.append(_path(data, stroke=colour, fill=fill, **look))
     return "".join(found)
