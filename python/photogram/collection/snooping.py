@@ -165,7 +165,7 @@ def check(network: Collection, threads: int | None) -> Diagnosis:
         )
         section.figure("robust adjustment", adjusted.status)
     except AdjustmentError as error:
-        section.remark(str(phrase("collection.no-robust-start", error=error)))
+        section.remark("collection.no-robust-start", error=error)
     sections, result = check_block(as_block(network), Manner({"threads": threads}))
     return Diagnosis("", [section, *sections], result)
 

@@ -94,9 +94,9 @@ def _fitting(block: Block, suspects: Suspects, adjusted: Adjuster, edited: Edite
     if not bad.any():
         return block, suspected
     names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]
-    edited.section.remark(f"adjusted without the photos that do not fit: {', '.join(names)}")
+    edited.section.remark("check.remark.without-photos", photos=names)
     if edited.reason:
-        edited.section.remark(f"with them: {edited.reason}")
+        edited.section.remark("check.remark.with-photos", reason=edited.reason)
     edited.first, edited.reason = _adjusted(of_photos(good, ~bad), adjusted)
     return of_photos(block, ~bad), suspected[~bad[block.image_photos]]
 

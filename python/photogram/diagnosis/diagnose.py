@@ -142,7 +142,7 @@ def _started(block: Block) -> tuple[Block | None, Section]:
     except (AdjustmentError, InputError) as error:
         note(section, "grave", phrase("check.no-first-values.all", reason=str(error)))
         return None, section
-    section.remark(f"{len(found.sources)} of {len(block.photo_ids)} photos have initial values")
+    section.remark("check.remark.started", n=len(found.sources), count=len(block.photo_ids))
     for photo, why in found.missing.items():
         note(section, "grave", phrase("check.no-first-values.photo", photo=photo, reason=why), [photo])
     aside = found.set_aside

@@ -92,8 +92,9 @@ class Section:
     parts: list[Part] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
 
-    def remark(self, sentence: str) -> None:
-        """Add a sentence."""
+    def remark(self, code: str, /, **fields: object) -> None:
+        """Add the sentence of a code."""
+        sentence = str(phrase(code, **fields))
         self.parts.append(Text(f"{sentence[:1].upper()}{sentence[1:].removesuffix('.')}."))
 
     def figure(self, name: str, value: object) -> None:

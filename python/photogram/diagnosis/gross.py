@@ -225,7 +225,7 @@ def _control(rays: Rays, section: Section) -> Bools:
     met = rays.intersect().positions
     control = np.flatnonzero(held.any(axis=1) & np.isfinite(met).all(axis=1))
     if not control.size:
-        section.remark("no control point is intersected")
+        section.remark("check.remark.no-control")
         return np.zeros(len(block.point_ids), dtype=bool)
     given = np.where(held[control], block.point_positions[control], rays.axes.from_local(met[control]))
     differences = np.where(held[control], met[control] - rays.axes.positions(given), np.nan)

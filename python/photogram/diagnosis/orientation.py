@@ -52,11 +52,9 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
         section.findings.append(finding("grave", bars.message, kind="convention"))
         view = view.changed(bars.change)
     if section.findings:
-        section.remark("the sections below hold with this put right")
+        section.remark("check.remark.corrected")
     if not exact:
-        section.remark(
-            "the size of a pixel and the origin are known only about: nothing below is called grave"
-        )
+        section.remark("check.remark.approximate")
     if view is start:
         note_all(section, "convention", "grave", [*readings(view.seen), *latitudes(view.seen)])
     return section, _sides(blocks, view, explanations, words), view, exact

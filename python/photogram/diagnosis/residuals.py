@@ -30,7 +30,7 @@ def residuals(result: Result, spread: float) -> Section:
     _sums(result, section)
     plain = without_lenses(result.block)
     if len(plain.image_xy) < len(result.block.image_xy):
-        section.remark("images beyond what the lens sees: no patterns over the frame")
+        section.remark("check.remark.outside-lens")
         return section
     spread = max(spread, ROUNDING)
     _frame_pattern(result, plain, spread, section)

@@ -42,16 +42,14 @@ def stations(block: Block, result: Result | None) -> Section:
     axes = local_axes(block)
     positions, cameras = axes.positions(block.photo_positions), axes.cameras()
     if not flown(block):
-        section.remark("the photos do not look down, as those of an aircraft do: no paths")
+        section.remark("check.remark.no-paths")
         return section
     strips = strips_of(positions)
     heights = block.photo_positions[:, 2]
     paths = [
         _path(positions[strip], heights[strip], cameras[strip]) for strip in strips if len(strip) >= FEWEST
     ]
-    section.remark(
-        f"{len(strips)} strips; {len(paths)} of them long enough ({FEWEST} photos) to judge the {which} path"
-    )
+    section.remark(f"check.remark.{which}-paths", n=len(strips), judged=len(paths), fewest=FEWEST)
     if paths:
         _compare(block, [strip for strip in strips if len(strip) >= FEWEST], paths, which, section)
     return section
@@ -194,7 +192,7 @@ def two_ray_heights(result: Result) -> Section:
     section = section_of("two-ray-heights")
     block = result.block
     if not flown(block):
-        section.remark("the photos do not look down: there is no ground that heights are above")
+        section.remark("check.remark.no-ground")
         return section
     known = np.flatnonzero(result.used_points)
     positions = local_axes(block).positions(result.point_positions[known])
@@ -203,7 +201,7 @@ def two_ray_heights(result: Result) -> Section:
     count = len(two)
     two, near = _neighbours(block, positions[:, :2], known, two)
     if not two.size:
-        section.remark(f"{count} two-ray points of {len(known)}: nothing to compare")
+        section.remark("check.remark.no-neighbours", n=count, count=len(known))
         return section
     departures, extrapolation = _above_planes(positions[:, :2], heights, two, near)
     own_sd = np.sqrt(np.maximum(result.point_covariances[known[two], 2, 2], 0))

@@ -37,7 +37,7 @@ def structure_section(block: Block, result: Result | None, words: Words) -> Sect
 def _bandwidths(block: Block, result: Result | None, section: Section) -> None:
     if result is not None:
         head, figures = bandwidths(result)
-        section.remark(head)
+        section.remark("check.remark.bandwidth", description=head)
         for name, value in figures:
             section.figure(name, value)
         bandwidth = structure(result.block.image_photos, result.block.image_points).effective_bandwidth
@@ -49,10 +49,8 @@ def _bandwidths(block: Block, result: Result | None, section: Section) -> None:
             f"{bandwidth} sets of three effective, {structured.naive_bandwidth} without sharing",
         )
     photos = (bandwidth - 1) // 2
-    section.remark(
-        f"{bandwidth} sets hold {photos} photos at a time: a photo may share points with {max(photos - 1, 0)}"
-        " photos before it or after it in FRAMES"
-    )
+    reach = max(photos - 1, 0)
+    section.remark("check.remark.sets", sets=bandwidth, photos=photos, reach=reach)
 
 
 def _parts(block: Block, section: Section) -> None:

@@ -39,7 +39,12 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     # Photos on a trajectory may be tied by other observations than points.
     structure.findings = [each for each in structure.findings if at_rest.issuperset(each.photos)]
     section = section_of("moving")
-    section.remark(f"{flown_by(block)}: of {counted(len(timed), 'photo')} {int(timed.sum())} are on one")
+    section.remark(
+        "check.remark.moving",
+        flown=flown_by(block),
+        photos=counted(len(timed), "photo"),
+        timed=int(timed.sum()),
+    )
     try:
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:

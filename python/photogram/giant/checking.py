@@ -64,7 +64,7 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     sections, result = check_block(block, Manner(options, _GuideWords(), why))
     files = Section("Input", "Remarks on the files, and the warnings of the 1987 program.")
     counts = {"photos": len(block.photo_ids), "points": len(block.point_ids), "images": len(block.image_xy)}
-    files.remark(str(phrase("giant.counts", **counts)))
+    files.remark("giant.counts", **counts)
     files.findings += [Finding("remark", "look", str(message)) for message in project.messages]
     for warning in error_warnings(project, block, limits):
         files.figure(warning.heading.capitalize(), ", ".join(warning.names))
