@@ -65,7 +65,8 @@ pub struct BrownTerms {
 
 impl BrownTerms {
     /// Nonzero terms of the lens.
-    pub(super) const TERMS: DistortionTerms = DistortionTerms { powers: [3, 0], tangential: true, prism: false };
+    pub(super) const TERMS: DistortionTerms =
+        DistortionTerms { powers: [3, 0], tangential: true, prism: false };
 
     /// Returns the lens with the radial factor 1 + R.
     #[inline(always)]
