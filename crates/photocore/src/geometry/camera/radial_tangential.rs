@@ -31,8 +31,9 @@ pub struct RadialTangential {
 pub struct DistortionTerms {
     /// Highest powers of N and D.
     pub powers: [usize; 2],
-    /// Whether tangential and thin-prism terms exist.
+    /// Whether tangential terms exist.
     pub tangential: bool,
+    /// Whether thin-prism terms exist.
     pub prism: bool,
 }
 
@@ -76,7 +77,7 @@ impl RadialTangential {
         let ([t1, t2], [[s1, s2], [s3, s4]]) = (self.tangential, self.prism);
         let square = a * a + b * b;
         let [n, d, by_n, by_d] = self.radial.at(square, terms.powers);
-        // A compiler does not remove factors of 0 and 1.
+        // The compiler must keep products with zero, which are not a number for infinite factors.
         let (reciprocal, factor, slope) = if terms.powers[1] == 0 {
             (1.0, n, 2.0 * by_n)
         } else {

@@ -1,6 +1,6 @@
 //! External reliability: what an undetected error changes of the points.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, Vector3};
 
 use super::super::suspects::Home;
 use super::super::trial::Trial;
@@ -134,17 +134,20 @@ impl<'a> Sample<'a> {
 
     /// Noncentrality of the tests of the check points if they change: of all together, or of the worst coordinate.
     fn shown(&self, changes: &[[f64; 3]]) -> f64 {
-        let ratios = changes.iter().flatten().zip(self.facts.check_sd.iter().flatten());
-        let single = ratios.map(|(change, sd)| (change / sd).powi(2)).filter(|own| own.is_finite());
-        let all: Vec<f64> = changes.iter().flatten().take(3 * self.facts.check_sd.len()).copied().collect();
+        let (sd, weights) = (&self.facts.check_sd, &self.facts.check_weights);
+        let ratios =
+            changes.iter().flatten().zip(sd.iter().flatten()).map(|(change, sd)| (change / sd).powi(2));
+        let single = ratios.filter(|own| own.is_finite()).fold(0.0, f64::max);
+        let count = 3 * sd.len();
+        if weights.is_empty() || weights.len() != count * count {
+            return single;
+        }
+        let weights = DMatrixView::from_slice(weights, count, count);
         // Missing differences have no weights.
-        let weighted = |row: &[f64]| {
-            row.iter().zip(&all).filter(|own| *own.0 != 0.0).map(|(w, own)| w * own).sum::<f64>()
-        };
-        let rows = self.facts.check_weights.chunks_exact(all.len().max(1)).zip(&all);
-        let rows = rows.filter(|(row, _)| row.iter().any(|w| *w != 0.0));
-        let together: f64 = rows.map(|(row, own)| own * weighted(row)).sum();
-        single.fold(if together.is_finite() { together } else { 0.0 }, f64::max)
+        let known = |k: usize| if weights[(k, k)] == 0.0 { 0.0 } else { changes[k / 3][k % 3] };
+        let own = DVector::from_fn(count, |k, _| known(k));
+        let together = own.dot(&(weights * &own));
+        if together.is_finite() { single.max(together) } else { single }
     }
 
     /// The effect of one of these errors; `own` are points that it belongs to.
