@@ -16,7 +16,7 @@ import numpy as np
 from photogram import formats
 from photogram.formats.colmap.content import Camera, Images, Model, Points
 from photogram.formats.colmap.files import binary_files, read_model
-from photogram.formats.isis.network import ControlNetwork, measures_of, points_of, read_network
+from photogram.formats.isis.network import ControlMeasures, ControlNetwork, ControlPoints, read_network
 from photogram.formats.isis.writing import binary_network, network_text
 from photogram.io.delimited import read_columns
 from photogram.io.places import Place
@@ -92,15 +92,16 @@ def _control_network(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.
     """Read the records as measures of a control network, binary and as text."""
     order = np.argsort(points, kind="stable")
     counts = np.bincount(points)
-    measured = {
-        "serial": (photos[order].astype(np.int32), [f"LRO/{k}/NACL" for k in range(int(photos.max()) + 1)]),
-        "types": np.full(len(points), 3, dtype=np.int8),
-        "sample": xy[order, 0],
-        "line": xy[order, 1],
-    }
-    named = {"ids": [f"T{k:06d}" for k in range(len(counts))], "types": np.full(len(counts), 2, np.int8)}
+    measures = ControlMeasures(
+        [f"LRO/{k}/NACL" for k in range(int(photos.max()) + 1)],
+        photos[order].astype(np.int32),
+        np.full(len(points), 3, dtype=np.int8),
+        sample=xy[order, 0],
+        line=xy[order, 1],
+    )
+    named = ControlPoints([f"T{k:06d}" for k in range(len(counts))], np.full(len(counts), 2, np.int8))
     firsts = np.concatenate([[0], np.cumsum(counts)])
-    network = ControlNetwork(points_of(named), measures_of(measured), firsts)
+    network = ControlNetwork(named, measures, firsts)
     path.write_bytes(binary_network(network))
     timed("Control network, binary", lambda: read_network(path))
     path.write_bytes(network_text(network))

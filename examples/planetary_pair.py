@@ -20,7 +20,13 @@ import numpy as np
 from photogram import Attitudes, Result, Spheroid, adjust, formats
 from photogram.formats import ReadOptions
 from photogram.formats.csm import SupportedImage, read_support
-from photogram.formats.isis import POINT_TYPES, ControlNetwork, measures_of, network_text, points_of
+from photogram.formats.isis import (
+    POINT_TYPES,
+    ControlMeasures,
+    ControlNetwork,
+    ControlPoints,
+    network_text,
+)
 from photogram.network import geocentric_to_geographic, geographic_to_geocentric
 
 RADIUS, HEIGHT, SPEED = 1737.4, 50.0, 1.66
@@ -131,23 +137,21 @@ def simulate(folder: Path, seed: int = 7) -> np.ndarray:
     square = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0]) * CONTROL**2
     types = np.where(control, POINT_TYPES.index("Constrained"), POINT_TYPES.index("Free"))
     count, held = len(points), control[:, np.newaxis]
-    given = np.where(held, known, np.nan)
-    columns = {
-        "ids": [f"point_{k:02d}" for k in range(count)],
-        "types": types.astype(np.int8),
-        "apriori_covariance": np.where(held, square, np.nan),
-        **{f"apriori_{axis}": given[:, k] for k, axis in enumerate("xyz")},
-        **{f"{name}_constrained": control for name in ("latitude", "longitude", "radius")},
-    }
-    measures = {
-        "serial": (np.tile(np.arange(2, dtype=np.int32), count), [f"SIM/{side}" for side in SIDES]),
-        "types": np.full(2 * count, 3, dtype=np.int8),
-        "sample": samples,
-        "line": lines,
-    }
     network = ControlNetwork(
-        points_of(columns),
-        measures_of(measures),
+        ControlPoints(
+            [f"point_{k:02d}" for k in range(count)],
+            types.astype(np.int8),
+            apriori=np.where(held, known, np.nan),
+            apriori_covariance=np.where(held, square, np.nan),
+            constrained=np.repeat(held, 3, axis=1),
+        ),
+        ControlMeasures(
+            [f"SIM/{side}" for side in SIDES],
+            np.tile(np.arange(2, dtype=np.int32), count),
+            np.full(2 * count, 3, dtype=np.int8),
+            samples,
+            lines,
+        ),
         2 * np.arange(count + 1),
         network_id="simulated_pair",
         target="Moon",

@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from photogram.formats.isis import ControlNetwork, measures_of, points_of, read_network
+from photogram.formats.isis import ControlMeasures, ControlNetwork, ControlPoints, read_network
 
 LABEL = 65536
 
@@ -155,8 +155,7 @@ def full_message():
 
 def small():
     """Return a network made of nothing but columns."""
-    points = points_of(
-        {"ids": ["A", "B"], "types": np.array([2, 4], np.int8), "adjusted_x": np.array([1.0, 2.0])}
-    )
-    measures = measures_of({"serial": (np.zeros(3, np.int32), ["S"]), "types": np.ones(3, np.int8)})
+    adjusted = np.array([[1.0, np.nan, np.nan], [2.0, np.nan, np.nan]])
+    points = ControlPoints(["A", "B"], np.array([2, 4], np.int8), adjusted=adjusted)
+    measures = ControlMeasures(["S"], np.zeros(3, np.int32), np.ones(3, np.int8))
     return ControlNetwork(points, measures, np.array([0, 1, 3]))

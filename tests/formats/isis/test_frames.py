@@ -11,7 +11,7 @@ from photogram import adjust, formats
 from photogram.formats import ReadOptions
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
-from photogram.formats.isis import FORMAT, ControlNetwork, measures_of, network_text, points_of
+from photogram.formats.isis import FORMAT, ControlMeasures, ControlNetwork, ControlPoints, network_text
 from photogram.formats.isis.outcome import Outcome, contents_of
 
 
@@ -33,16 +33,17 @@ def network(folder, images, ground):
     there = np.isfinite(seen).all(axis=2)
     assert there.any(axis=1).all()
     count = len(ground)
-    columns = {"ids": [f"p{k}" for k in range(count)], "types": np.full(count, 4, dtype=np.int8)}
-    columns |= {f"apriori_{axis}": ground[:, k] for k, axis in enumerate("xyz")}
-    measures = {
-        "serial": (np.nonzero(there)[1].astype(np.int32), [each.name for each in images]),
-        "types": np.full(there.sum(), 3, dtype=np.int8),
-        "line": seen[there][:, 0],
-        "sample": seen[there][:, 1],
-    }
+    types = np.full(count, 4, dtype=np.int8)
+    points = ControlPoints([f"p{k}" for k in range(count)], types, apriori=ground)
+    measures = ControlMeasures(
+        [each.name for each in images],
+        np.nonzero(there)[1].astype(np.int32),
+        np.full(there.sum(), 3, dtype=np.int8),
+        sample=seen[there][:, 1],
+        line=seen[there][:, 0],
+    )
     starts = np.append(0, np.cumsum(there.sum(axis=1)))
-    own = ControlNetwork(points_of(columns), measures_of(measures), starts, target="Moon")
+    own = ControlNetwork(points, measures, starts, target="Moon")
     path = folder / "own.net"
     path.write_bytes(network_text(own))
     return path

@@ -59,7 +59,7 @@ def _rms(outcome: Outcome, image: Image) -> list[float]:
     if not len(residuals):
         return [np.nan] * 3
     squares = (residuals**2).mean(axis=0)
-    return np.sqrt([*squares, squares.mean()]).tolist()
+    return list(np.sqrt([*squares, squares.mean()]))
 
 
 def _images(outcome: Outcome, images: Mapping[Image, list[Parameter]]) -> _Columns:
@@ -132,7 +132,7 @@ def _residuals(outcome: Outcome) -> _Columns:
 def _report(outcome: Outcome, images: Mapping[Image, list[Parameter]], points: _Columns) -> Iterator[str]:
     """Yield the lines of `bundleout.txt`."""
     network, settings = outcome.contents.network, outcome.contents.settings
-    facts = {
+    facts: dict[str, dict[str, object]] = {
         "JIGSAW: BUNDLE ADJUSTMENT": {
             "Network Id": network.network_id or "",
             "Network Filename": outcome.contents.path,
@@ -160,8 +160,8 @@ def _report(outcome: Outcome, images: Mapping[Image, list[Parameter]], points: _
         yield f"Image Serial Number: {image.serial}"
         name, power, unit, *cells = zip(*own, strict=True)
         units = [f"({each}{f'/t^{k}' if k else ''})" for each, k in zip(unit, power, strict=True)]
-        heads = (("Image",), ("",), *((cell,) for cell in _CELLS))
-        yield from [*_lines(list(zip(heads, (name, units, *cells), strict=True))), ""]
+        names = [(head,) for head in ("Image", "", *_CELLS)]
+        yield from [*_lines(list(zip(names, (name, units, *cells), strict=True))), ""]
     yield from [*_title("POINTS"), *_lines(points)]
 
 

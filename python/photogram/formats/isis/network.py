@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,16 +59,12 @@ _ABSENT: Mapping[type, np.generic] = {
 """Missing values of columns by type."""
 
 
-_no_column: Callable[..., Any] = field  # Declares a field that is no column
-
-
-def _column(kind: type, *names: str, width: int = 1) -> Any:
-    """Declare a column: type, names of the engine if it has several columns, numbers per row."""
-    return field(metadata={"absent": _ABSENT[kind], "names": names, "width": len(names) or width})
-
-
-def _axes(kind: type, form: str, names: str = "x y z") -> Any:
-    return _column(kind, *(form.format(name) for name in names.split()))
+def _column(kind: type, names: str = "", width: int = 1) -> Any:
+    """Declare a column: type, names in the engine if each number of a row has one, numbers per row."""
+    own = tuple(names.split())
+    return field(
+        default=None, metadata={"absent": _ABSENT[kind], "names": own, "shape": (len(own) or width,)}
+    )
 
 
 def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
@@ -77,7 +73,7 @@ def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
 
 
 class _Columns:
-    """Columns of points or measures, all with the same number of rows."""
+    """Columns of points or measures, all with the same number of rows; missing ones have missing values."""
 
     rest: _Rest
 
@@ -86,15 +82,40 @@ class _Columns:
 
     def __post_init__(self) -> None:
         rows = len(self)
-        for name, column in _columns(type(self)).items():
-            width = column["width"]
-            _check_shape(name, getattr(self, name), (rows,) if width == 1 else (rows, width))
+        if self.rest is None:
+            object.__setattr__(self, "rest", (np.zeros(0, np.uint8), np.zeros(rows + 1, np.int64)))
+        for name, column in self._declared().items():
+            shape = (rows, *column["shape"]) if column["shape"] != (1,) else (rows,)
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.broadcast_to(column["absent"], shape))
+            _check_shape(name, getattr(self, name), shape)
         _check_shape("rest[1]", self.rest[1], (rows + 1,))
 
+    @classmethod
+    def _declared(cls) -> dict[str, Mapping[str, Any]]:
+        return {each.name: each.metadata for each in fields(cls) if each.metadata}  # type: ignore[arg-type]
 
-def _columns(kind: type[_Columns]) -> dict[str, Mapping[str, Any]]:
-    """Return the declarations of the columns of points or measures."""
-    return {each.name: each.metadata for each in fields(kind) if each.metadata}  # type: ignore[arg-type]
+    @classmethod
+    def of(cls, own: dict[str, Any]) -> Self:
+        """Create columns from those of the engine."""
+        for name, column in cls._declared().items():
+            parts = {each: own.pop(each) for each in column["names"] if each in own}
+            if parts:
+                missing = np.full_like(next(iter(parts.values())), column["absent"])
+                own[name] = np.column_stack([parts.get(each, missing) for each in column["names"]])
+        return cls(**own)
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of the engine, without empty ones."""
+        found: dict[str, Any] = {"rest": self.rest}
+        for name, own in self._declared().items():
+            absent, values = own["absent"], getattr(self, name)
+            pairs = zip(own["names"], values.T, strict=True) if own["names"] else [(name, values)]
+            for each, column in pairs:
+                same = not any(column.strides)
+                if column.size and not (same and np.array_equal(column.flat[0], absent, equal_nan=True)):
+                    found[each] = np.ascontiguousarray(column, dtype=absent.dtype)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +135,18 @@ class ControlPoints(_Columns):
     # (n,) index into `SOURCES`: origin of the a-priori coordinates, and of the radius
     apriori_source: _Codes = _column(np.int8)
     apriori_radius_source: _Codes = _column(np.int8)
-    apriori: Floats = _axes(np.float64, "apriori_{}")  # (n, 3) coordinates before an adjustment
+    apriori: Floats = _column(
+        np.float64, "apriori_x apriori_y apriori_z"
+    )  # (n, 3) coordinates before an adjustment
     apriori_covariance: Floats = _column(np.float64, width=6)
     # (n, 3) whether latitude, longitude and radius are weighted
-    constrained: Bools = _axes(np.bool_, "{}_constrained", "latitude longitude radius")
-    adjusted: Floats = _axes(np.float64, "adjusted_{}")  # (n, 3) coordinates of an adjustment
+    constrained: Bools = _column(np.bool_, "latitude_constrained longitude_constrained radius_constrained")
+    adjusted: Floats = _column(
+        np.float64, "adjusted_x adjusted_y adjusted_z"
+    )  # (n, 3) coordinates of an adjustment
     adjusted_covariance: Floats = _column(np.float64, width=6)
     # All other message fields as bytes, and the start of each point (n + 1); written unchanged
-    rest: _Rest = _no_column()
+    rest: _Rest = None  # type: ignore[assignment]  # Created if missing
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -159,7 +184,7 @@ class ControlMeasures(_Columns):
     edit_lock: Bools = _column(np.bool_)  # (m,) the measure must not be edited
     ignore: Bools = _column(np.bool_)
     rejected: Bools = _column(np.bool_)
-    rest: _Rest = _no_column()
+    rest: _Rest = None  # type: ignore[assignment]  # Created if missing
 
     def __len__(self) -> int:
         return len(self.serial)
@@ -207,6 +232,20 @@ class ControlNetwork:
     def __post_init__(self) -> None:
         _check_shape("firsts", self.firsts, (len(self.points) + 1,))
 
+    @classmethod
+    def of(cls, columns: tuple[dict[str, Any], dict[str, Any], NDArray[np.int64]], **header: Any) -> Self:
+        """Create a network from columns of the engine."""
+        points, measures, firsts = columns
+        measures["serial"], measures["serials"] = measures["serial"]
+        return cls(ControlPoints.of(points), ControlMeasures.of(measures), firsts, **header)
+
+    def columns(self) -> tuple[dict[str, Any], dict[str, Any], NDArray[np.int64]]:
+        """Return the columns of the engine: of points, of measures, first measures."""
+        points, measures = self.points.columns(), self.measures.columns()
+        points["ids"] = list(self.points.ids)
+        measures["serial"] = np.ascontiguousarray(self.measures.serial, np.int32), list(self.measures.serials)
+        return points, measures, self.firsts
+
     @property
     def point_of_measure(self) -> NDArray[np.int64]:
         """(m,) the point of each measure."""
@@ -218,66 +257,14 @@ class ControlNetwork:
         return self.measures.ignore | self.points.ignore[self.point_of_measure]
 
 
-def _from_core(kind: type[_Columns], columns: Mapping[str, Any], rows: int) -> dict[str, Any]:
-    """Return columns of points or measures; an empty one has missing values."""
-    found = {"rest": columns.get("rest", (np.zeros(0, np.uint8), np.zeros(rows + 1, np.int64)))}
-    for name, own in _columns(kind).items():
-        absent, names, width = own["absent"], own["names"] or (name,), own["width"]
-        if not any(each in columns for each in names):
-            shape = (rows,) if width == 1 else (rows, width)
-            found[name] = np.broadcast_to(absent, shape)
-        elif len(names) == 1:
-            found[name] = columns[name]
-        else:
-            parts = [columns.get(each) for each in names]
-            missing = np.broadcast_to(absent, rows)
-            found[name] = np.column_stack([missing if part is None else part for part in parts])
-    return found
-
-
-def _to_core(table: _Columns) -> dict[str, Any]:
-    """Return points or measures as columns of the engine, without empty columns."""
-    found: dict[str, Any] = {"rest": table.rest}
-    for name, own in _columns(type(table)).items():
-        absent, values = own["absent"], getattr(table, name)
-        pairs = zip(own["names"], values.T, strict=True) if own["names"] else [(name, values)]
-        for each, column in pairs:
-            same = not any(column.strides)
-            if column.size and not (same and np.array_equal(column.flat[0], absent, equal_nan=True)):
-                found[each] = np.ascontiguousarray(column, dtype=absent.dtype)
-    return found
-
-
-def points_of(columns: Mapping[str, Any]) -> ControlPoints:
-    """Return points from columns of the engine: `ids`, `types`, and optional ones."""
-    ids = columns["ids"]
-    return ControlPoints(ids=ids, **_from_core(ControlPoints, columns, len(ids)))
-
-
-def measures_of(columns: Mapping[str, Any]) -> ControlMeasures:
-    """Return measures from engine columns `serial`, `types` and optional ones."""
-    serial, serials = columns["serial"]
-    own = _from_core(ControlMeasures, columns, len(serial))
-    return ControlMeasures(serials=serials, serial=serial, **own)
-
-
-def columns_of_points(points: ControlPoints) -> dict[str, Any]:
-    """Return points as columns of the engine."""
-    return {"ids": list(points.ids), **_to_core(points)}
-
-
-def columns_of_measures(measures: ControlMeasures) -> dict[str, Any]:
-    """Return measures as columns of the engine."""
-    serial = np.ascontiguousarray(measures.serial, dtype=np.int32)
-    return {"serial": (serial, list(measures.serials)), **_to_core(measures)}
-
-
 LABEL_BYTES = 65536  # Bytes of the label of a binary network, padded with zeros
 _FIRST_OBJECT = re.compile(rb"\s*(?:(?:#|/\*)[^\n]*\n\s*)*object\s*=\s*(\w+)", re.IGNORECASE)
 _BINARY, _TEXT = "protobuffer", "controlnetwork"
 _BINARY_VERSIONS = ("2", "5")
 _TEXT_VERSIONS = ("3", "4", "5")
 _OLDEST = "1"  # Version of a network without a version
+_LISTED = 2  # Version whose header contains the lengths of points
+_PLACES = ("HeaderStartByte", "HeaderBytes", "PointsStartByte", "PointsBytes")
 _HEADER = {key.lower(): name for key, name in HEADER.items()}
 
 
@@ -311,12 +298,9 @@ def read_network(path: Path) -> ControlNetwork:
     """
     data = read_bytes(path)
     kind = _kind(data)
-    if kind == _BINARY:
-        network = _binary(data, path)
-    elif kind == _TEXT:
-        network = _text(data, path)
-    else:
-        raise InputError(phrase("isis.network", value=str(kind)), file=path)
+    if kind not in (_BINARY, _TEXT):
+        raise InputError(phrase("isis.network", value=kind), file=path)
+    network = (_binary if kind == _BINARY else _text)(data, path)
     ids = network.points.ids
     if len(set(ids)) < len(ids):
         first: dict[str, int] = {}
@@ -326,21 +310,26 @@ def read_network(path: Path) -> ControlNetwork:
     return network
 
 
-def _check_version(version: str, known: tuple[str, ...], what: str, path: Path) -> None:
+def _version(group: Group, known: tuple[str, ...], what: str, path: Path) -> int:
+    version = str(group.get("Version") or _OLDEST)
     if version not in known:
         raise InputError(phrase("isis.version", kind=what, version=version, names=list(known)), file=path)
+    return int(version)
 
 
-def _whole(group: Group, key: str, path: Path, *, required: bool = False) -> int | None:
+def _others(known: Container[str], *groups: Group) -> Group:
+    """Return the keys and groups of a header that a network has no fields for."""
+    items = [item for group in groups for item in group.items if item[0].lower() not in known]
+    inside = [each for group in groups for each in group.inside if all(each is not own for own in groups)]
+    return Group("", "label", items=items, inside=inside)
+
+
+def _whole(group: Group, key: str, path: Path) -> int | None:
     """Return an integer that is not negative; None if the key is missing."""
     value = group.get(key)
-    if value is None:
-        if required:
-            raise InputError(phrase("format.member", name=key), file=path, record=group.line)
-        return None
-    if not isinstance(value, str) or re.fullmatch(r"\d{1,18}", value) is None:
+    if value is not None and (not isinstance(value, str) or re.fullmatch(r"\d{1,18}", value) is None):
         raise InputError(phrase("format.whole", name=key, value=value), file=path, record=group.line)
-    return int(value)
+    return None if value is None else int(value)
 
 
 def _binary(data: bytes, path: Path) -> ControlNetwork:
@@ -352,41 +341,42 @@ def _binary(data: bytes, path: Path) -> ControlNetwork:
     label = parsed(text, path, numbers=False)
     buffer = label.need("ProtoBuffer", path)
     core, info = (buffer.need(name, path) for name in ("Core", "ControlNetworkInfo"))
-    version = str(info.get("Version") or _OLDEST)
-    _check_version(version, _BINARY_VERSIONS, "binary", path)
-    keys = ("HeaderStartByte", "HeaderBytes", "PointsStartByte", "PointsBytes")
-    start, size, points, points_size = (int(_whole(core, key, path, required=True) or 0) for key in keys)
+    version = _version(info, _BINARY_VERSIONS, "binary", path)
+    places = []
+    for key in _PLACES:
+        if (place := _whole(core, key, path)) is None:
+            raise InputError(phrase("format.member", name=key), file=path, record=core.line)
+        places.append(place)
+    start, size, first, points_size = places
     texts, count, lengths, radii, rest = _photocore.control_header(data, start, start + size, path)
-    listed = lengths if version == "2" else None
-    columns, measures, firsts = _photocore.control_points(data, points, points + points_size, listed, path)
-    known = {*_HEADER, "numberofpoints", "numberofmeasures", "version"}
-    others = Group("", "label", items=[item for item in info.items if item[0].lower() not in known])
-    others.items += label.items + buffer.items
-    read = {id(buffer), id(core), id(info)}
-    others.inside = [each for each in label.inside + buffer.inside if id(each) not in read]
-    header: dict[str, Any] = dict(zip(MESSAGE, texts, strict=True))
-    header |= {"radii": np.array(radii), "header_rest": rest, "version": int(version), "others": others}
-    network = ControlNetwork(points_of(columns), measures_of(measures), firsts, **header)
+    listed = lengths if version == _LISTED else None
+    columns = _photocore.control_points(data, first, first + points_size, listed, path)
+    known = {*_HEADER, "numberofpoints", "numberofmeasures", "version", *map(str.lower, _PLACES)}
+    network = ControlNetwork.of(
+        columns,
+        **dict(zip(MESSAGE, texts, strict=True)),
+        version=version,
+        radii=np.array(radii),
+        others=_others(known, info, label, buffer, core),
+        header_rest=rest,
+    )
     for said, found, what in (
-        (count, len(network.points), "points"),
-        (_whole(info, "NumberOfPoints", path), len(network.points), "points"),
-        (_whole(info, "NumberOfMeasures", path), len(network.measures), "measures"),
+        (count, network.points, "points"),
+        (_whole(info, "NumberOfPoints", path), network.points, "points"),
+        (_whole(info, "NumberOfMeasures", path), network.measures, "measures"),
     ):
-        if said is not None and said != found:
-            raise InputError(phrase("isis.count", count=said, what=what, n=found), file=path)
+        if said is not None and said != len(found):
+            raise InputError(phrase("isis.count", count=said, what=what, n=len(found)), file=path)
     return network
 
 
 def _text(data: bytes, path: Path) -> ControlNetwork:
-    (points, measures, firsts), around = _photocore.control_points_of_text(
-        data.removeprefix(b"\xef\xbb\xbf"), path
-    )
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    columns, around = _photocore.control_points_of_text(data, path)
     label = parsed(around, path, numbers=False)
     network = label.need("ControlNetwork", path)
-    _check_version(str(network.get("Version") or _OLDEST), _TEXT_VERSIONS, "text", path)
+    version = _version(network, _TEXT_VERSIONS, "text", path)
     header: dict[str, Any] = {}
-    others = Group("", "label", items=[*label.items])
-    others.inside = network.inside + [each for each in label.inside if each is not network]
     for key, value in network.items:
         if (name := _HEADER.get(key.lower())) is not None:
             if not isinstance(value, str):
@@ -394,21 +384,16 @@ def _text(data: bytes, path: Path) -> ControlNetwork:
             header[name] = value
         elif key.lower() == "targetradii":
             header["radii"] = _radii(value, network, path)
-        elif key.lower() != "version":
-            others.items.append((key, value))
-    header |= {"version": int(str(network.get("Version"))), "others": others}
-    return ControlNetwork(points_of(points), measures_of(measures), firsts, **header)
+    others = _others({*_HEADER, "targetradii", "version"}, label, network)
+    return ControlNetwork.of(columns, **header, version=version, others=others)
 
 
 def _radii(value: Value, network: Group, path: Path) -> Floats:
+    own, unit = value if isinstance(value, Quantity) else (value, "meters")
     try:
-        if isinstance(value, Quantity):
-            if value.unit.lower() != "meters":
-                raise ValueError
-            value = value.value
-        radii = np.array([float(str(each)) for each in (value if isinstance(value, list) else [value])])
-        if not np.isfinite(radii).all():
-            raise ValueError
-    except ValueError:
-        raise InputError(phrase("isis.radii", value=str(value)), file=path, record=network.line) from None
+        radii = np.array(own if isinstance(own, list) else [own], dtype=float)
+    except (TypeError, ValueError):
+        radii = np.array(np.nan)
+    if unit.lower() != "meters" or radii.ndim != 1 or not np.isfinite(radii).all():
+        raise InputError(phrase("isis.radii", value=str(value)), file=path, record=network.line)
     return radii

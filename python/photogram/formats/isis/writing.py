@@ -31,8 +31,6 @@ from photogram.formats.isis.network import (
     LABEL_BYTES,
     MESSAGE,
     ControlNetwork,
-    columns_of_measures,
-    columns_of_points,
     is_binary,
 )
 from photogram.formats.isis.outcome import Image, Outcome, contents_of
@@ -65,8 +63,7 @@ def binary_network(network: ControlNetwork) -> bytes:
         If columns are inconsistent, or a value that was read from text cannot be written to a binary network.
         The message names the value and the point.
     """
-    columns = columns_of_points(network.points), columns_of_measures(network.measures)
-    points = _photocore.control_point_messages(*columns, network.firsts)
+    points = _photocore.control_point_messages(*network.columns())
     texts = [getattr(network, name) for name in MESSAGE]
     radii = network.radii.tolist()
     header = _photocore.control_header_message(texts, len(network.points), radii, network.header_rest)
@@ -101,8 +98,7 @@ def network_text(network: ControlNetwork) -> bytes:
     """
     if network.header_rest:
         raise InputError(phrase("isis.fields"))
-    columns = columns_of_points(network.points), columns_of_measures(network.measures)
-    points = _photocore.control_point_text(*columns, network.firsts)
+    points = _photocore.control_point_text(*network.columns())
     items = _header(network)
     if network.radii.size:
         items.append(("TargetRadii", list[Value](network.radii.tolist())))
