@@ -12,7 +12,7 @@ FAULTS = [
     ("drone", "cameras.csv", "inf,down", "inf,sideways", ["record 2", "readout_direction", "sideways"]),
     ("drone", "cameras.csv", "0.02,inf", ",inf", ["record 2", "error.column readout: error.empty"]),
     ("drone", "cameras.csv", "3000,2000", ",", ["record 2", "plain.picture-edges"]),
-    ("drone", "cameras.csv", "0.02,inf", "0.02,-1", ["record 2", "sd of readout rows"]),
+    ("drone", "cameras.csv", "0.02,inf", "0.02,-1", ["record 2", "column sd_readout"]),
     ("drone", "photos.csv", "DJI_0,drone", "DJI_0,phone", ["record 2", "column camera"]),
     ("drone", "velocities.csv", "DJI_0,", "DJI_9,", ["record 2", "error.unknown.close photo DJI_9"]),
     ("drone", "velocities.csv", "DJI_0,", "DJI_0,x", ["record 2", "column vx"]),

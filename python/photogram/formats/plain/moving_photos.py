@@ -49,7 +49,7 @@ def read_timed(
     rigs: Mapping[str, Rig],
 ) -> list[Timed]:
     """Read the motion of photos: on trajectories, or of their own."""
-    table, lines = photos.table, _line_times(tables, photos)
+    table, lines = photos.table, _line_times(tables)
     if _COLUMNS.isdisjoint(table.columns) and not any((lines, *cameras.shutters, *cameras.lines)):
         return []
     on = named_of(table, "trajectory", trajectories, "trajectory")
@@ -128,11 +128,10 @@ def _on_rig(
     return rig.sensors.get(sensor), rig.clocks.get(sensor)
 
 
-def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
+def _line_times(tables: Tables) -> dict[str, Lines]:
     """Return the line times by photo name."""
     table = tables.rows("line_times")
-    names = [*photos.names, *sorted(photos.unused)]
-    groups = rows_of(table, "photo", {name: row for row, name in enumerate(names)})
+    groups = rows_of(tables, "line_times")
     values = table.given(("line", "time", "seconds_per_line"))
     increasing(table, groups, "line")
     return {name: made(table, int(rows[0]), Lines, values[rows]) for (name,), rows in groups.items()}

@@ -6,11 +6,12 @@ objects that the column names, and their content for docs/formats/plain-tables.m
 `unknown` declare a shared unknown: its class, field and rule (see :class:`Parameter`). A row without columns
 declares the table: its observations, whether it may have a coordinate system, and the lengths of its `[sd]`.
 
-Kinds of text are `text`, `word` (one of the words in backticks of the content), `point`, `photo`, `shared`
-(an unknown), `group` (of unknowns) and `subject` (a photo, or a trajectory at a time). Kinds of numbers are
-`number`, `place` (a position in the frame of the project), `body` (a vector in the axes of a photo),
-`attitude`, `turn` (an attitude relative to a photo), `mounting` (the inverse of a `turn`), `sd`, and `matrix`
-or `body matrix` (with covariances).
+Kinds of text are `text`, `key` (the name of the row, once), `ref` (a name in the table `field`), `word` (one
+of the words in backticks of the content), `flag`, `point`, `photo`, `shared` (an unknown), `group` (of
+unknowns) and `subject` (a photo, or a trajectory at a time). Kinds of numbers are `number`, `whole`, `place`
+(a position in the frame of the project), `body` (a vector in the axes of a photo), `attitude`, `turn` (an
+attitude relative to a photo), `mounting` (the inverse of a `turn`), `sd`, and `matrix` or `body matrix` (with
+covariances).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from photogram import _photocore
 from photogram.formats.column_words import KINDS_OF_UNITS, UNITS
@@ -47,7 +48,7 @@ ANGLES: Mapping[str, tuple[str, ...]] = {
 """Columns of each representation of attitudes."""
 OPK = ANGLES["omega_phi_kappa"]  # Representation in written files
 ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
-ANGULAR = frozenset((*ALL_ANGLES[:9], *ROTATIONS))  # Columns with a unit of angles
+ANGULAR = frozenset((*ALL_ANGLES[:9], *ROTATIONS))  # Columns with a unit of angles, also among lengths
 
 
 def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
@@ -75,8 +76,9 @@ FILM_MODELS = ("affine", "conformal", "bilinear", "projective")
 BENDS = ("bend_x", "bend_y")  # Deflections of a board
 PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a board
 
+TURNS = ("attitude", "turn", "mounting")  # Kinds of columns with rotations
 REQUIRED, SETTINGS = "required", "[sd]"  # Defaults of cells that may not be empty, or that the settings fill
-_TEXTS = frozenset(("text", "word", "point", "photo", "shared", "group", "subject"))
+TEXTS = frozenset(("text", "key", "ref", "word", "flag", "point", "photo", "shared", "group", "subject"))
 _GROUPS = {
     "@parameters": sorted(
         {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
@@ -106,7 +108,7 @@ class Column(NamedTuple):
         names = self.components
         if self.kind == "sd":
             return deviation_columns(names) or ("sd",)
-        if self.kind in ("attitude", "turn", "mounting"):
+        if self.kind in TURNS:
             return ALL_ANGLES
         if not self.kind.endswith("matrix"):
             return names
@@ -131,7 +133,7 @@ class Column(NamedTuple):
     def unit_of(self, name: str) -> str:
         """Return the unit of a column; covariances and quaternions have none."""
         angular = name.removeprefix("sd_") in ANGULAR
-        if name.startswith("cov_") or (self.unit == "angle" and not angular):
+        if name.startswith("cov_") or (self.kind in TURNS and not angular):
             return ""
         return "angle" if self.unit and angular else self.unit
 
@@ -229,14 +231,18 @@ class Schema:
         return self._names(text=False)
 
     def _names(self, *, text: bool) -> tuple[str, ...]:
-        columns = [column for column in self.all_columns if (column.kind in _TEXTS) is text]
+        columns = [column for column in self.all_columns if (column.kind in TEXTS) is text]
         return tuple(dict.fromkeys(name for column in columns for name in column.names))
 
     @cached_property
-    def defaults(self) -> dict[str, float]:
-        """Numbers of empty cells by column, if they are declared."""
-        columns = (column for column in self.all_columns if not math.isnan(column.number))
-        return {name: column.number for column in columns for name in column.names}
+    def defaults(self) -> dict[str, Any]:
+        """Numbers and words of empty cells by column, if they are declared."""
+        found: dict[str, Any] = {}
+        for column in self.all_columns:
+            word = column.words[0] if column.words and column.default.startswith("`") else math.nan
+            value = word if math.isnan(column.number) else column.number
+            found |= dict.fromkeys(column.names if value == value else (), value)
+        return found
 
     @cached_property
     def words(self) -> dict[str, tuple[str, ...]]:
@@ -283,5 +289,5 @@ def column_units(name: str, length: str = "m", angle: str = "deg", image: str = 
         "mm": ("length", UNITS["mm"]),
         "time": ("time", 1.0),
     }
-    columns = [column for column in TABLES[name].all_columns if column.kind not in _TEXTS]
+    columns = [column for column in TABLES[name].all_columns if column.kind not in TEXTS]
     return {each: units.get(column.unit_of(each), ("", 1.0)) for column in columns for each in column.names}

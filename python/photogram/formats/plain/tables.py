@@ -21,7 +21,9 @@ from photogram.formats.plain.schema import (
     ANGLES,
     ANGULAR,
     AXES,
+    REQUIRED,
     TABLES,
+    TEXTS,
     column_units,
     covariance_columns,
 )
@@ -186,23 +188,59 @@ class Tables:
         path, columns = self.settings.path, TABLES[name].columns
         return ColumnTable(path, Place(path), columns, 0, dict.fromkeys(columns, ()), ())
 
-    def records(self, name: str) -> list[dict[str, Any]]:
-        """Return texts and numbers of the filled cells of each row by column; deviations may be infinite."""
+    def records(self, name: str, *, defaults: bool = False) -> list[dict[str, Any]]:
+        """Return the filled cells of each row by column, with all checks of the declaration.
+
+        Angles are in radians; standard deviations may be infinite. `defaults` adds the declared defaults.
+        """
         table, schema = self.rows(name), TABLES[name]
-        columns: dict[str, Sequence[Any]] = {
-            each: table.words(each, schema.words[each], "", optional=True)
-            if each in schema.words
-            else table.texts(each)
-            for each in schema.texts
-            if each in table
-        }
-        for each in schema.numbers:
-            if each in table:
-                columns[each] = table.numbers(each, infinite=each.startswith("sd")).tolist()
+        there = [each for each in dict.fromkeys(schema.columns) if each in table]
+        columns = {each: self.column(name, each) for each in there}
+        first = schema.defaults if defaults else {}
         return [
-            {each: own[row] for each, own in columns.items() if own[row] != "" and own[row] == own[row]}
+            first
+            | {each: own[row] for each, own in columns.items() if own[row] != "" and own[row] == own[row]}
             for row in range(table.count)
         ]
+
+    def column(self, table_name: str, name: str) -> Sequence[Any]:
+        """Return the cells of a column, with all checks of its declaration; empty texts and NaN are missing."""
+        table = self.rows(table_name)
+        column = next(each for each in TABLES[table_name].all_columns if name in each.names)
+        required = column.default == REQUIRED
+        match column.kind:
+            case "key":
+                return table.names_once(name)
+            case "word":
+                return table.words(name, column.words, "", optional=not required)
+            case "flag":
+                return table.flags(name).tolist()
+            case "ref" if required:
+                known = self.names_in(column.field)
+                indices_of(table, name, dict(zip(known, range(len(known)), strict=True)), name)
+            case "ref":
+                named_of(table, name, dict.fromkeys(self.names_in(column.field)), name)
+        if column.kind in TEXTS:
+            return table.texts(name)
+        is_sd = column.kind == "sd"
+        angular = column.unit_of(name) == "angle"
+        values = (
+            self.angles(table, [name], infinite=is_sd)[:, 0]
+            if angular
+            else table.numbers(name, infinite=is_sd)
+        )
+        if required:
+            table.check_given(values[:, np.newaxis], [name])
+        if is_sd:
+            check_not_negative(table, [name], values[:, np.newaxis])
+        if column.kind == "whole" and (parts := values % 1 > 0).any():
+            row = int(np.argmax(parts))
+            raise table.cell_error(row, name, "error.whole", value=float(values[row]))
+        return [int(each) if column.kind == "whole" and each == each else each for each in values.tolist()]
+
+    def names_in(self, name: str) -> list[str]:
+        """Return the different names in the first column of a table."""
+        return list(dict.fromkeys(self.rows(name).texts(TABLES[name].columns[0])))
 
     def words(self, name: str, column: str) -> list[Any]:
         """Return a column of declared words in a table; empty cells have the default."""
@@ -292,11 +330,14 @@ class Tables:
             if common is not None:
                 own = np.where(np.isnan(own), common, own)
             found[:, k] = np.where(np.isnan(own), defaults[k], own)
-        negative = np.argwhere(found < 0)
-        if len(negative):
-            row, k = negative[0]
-            raise table.cell_error(int(row), columns[k], "error.not-negative", value=float(found[row, k]))
+        check_not_negative(table, columns, found)
         return found
+
+
+def check_not_negative(table: ColumnTable, columns: Sequence[str], values: Floats) -> None:
+    """Reject negative numbers (rows, k) of columns."""
+    for row, k in np.argwhere(values < 0)[:1].tolist():
+        raise table.cell_error(row, columns[k], "error.not-negative", value=float(values[row, k]))
 
 
 def matrices_of(settings: Settings, values: Floats) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.plain.schema import AXES, BASES, FACTORS, OPK, SD_AXES, VELOCITY
+from photogram.formats.plain.schema import AXES, BASES, FACTORS, OPK, SD_AXES, TABLES, VELOCITY
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
@@ -20,7 +20,6 @@ from photogram.formats.plain.tables import (
     columns_of_records,
     correlations,
     covariances_of,
-    indices_of,
     made,
 )
 from photogram.io.column_table import ColumnTable
@@ -53,32 +52,33 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
             path = tables.settings.tables[there[0]]
             raise InputError(phrase("error.missing", name="trajectories.csv"), file=path)
         return {}
-    names = table.names_once("trajectory")
-    places = {name: row for row, name in enumerate(names)}
-    records = _records(tables, table, places)
-    bases = [_Bases(tables, table, of, places) for of in BASES]
-    bodies = _turned(tables, "body_rotations", places, tables.flip)
-    along = tables.words("trajectories", "position_axes")
-    angles = tables.words("trajectories", "angles")
+    positions, corrections = _positions(tables), _Corrections(tables)
+    attitudes = _attitudes(tables, "trajectory_attitudes")
+    bodies = _attitudes(tables, "body_rotations", tables.flip)
     found: dict[str, Trajectory] = {}
-    for row, name in enumerate(names):
-        own = records[row]
-        position, rotation = (each.of(row, name, own) for each in bases)
-        body = bodies.get(name)
-        if body is not None:
-            # The matrix of a body transforms from inertial axes, an attitude in the opposite direction.
-            body = body[0], np.swapaxes(body[1], 1, 2)
-        values = own, position, rotation, body, along[row], angles[row]
-        found[name] = made(table, row, Trajectory, name, *values)
+    for row, cells in enumerate(tables.records("trajectories", defaults=True)):
+        name = cells["trajectory"]
+        for what, known in (("positions", positions), ("attitudes", attitudes)):
+            if name not in known:
+                raise table.error(row, phrase("plain.no-rows", name=name, table=f"trajectory_{what}"))
+        times, values = positions[name]
+        hermite = cells["interpolation"] == "hermite"
+        if hermite and np.isnan(values).any():
+            raise table.cell_error(row, "interpolation", "plain.hermite")
+        velocities = values[:, 3:] if hermite else None
+        kinds = cells["interpolation"], cells["attitude_interpolation"]
+        own = made(table, row, Table, times, values[:, :3], *attitudes[name], velocities, *kinds)
+        bases = [corrections.basis(row, cells, of, own.span) for of in BASES]
+        # The matrix of a body transforms from inertial axes, an attitude in the opposite direction.
+        body = (bodies[name][0], np.swapaxes(bodies[name][1], 1, 2)) if name in bodies else None
+        axes = cells["position_axes"], cells["angles"]
+        found[name] = made(table, row, Trajectory, name, own, *bases, body, *axes)
     return found
 
 
-def rows_of(table: ColumnTable, column: str, places: Mapping[str, int], *, bases: bool = False) -> Groups:
+def rows_of(tables: Tables, name: str, *, bases: bool = False) -> Groups:
     """Return the rows of each photo or trajectory or, if `bases`, of each correction of trajectories."""
-    indices_of(table, column, places, column)
-    words: Sequence[Sequence[str]] = [table.texts(column)]
-    if bases:
-        words = [*words, table.words("of", BASES, "")]
+    words = [tables.column(name, column) for column in (TABLES[name].columns[0], *(["of"] if bases else []))]
     found: dict[tuple[str, ...], list[int]] = {}
     for row, key in enumerate(zip(*words, strict=True)):
         found.setdefault(key, []).append(row)
@@ -97,159 +97,94 @@ def increasing(table: ColumnTable, groups: Groups, column: str = "time", *, mult
     return times
 
 
-def _turned(
-    tables: Tables, name: str, places: Mapping[str, int], flip: Floats | None = None
-) -> dict[str, tuple[Floats, Floats]]:
+def _attitudes(tables: Tables, name: str, axes: Floats | None = None) -> dict[str, tuple[Floats, Floats]]:
     """Return (k,) times and (k, 3, 3) attitudes by trajectory."""
     table = tables.rows(name)
-    groups = rows_of(table, "trajectory", places)
+    groups = rows_of(tables, name)
     times, matrices = increasing(table, groups), tables.matrices(table)
     tables.check_known(table, matrices)
-    if flip is not None:
-        matrices = matrices @ flip
+    if axes is not None:
+        matrices = matrices @ axes
     return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
 
 
-def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> list[Table]:
-    """Return the sampled trajectory of each row."""
-    own = tables.rows("trajectory_positions")
-    groups = rows_of(own, "trajectory", places)
-    times, values = increasing(own, groups), np.column_stack([own.given(AXES), own.vectors(VELOCITY)])
-    check_complete(own, values[:, 3:], phrase("plain.all-or-none", columns=list(VELOCITY)))
-    positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
-    attitudes = _turned(tables, "trajectory_attitudes", places)
-    kinds = [tables.words("trajectories", f"{of}interpolation") for of in ("", "attitude_")]
-    found = []
-    for name, row in places.items():
-        for what, known in (("positions", positions), ("attitudes", attitudes)):
-            if name not in known:
-                raise table.error(row, phrase("plain.no-rows", name=name, table=f"trajectory_{what}"))
-        times, values = positions[name]
-        hermite = kinds[0][row] == "hermite"
-        if hermite and np.isnan(values).any():
-            raise table.cell_error(row, "interpolation", "plain.hermite")
-        velocities = values[:, 3:] if hermite else None
-        given = times, values[:, :3], *attitudes[name], velocities, kinds[0][row], kinds[1][row]
-        found.append(made(table, row, Table, *given))
-    return found
+def _positions(tables: Tables) -> dict[str, tuple[Floats, Floats]]:
+    """Return (k,) times, and (k, 6) positions and velocities, by trajectory."""
+    table, groups = tables.rows("trajectory_positions"), rows_of(tables, "trajectory_positions")
+    times, values = increasing(table, groups), np.column_stack([table.given(AXES), table.vectors(VELOCITY)])
+    check_complete(table, values[:, 3:], phrase("plain.all-or-none", columns=list(VELOCITY)))
+    return {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
 
 
+_KINDS: Mapping[str, type[Basis]] = {"polynomial": Polynomial, "spline": Spline}
+_PAIRS = ("smooth", "correlation")  # Numbers with a standard deviation
 _COLUMNS = {
     "none": (),
     "polynomial": ("degree", "reference", "scale"),
-    "spline": ("degree", "every", "smooth", "correlation"),
+    "spline": ("degree", "every", *_PAIRS),
 }
 """Columns of each basis."""
 _ALL = tuple(dict.fromkeys(name for names in _COLUMNS.values() for name in names))
 
 
-class _Bases:
-    """Bases of position or rotation corrections (`kind`) by trajectory."""
+class _Corrections:
+    """Tables of the corrections of trajectories: knots and coefficients by trajectory and `of`."""
 
-    def __init__(self, tables: Tables, table: ColumnTable, kind: str, places: Mapping[str, int]) -> None:
-        self.table, self.kind = table, kind
-        self.unit = tables.radians if kind == "rotation" else 1.0
-        self.cells = tables.records("trajectories")
-        default = tables.settings.sd.get("trajectories", (math.inf,) * 2)[BASES.index(kind)]
-        self.sd = table.numbers(f"sd_{kind}", default, infinite=True) * self.unit
-        if (negative := self.sd < 0).any():
-            row = int(np.argmax(negative))
-            raise table.cell_error(row, f"sd_{kind}", "error.not-negative", value=float(self.sd[row]))
-        own = tables.rows("trajectory_knots")
-        groups = rows_of(own, "trajectory", places, bases=True)
-        values = increasing(own, groups, "knot", multiple=True)
-        self.knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
-        self.coefficients = tables.rows("trajectory_coefficients")
-        self.rows = rows_of(self.coefficients, "trajectory", places, bases=True)
-        self.words = tables.words("trajectories", kind)
-        self.signs = np.ones((table.count, 3))  # Direction of the axes of coefficients
-        if kind == "rotation":
-            about_photo = [each != "zxz" for each in tables.words("trajectories", "angles")]
-            self.signs[about_photo] = np.diag(tables.flip)
+    def __init__(self, tables: Tables) -> None:
+        self.tables, self.table = tables, tables.rows("trajectories")
+        knots = tables.rows("trajectory_knots")
+        groups = rows_of(tables, "trajectory_knots", bases=True)
+        values = increasing(knots, groups, "knot", multiple=True)
+        self.knots = {key: values[rows] for key, rows in groups.items()}
+        self.rows = rows_of(tables, "trajectory_coefficients", bases=True)
+        self.coefficients = tables.records("trajectory_coefficients", defaults=True)
 
-    def of(self, row: int, name: str, known: Table) -> Basis | None:
-        """Return the basis of the trajectory of a row; None without corrections."""
-        word = self.words[row]
-        rows = self.rows.get((name, self.kind))
-        self._check(row, name, word, rows)
-        if word == "none":
-            return None
-        sd = float(self.sd[row])
-        basis = made(self.table, row, lambda: self._basis(row, name, word).over(*known.span))
-        if rows is None:
-            return replace(basis, sd=sd)
-        values, deviations = self._coefficients(rows, basis.count, sd)
-        values = values * self.signs[row]
-        return replace(basis, value=values, sd=deviations)
-
-    def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
-        """Reject columns of other bases."""
-        kind = self.kind
-        there = [f"{kind}_{each}" for each in _ALL if self._number(row, each) is not None]
-        others = [each for each in there if each.removeprefix(f"{kind}_") not in _COLUMNS[word]]
-        others += ["trajectory_knots"] if name in self.knots and word != "spline" else []
+    def basis(self, row: int, cells: Mapping[str, Any], of: str, span: tuple[float, float]) -> Basis | None:
+        """Return the basis of positions or rotations of the trajectory of a row; None without corrections."""
+        name, word = cells["trajectory"], cells[of]
+        fields = {each: cells[f"{of}_{each}"] for each in _ALL if f"{of}_{each}" in cells}
+        knots, rows = self.knots.get((name, of)), self.rows.get((name, of))
+        others = [f"{of}_{each}" for each in fields if each not in _COLUMNS[word]]
+        others += ["trajectory_knots"] if knots is not None and word != "spline" else []
         others += ["trajectory_coefficients"] if rows is not None and word == "none" else []
         if others:
-            other = f"{kind} {word}"
-            raise self.table.error(row, phrase("error.not-applicable", name=others[0], other=other))
-
-    def _basis(self, row: int, name: str, word: str) -> Basis:
-        degree = self._whole(row, "degree")
-        if word == "polynomial":
-            return Polynomial(degree or 0, self._number(row, "reference"), self._number(row, "scale"))
-        found = Spline(self._number(row, "every"), self.knots.get(name))
-        smooth = self._pair(row, "smooth")
-        return replace(
-            found,
-            degree=found.degree if degree is None else degree,
-            smooth=None if smooth is None else (self._whole(row, "smooth") or 0, smooth[1]),
-            correlation=self._pair(row, "correlation"),
-        )
-
-    def _number(self, row: int, what: str) -> float | None:
-        return self.cells[row].get(f"{self.kind}_{what}")
-
-    def _whole(self, row: int, what: str) -> int | None:
-        value = self._number(row, what)
-        if value is not None and value != int(value):
-            raise self.table.cell_error(row, f"{self.kind}_{what}", "error.whole", value=value)
-        return None if value is None else int(value)
-
-    def _pair(self, row: int, what: str) -> tuple[float, float] | None:
-        """Return a number and its standard deviation; None without both."""
-        column = f"{self.kind}_{what}"
-        value, sd = self.cells[row].get(column), self.cells[row].get(f"sd_{column}")
-        if value is None or sd is None:
-            if value is not None or sd is not None:
-                raise self.table.error(row, phrase("error.together", name=column, other=f"sd_{column}"))
+            message = phrase("error.not-applicable", name=others[0], other=f"{of} {word}")
+            raise self.table.error(row, message)
+        if word == "none":
             return None
-        return value, sd * self.unit
-
-    def _coefficients(self, rows: Indices, count: int, sd: float) -> tuple[Floats, Floats]:
-        """Return (K, 3) coefficients and standard deviations, with defaults."""
-        table = self.coefficients
-        values, deviations = np.zeros((count, 3)), np.full((count, 3), sd)
-        numbers = table.numbers("k")[rows]
-        given, own = table.vectors(AXES, 0.0)[rows], table.vectors(SD_AXES, infinite=True)[rows]
-        seen: set[int] = set()
-        for row, number, value, each in zip(rows.tolist(), numbers.tolist(), given, own, strict=True):
-            if number not in range(count):
-                raise table.cell_error(row, "k", "error.whole-range", low=0, high=count - 1, value=number)
-            if number in seen:
-                raise table.error(row, phrase("error.repeated", kind="coefficient", name=f"{number:g}"))
-            if (each < 0).any():
-                k = int(np.argmax(each < 0))
-                raise table.cell_error(row, SD_AXES[k], "error.not-negative", value=float(each[k]))
-            seen.add(number)
-            values[int(number)] = value * self.unit
-            deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
-        return values, deviations
+        for each in _PAIRS:
+            column, sd = f"{of}_{each}", cells.get(f"sd_{of}_{each}")
+            if (each in fields) != (sd is not None):
+                raise self.table.error(row, phrase("error.together", name=column, other=f"sd_{column}"))
+            fields |= {each: (fields[each], sd)} if each in fields else {}
+        fields |= {} if knots is None else {"knots": knots}
+        basis: Basis = made(self.table, row, lambda: _KINDS[word](**fields).over(*span))
+        unit = self.tables.radians if of == "rotation" else 1.0
+        default = self.tables.settings.sd.get("trajectories", (math.inf,) * 2)[BASES.index(of)]
+        usual = cells.get(f"sd_{of}", default * unit)
+        if rows is None:
+            return replace(basis, sd=usual)
+        values, deviations = np.zeros((basis.count, 3)), np.full((basis.count, 3), usual)
+        axes = np.diag(self.tables.flip) if of == "rotation" and cells["angles"] != "zxz" else np.ones(3)
+        seen = set[int]()
+        table = self.tables.rows("trajectory_coefficients")
+        for at in rows.tolist():
+            own = self.coefficients[at]
+            k = own["k"]
+            if k not in range(basis.count):
+                raise table.cell_error(at, "k", "error.whole-range", low=0, high=basis.count - 1, value=k)
+            if k in seen:
+                raise table.error(at, phrase("error.repeated", kind="coefficient", name=f"{k:g}"))
+            seen.add(k)
+            values[k] = np.array([own[axis] for axis in AXES]) * unit * axes
+            deviations[k] = [own[sd] * unit if sd in own else usual for sd in SD_AXES]
+        return replace(basis, value=values, sd=deviations)
 
 
 def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> list[Observation]:
     """Read sums of neighbouring coefficients."""
     table = tables.rows("smoothness")
-    groups = rows_of(table, "trajectory", {name: row for row, name in enumerate(trajectories)}, bases=True)
+    groups = rows_of(tables, "smoothness", bases=True)
     sd = tables.deviations(table, "smoothness", SD_AXES)
     table.check_given(sd, SD_AXES)
     observed, covariances = table.vectors(AXES, 0.0), covariances_of(sd, table)

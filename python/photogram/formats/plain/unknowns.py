@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.schema import ANGULAR, OPK, Column, Parameter
+from photogram.formats.plain.schema import ANGULAR, OPK, TURNS, Column, Parameter
 from photogram.formats.plain.tables import (
     Tables,
     Transform,
@@ -26,8 +26,6 @@ from photogram.network import trajectories, unknowns
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
-
-TURNS = ("attitude", "turn", "mounting")  # Kinds of columns with rotations
 
 
 def read_values(tables: Tables, table: ColumnTable, column: Column) -> Floats:
