@@ -370,7 +370,7 @@ def test_cover_of_points_that_are_off_does_not_count(project):
         ),
         ("north-1,south-1", "north-1,south-9", "error.column to: error.unknown.close point south-9 south-2"),
         ("north-1,south-1", "north-1,north-1", "plain.same-ends north-1"),
-        ("70.765", "", "error.column length: error.empty nan"),
+        ("70.765", "", "error.column length: error.empty"),
         ("70.765", "-70.765", "error.column length: error.positive -70.765"),
         ("70.765", "long", "column length"),
         ("0.005", "", "error.column sd: cells.no-sd lengths"),

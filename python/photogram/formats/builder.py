@@ -36,9 +36,9 @@ class Rig:
 
     name: str
     reference: str  # Sensor whose axes are the axes of the frame
-    sensors: Mapping[str, Sensor]  # Poses of the other sensors
+    sensors: dict[str, Sensor]  # Poses of the other sensors
     # Clocks of sensors on trajectories
-    clocks: Mapping[str, Clock] = field(default_factory=dict)
+    clocks: dict[str, Clock] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ import numpy as np
 
 from photogram.formats.plain.schema import BENDS, PITCHES, deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made
-from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
 from photogram.targets.board import Board
@@ -22,46 +21,28 @@ TIMES = "times of photos on frames"
 """Key of a detail: clock times in seconds, by names of board photos."""
 
 
-def read_boards(tables: Tables) -> dict[str, Board]:
-    """Read boards of columns and rows; others use control points."""
-    table = tables.rows("boards")
+def read_boards(tables: Tables) -> tuple[dict[str, Board], list[Figure], str | None]:
+    """Return the boards, the deflection of boards that have one, and the source of weak camera priors.
+
+    Boards of columns and rows have their own points; others use control points, which are read later.
+    """
+    table, records = tables.rows("boards"), tables.records("boards", defaults=True)
     if table.count > 1:
         raise table.error(1, phrase("plain.several-boards", count=table.count))
-    return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
-
-
-def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
-    cells = tables.records("boards")[row]
-    given: dict[str, Any] = {name: cells[name] for name in ("kind", "shape") if name in cells}
-    given["unit"] = tables.settings.length
-    if given.get("kind") == "points":
-        # Their positions are control points, which are read later.
-        given["points"] = np.zeros((0, 3))
-        return Board(**given)
-    given |= {name: int(cells.get(name, 0)) for name in ("columns", "rows")}
-    given |= {name: cells[name] for name in PITCHES[2:] if name in cells}
-    if "tag_size" not in given:
-        given["spacing"] = tuple(cells.get(name, np.nan) for name in PITCHES[:2])
-    return made(table, row, Board, **given)
-
-
-def read_regularised(tables: Tables) -> str | None:
-    """Return the source of weak camera priors; None without."""
-    return next((cells.get(REGULARISED) for cells in tables.records("boards")), None)
-
-
-def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
-    """Return the deflection of boards with free deflection."""
-    table = tables.rows("boards")
-    if all(each.shape != "bend" for each in boards.values()):
-        return []
-    values = np.nan_to_num(table.vectors(BENDS))
-    sd = table.vectors(deviation_columns(BENDS), np.inf, infinite=True)
-    return [
-        Figure(Bend(name, values[row], sd[row]), own.names, own.shifts())
-        for row, (name, own) in enumerate(boards.items())
-        if own.shape == "bend"
-    ]
+    boards, bends = dict[str, Board](), list[Figure]()
+    for row, cells in enumerate(records):
+        name, alone = cells["board"], cells["kind"] == "points"
+        fields = ("kind", "shape") if alone else ("kind", "shape", "columns", "rows", *PITCHES[2:])
+        given: dict[str, Any] = {field: cells[field] for field in fields if field in cells}
+        if alone:
+            given["points"] = np.zeros((0, 3))
+        elif "tag_size" not in given:
+            given["spacing"] = tuple(cells.get(field, np.nan) for field in PITCHES[:2])
+        boards[name] = own = made(table, row, Board, unit=tables.settings.length, **given)
+        if own.shape == "bend":
+            values, sd = ([cells[field] for field in part] for part in (BENDS, deviation_columns(BENDS)))
+            bends.append(Figure(Bend(name, values, sd), own.names, own.shifts()))
+    return boards, bends, records[0].get(REGULARISED) if records else None
 
 
 def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | None) -> dict[str, Any]:

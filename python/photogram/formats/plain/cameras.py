@@ -446,9 +446,9 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
     table = tables.rows("knots")
     splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
     values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
-    seen = set[tuple[str, float, float]]()
-    for row, cells in enumerate(tables.records("knots")):
-        name, i, j = cells.get("camera", ""), cells.get("i", math.nan), cells.get("j", math.nan)
+    seen = set[tuple[str, int, int]]()
+    for row, cells in enumerate(tables.records("knots", defaults=True)):
+        name, i, j = cells["camera"], cells["i"], cells["j"]
         if name not in splined:
             raise table.unknown_error(row, "camera", "splined camera", name, splined)
         rows, count, _ = values[name].shape
@@ -459,7 +459,7 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
             raise table.error(row, phrase("error.repeated", kind="knot", name=f"{i:g}, {j:g}"))
         seen.add((name, i, j))
         for found, columns in ((values, ("dx", "dy")), (sd, _SD)):
-            found[name][int(j), int(i)] = [cells.get(column, 0.0) for column in columns]
+            found[name][j, i] = [cells[column] for column in columns]
     with at_place(Place(tables.settings.path)):
         return [
             each.replace(knots=values[each.name], knot_sd=sd[each.name]) if each.name in splined else each

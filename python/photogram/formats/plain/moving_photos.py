@@ -124,7 +124,7 @@ def _on_rig(
     if name and name not in rigs:
         raise table.unknown_error(row, "rig", "rig", name, rigs)
     rig = rigs[name] if name else next(iter(rigs.values()))
-    sensor = sensor_of(table, row, rig, own, camera)
+    sensor = sensor_of(table, row, rig, own or camera)
     return rig.sensors.get(sensor), rig.clocks.get(sensor)
 
 

@@ -14,14 +14,7 @@ from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.names import NamedValues
 from photogram.formats.plain import SETTINGS
-from photogram.formats.plain.boards import (
-    ASSUMED,
-    REGULARISED,
-    TIMES,
-    read_bends,
-    read_boards,
-    read_regularised,
-)
+from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.film_readings import Seen
@@ -35,7 +28,7 @@ from photogram.formats.plain.photos import (
     read_images,
     read_photos,
 )
-from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
+from photogram.formats.plain.rigs import read_frames, read_rigs, times_of
 from photogram.formats.plain.schema import AXES, SD_AXES, TABLES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import read_settings, unread_tables
@@ -96,7 +89,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     # A frame without origin is defined by control, which is therefore transformed first.
     given = None if control is None else read_control(tables, control, transform)
     photos = read_photos(tables, transform, cameras)
-    rigs = read_rigs(tables, [each.name for each in cameras.cameras])
+    rigs = read_rigs(tables)
     timed = read_timed(tables, photos, cameras, trajectories, rigs)
     geographic = transform.frame.kind == "geographic"
     spheroid = Spheroid(*transform.frame.ellipsoid) if geographic else None
@@ -122,8 +115,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     photo_rows = {name: row for row, name in enumerate(photos.names)}
     known_objects = Known(places, photo_rows, photos.times.tolist(), trajectories)
     observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
-    boards = read_boards(tables)
-    bends = read_bends(tables, boards)
+    boards, bends, regularise = read_boards(tables)
     common = [*_unknowns(observations, block.mounts, timed), *(each.bend for each in bends)]
     priors = read_covariances(tables).priors(common)
     if trajectories and transform.frame != settings.frame:
@@ -153,8 +145,8 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
         details={
             "settings": settings,
             ASSUMED: assumed,
-            REGULARISED: read_regularised(tables),
-            TIMES: times_of_frames(tables) | times_said(photos.names, photos.times),
+            REGULARISED: regularise,
+            TIMES: times_of(tables, "frames") | times_of(tables, "photos"),
             **scanned.inside,
         },
     ).replace(

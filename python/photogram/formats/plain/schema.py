@@ -8,10 +8,10 @@ declares the table: its observations, whether it may have a coordinate system, a
 
 Kinds of text are `text`, `key` (the name of the row, once), `ref` (a name in the table `field`), `word` (one
 of the words in backticks of the content), `flag`, `point`, `photo`, `shared` (an unknown), `group` (of
-unknowns) and `subject` (a photo, or a trajectory at a time). Kinds of numbers are `number`, `whole`, `place`
-(a position in the frame of the project), `body` (a vector in the axes of a photo), `attitude`, `turn` (an
-attitude relative to a photo), `mounting` (the inverse of a `turn`), `sd`, and `matrix` or `body matrix` (with
-covariances).
+unknowns) and `subject` (a photo, or a trajectory at a time). Kinds of numbers are `number`, `whole`,
+`positive`, `place` (a position in the frame of the project), `body` (a vector in the axes of a photo),
+`attitude`, `turn` (an attitude relative to a photo), `mounting` (the inverse of a `turn`), `sd`, and `matrix`
+or `body matrix` (with covariances).
 """
 
 from __future__ import annotations

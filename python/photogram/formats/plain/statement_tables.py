@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from photogram.errors import InputError, message_of
 from photogram.formats.plain.schema import ENDS, TABLES
-from photogram.formats.plain.tables import Tables, indices_of
+from photogram.formats.plain.tables import Tables, columns_of_records, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.toml import TomlFile
 from photogram.messages import counted, unknown_name
@@ -52,32 +53,24 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
 
 
 def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, Any], ...]:
-    table = tables.rows("lengths")
+    table, found = tables.rows("lengths"), tables.records("lengths")
     table.names("line")
     for end in ENDS:
         indices_of(table, end, points, "point")
-    deviations = tables.deviations(table, "lengths", ("sd",))[:, 0].tolist()
-    found = tables.records("lengths")
-    for row, (cells, sd) in enumerate(zip(found, deviations, strict=True)):
-        if not cells.get("length", 0.0) > 0:
-            code = "error.positive" if "length" in cells else "error.empty"
-            raise table.cell_error(row, "length", code, value=cells.get("length", math.nan))
+    sd = tables.deviations(table, "lengths", ("sd",))
+    table.check_given(np.where(np.isinf(sd), np.nan, sd), ("sd",), "lengths")
+    for row, cells in enumerate(found):
         if cells["from"] == cells["to"]:
             raise table.error(row, phrase("plain.same-ends", name=cells["from"]))
-        if not sd < math.inf:
-            raise table.cell_error(row, "sd", "cells.no-sd", table="lengths")
-        cells["sd"] = sd
+        cells["sd"] = float(sd[row, 0])
     return tuple(found)
 
 
 def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the columns of the table of lengths."""
-    if not lengths:
-        return {}
-    columns = {name: [each[name] for each in lengths] for name in ("line", *ENDS, "length", "sd")}
-    if any("temperature" in each for each in lengths):
-        columns["temperature"] = [each.get("temperature") for each in lengths]
-    return columns
+    return columns_of_records(
+        {name: each.get(name) for name in TABLES["lengths"].columns} for each in lengths
+    )
 
 
 def with_cover(

@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.column_words import is_angular
 from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, is_geographic, nameless, settled
@@ -108,6 +108,12 @@ class Shared:
 
 
 _Named = TypeVar("_Named")
+_NUMBERS: Mapping[str, tuple[str, Callable[[Floats], Bools]]] = {
+    "sd": ("error.not-negative", lambda values: values >= 0),
+    "whole": ("error.whole", lambda values: values == np.round(values)),
+    "positive": ("error.positive", lambda values: values > 0),
+}
+"""Code of the error, and the condition, of kinds of numbers."""
 DEGREE = 180 / np.pi  # Degrees per radian
 
 
@@ -204,7 +210,7 @@ class Tables:
         ]
 
     def column(self, table_name: str, name: str) -> Sequence[Any]:
-        """Return the cells of a column, with all checks of its declaration; empty texts and NaN are missing."""
+        """Return the cells of a column, with all checks of its declaration; empty text and NaN: missing."""
         table = self.rows(table_name)
         column = next(each for each in TABLES[table_name].all_columns if name in each.names)
         required = column.default == REQUIRED
@@ -221,22 +227,21 @@ class Tables:
             case "ref":
                 named_of(table, name, dict.fromkeys(self.names_in(column.field)), name)
         if column.kind in TEXTS:
-            return table.texts(name)
-        is_sd = column.kind == "sd"
-        angular = column.unit_of(name) == "angle"
-        values = (
-            self.angles(table, [name], infinite=is_sd)[:, 0]
-            if angular
-            else table.numbers(name, infinite=is_sd)
-        )
+            texts = table.texts(name)
+            if required and "" in texts:
+                raise table.cell_error(texts.index(""), name, "error.no-name", value="")
+            return texts
+        if column.unit_of(name) == "angle":
+            values = self.angles(table, [name], infinite=column.kind == "sd")
+        else:
+            values = table.vectors([name], infinite=column.kind == "sd")
         if required:
-            table.check_given(values[:, np.newaxis], [name])
-        if is_sd:
-            check_not_negative(table, [name], values[:, np.newaxis])
-        if column.kind == "whole" and (parts := values % 1 > 0).any():
-            row = int(np.argmax(parts))
-            raise table.cell_error(row, name, "error.whole", value=float(values[row]))
-        return [int(each) if column.kind == "whole" and each == each else each for each in values.tolist()]
+            table.check_given(values, [name])
+        code, valid = _NUMBERS.get(column.kind, ("", np.isreal))
+        for row in np.flatnonzero(~(valid(values[:, 0]) | np.isnan(values[:, 0])))[:1].tolist():
+            raise table.cell_error(row, name, code, value=float(values[row, 0]))
+        convert = int if column.kind == "whole" else float
+        return [math.nan if math.isnan(each) else convert(each) for each in values[:, 0].tolist()]
 
     def names_in(self, name: str) -> list[str]:
         """Return the different names in the first column of a table."""
@@ -330,14 +335,9 @@ class Tables:
             if common is not None:
                 own = np.where(np.isnan(own), common, own)
             found[:, k] = np.where(np.isnan(own), defaults[k], own)
-        check_not_negative(table, columns, found)
+        for row, k in np.argwhere(found < 0)[:1].tolist():
+            raise table.cell_error(row, columns[k], "error.not-negative", value=float(found[row, k]))
         return found
-
-
-def check_not_negative(table: ColumnTable, columns: Sequence[str], values: Floats) -> None:
-    """Reject negative numbers (rows, k) of columns."""
-    for row, k in np.argwhere(values < 0)[:1].tolist():
-        raise table.cell_error(row, columns[k], "error.not-negative", value=float(values[row, k]))
 
 
 def matrices_of(settings: Settings, values: Floats) -> Floats:
