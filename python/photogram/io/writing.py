@@ -8,7 +8,6 @@ from __future__ import annotations
 import errno
 import io
 import os
-import re
 import secrets
 import stat
 import sys
@@ -31,7 +30,6 @@ Files = Mapping[Path, Content]
 
 NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 MOST_PENDING = 32  # Largest number of files that wait for the disk
-MOST_LINKS = 40  # Largest number of symbolic links that are followed, as in Linux
 _Identity = tuple[int, int]
 
 
@@ -42,7 +40,7 @@ class Target:
     given: Path  # The path of the user, for errors
     place: str  # The path after all symbolic links
     status: os.stat_result | None  # Status of the existing file; None without
-    descriptor: int | None = None  # File descriptor of this process, for paths such as `/dev/stdout`
+    descriptor: int | None = None  # Of standard output or error, if it is the target
 
     @property
     def regular(self) -> bool:
@@ -64,36 +62,23 @@ def follow(path: Path) -> Target:
     if "\0" in str(path):
         raise InputError(phrase("file.nul"), file=path)
     with naming(path):
-        place = os.fspath(path)
-        for _ in range(MOST_LINKS):
-            descriptor = _own_descriptor(place)
-            if descriptor is not None:
-                return Target(path, place, os.fstat(descriptor), descriptor)
-            try:
-                place = os.path.join(os.path.dirname(place), os.readlink(place))
-            except OSError as error:
-                if error.errno not in (errno.EINVAL, errno.ENOENT, errno.ENOTDIR):
-                    raise
-                break
-        else:
-            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         try:
-            status = os.stat(place)
+            status = os.stat(path)
         except FileNotFoundError:
             status = None
-    directory, name = os.path.split(place)
-    if name in ("", os.curdir, os.pardir) or (status and stat.S_ISDIR(status.st_mode)):
+    place = os.path.realpath(path)
+    if path.name in ("", os.pardir) or (status and stat.S_ISDIR(status.st_mode)):
         raise InputError(phrase("file.directory"), file=path)
-    return Target(path, os.path.join(os.path.realpath(directory), name), status)
+    return Target(path, place, status, _standard_stream(status) if status else None)
 
 
-def _own_descriptor(place: str) -> int | None:
-    """Return the file descriptor of this process for a path like `/proc/self/fd/1`."""
-    directory, name = os.path.split(place)
-    if not (name.isascii() and name.isdigit()):
-        return None
-    descriptors = rf"/proc/{os.getpid()}(/task/\d+)?/fd"
-    return int(name) if re.fullmatch(descriptors, os.path.realpath(directory)) else None
+def _standard_stream(status: os.stat_result) -> int | None:
+    """Return the descriptor of standard output or error, if it is the file with this status."""
+    for descriptor in (1, 2):
+        with suppress(OSError):
+            if os.path.samestat(os.fstat(descriptor), status):
+                return descriptor
+    return None
 
 
 class Guard:
@@ -386,7 +371,7 @@ def _stream(target: Target) -> io.BufferedWriter:
     """Open a pipe or device for direct writing."""
     with naming(target.given):
         if target.descriptor is None:
-            descriptor = os.open(target.place, os.O_WRONLY | getattr(os, "O_NOCTTY", 0))
+            descriptor = os.open(target.given, os.O_WRONLY | getattr(os, "O_NOCTTY", 0))
         else:
             # Previous output to the same target must precede.
             for stream in (sys.stdout, sys.stderr):
