@@ -13,7 +13,7 @@ from photogram.distributed.cut import Homes, alone_of, photos_of, vertices_of
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
-from photogram.io.seals import Seals, check_seal, seal
+from photogram.io.seals import check_seal, recorded, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
@@ -201,7 +201,7 @@ def names_above(
 
 def write_part(folder: Path, part: Part) -> str:
     """Write the tables of a part and then its settings; return the seal of all files."""
-    block, seals = part.block, Seals()
+    block, seals = part.block, dict[str, str]()
     for table, fields in TABLES.items():
         columns = []
         if table != "images":
@@ -214,11 +214,11 @@ def write_part(folder: Path, part: Part) -> str:
             values = getattr(block, name)
             if values is not None:
                 columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
-        write_file(folder / f"{table}.parquet", seals.through(table, parquet_content(columns, {})))
+        write_file(folder / f"{table}.parquet", recorded(seals, table, parquet_content(columns, {})))
     encoder = Encoder()
     document = {
         "node": part.node,
-        "tables": seals.known,
+        "tables": seals,
         "observations": part.observations.tolist(),
         "unknowns": part.unknowns.tolist(),
         "block": encoder.fields(block, IN_TABLES),

@@ -88,7 +88,7 @@ class Sheet:
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
     """Return a function that writes columns and metadata to an open file."""
-    from pyarrow import parquet, types  # Import is slow
+    from pyarrow import PythonFile, parquet, types  # Import is slow
 
     table = _table(columns, about)
     repeated = [each.name for each in columns if isinstance(each.values, Repeated)]
@@ -98,7 +98,7 @@ def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Call
         # Measured numbers are rarely equal: a dictionary of them takes ten times as long.
         parquet.write_table(
             table,
-            file,
+            PythonFile(file, "w"),
             compression="zstd",
             compression_level=LEVEL,
             row_group_size=ROWS,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -61,36 +60,14 @@ def check_seal(path: Path, expected: object, of: str) -> None:
         raise InputError(phrase("file.other", file=of), file=path)
 
 
-class Seals:
-    """Checksums of files that are being written, available afterwards."""
+def recorded(
+    seals: dict[str, str], name: str, content: Callable[[BinaryIO], object]
+) -> Callable[[BinaryIO], None]:
+    """Return a function that writes a content and then adds its checksum to `seals`."""
 
-    def __init__(self) -> None:
-        self.known: dict[str, str] = {}
+    def write(file: BinaryIO) -> None:
+        content(file)
+        file.seek(0)
+        seals[name] = hashlib.file_digest(file, "sha256").hexdigest()
 
-    def through(self, name: str, content: Callable[[Any], object]) -> Callable[[BinaryIO], None]:
-        """Return a function that writes a content and stores its checksum under a name."""
-
-        def write(file: BinaryIO) -> None:
-            hashing = _Hashing(file)
-            content(hashing)
-            self.known[name] = hashing.digest.hexdigest()
-
-        return write
-
-
-class _Hashing(io.RawIOBase):
-    """A sequentially written file; its owner closes the file below."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file, self._at, self.digest = file, 0, hashlib.sha256()
-
-    def write(self, data: Any) -> int:
-        self.digest.update(data)
-        self._at += len(data)
-        return self._file.write(data)
-
-    def tell(self) -> int:
-        return self._at
-
-    def writable(self) -> bool:
-        return True
+    return write

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Content = bytes | Callable[[BinaryIO], object]  # Bytes, or a function that writes them to a file
 Files = Mapping[Path, Content]
 
-NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+NEW = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 MOST_PENDING = 32  # Largest number of files that wait for the disk
 _Identity = tuple[int, int]
 
@@ -147,8 +147,8 @@ def _status(path: Path) -> os.stat_result | None:
 class _File(io.FileIO):
     """An open descriptor whose errors contain the path of the user."""
 
-    def __init__(self, descriptor: int, given: Path) -> None:
-        super().__init__(descriptor, "wb")
+    def __init__(self, descriptor: int, given: Path, mode: str = "wb") -> None:
+        super().__init__(descriptor, mode)
         self.given = given
 
     def write(self, data: ReadableBuffer) -> int:
@@ -180,7 +180,7 @@ class _Staged:
         status = self.target.status
         mode = stat.S_IMODE(status.st_mode) & 0o777 if status else 0o666
         descriptor = os.open(self.path, NEW, mode)
-        self.file = io.BufferedWriter(_File(descriptor, self.target.given))
+        self.file = io.BufferedRandom(_File(descriptor, self.target.given, "w+b"))
         if status and sys.platform != "win32":
             made = os.fstat(descriptor)
             if (made.st_uid, made.st_gid) != (status.st_uid, status.st_gid):

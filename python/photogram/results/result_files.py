@@ -20,7 +20,7 @@ from photogram import _photocore
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.parquet import Column, Repeated, Sheet, packed, parquet_content, read_sheet, unpacked
-from photogram.io.seals import SEAL, Seals, check_seal, check_sealed, seal
+from photogram.io.seals import SEAL, check_seal, check_sealed, recorded, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
@@ -244,14 +244,14 @@ def written(
         "input": _digest(result, given, parts, kept[given]),
         "kept": kept,
     }
-    seals = Seals()
+    seals: dict[str, str] = {}
     files: dict[str, Content] = {
-        f"{table}.parquet": seals.through(table, parquet_content(columns, about))
+        f"{table}.parquet": recorded(seals, table, parquet_content(columns, about))
         for table, columns in sheets.items()
     }
 
     def last(file: BinaryIO) -> None:
-        document["tables"] = seals.known
+        document["tables"] = seals
         document[SEAL] = seal(document)
         file.write(orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE))
 
