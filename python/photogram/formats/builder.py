@@ -50,51 +50,6 @@ class FrameOf:
     photos: Mapping[str, int]
 
 
-@dataclass(frozen=True)
-class Stand:
-    """A photo without images that represents a frame."""
-
-    name: str
-    camera: str
-    like: int
-    centre: Floats
-    matrix: Floats
-
-
-def mounted(
-    frames: Sequence[FrameOf], photos: Sequence[str], centres: Floats, matrices: Floats
-) -> tuple[list[Mount], list[Stand]]:
-    """Return mounts, and the missing photos of frames.
-
-    `centres`, `matrices`: (P, 3) and (P, 3, 3) poses A, photo to object; NaN if unknown.
-    """
-    mounts: list[Mount] = []
-    stands: list[Stand] = []
-    taken = set(photos)
-    for frame in frames:
-        first = frame.photos.get(frame.rig.reference)
-        if first is not None:
-            name = photos[first]
-        else:
-            camera, row = next(iter(frame.photos.items()))
-            sensor = frame.rig.sensors[camera]
-            # For an unknown sensor the photo's own pose is a sufficient initial value.
-            turn = np.eye(3) if sensor.matrix is None else np.asarray(sensor.matrix)
-            matrix = matrices[row] @ turn.T
-            name = f"frame {frame.name}"
-            while name in taken:
-                name += "'"
-            taken.add(name)
-            centre = centres[row] - matrix @ sensor.position
-            stands.append(Stand(name, frame.rig.reference, row, centre, matrix))
-        mounts += [
-            Mount(photos[row], name, frame.rig.sensors[camera])
-            for camera, row in frame.photos.items()
-            if camera != frame.rig.reference
-        ]
-    return mounts, stands
-
-
 ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Default for image coordinates
 
 
@@ -201,14 +156,33 @@ class BlockBuilder:
         """
         assert self._poses is not None
         centres, matrices = self._poses
-        mounts, stands = mounted(frames, self.photo_ids, centres, matrices)
         owners = {each.name: row for row, each in enumerate(self.cameras)} if cameras is None else cameras
-        self.mounts += mounts
-        self.photo_ids += [each.name for each in stands]
-        self.photo_cameras += [owners.get(each.camera, self.photo_cameras[each.like]) for each in stands]
+        taken, stands = set(self.photo_ids), list[tuple[Floats, Floats]]()
+        for frame in frames:
+            first, reference = frame.photos.get(frame.rig.reference), frame.rig.reference
+            if first is not None:
+                name = self.photo_ids[first]
+            else:
+                camera, row = next(iter(frame.photos.items()))
+                sensor = frame.rig.sensors[camera]
+                # For an unknown sensor the photo's own pose is a sufficient initial value.
+                turn = np.eye(3) if sensor.matrix is None else np.asarray(sensor.matrix)
+                matrix = matrices[row] @ turn.T
+                name = f"frame {frame.name}"
+                while name in taken:
+                    name += "'"
+                taken.add(name)
+                self.photo_ids.append(name)
+                self.photo_cameras.append(owners.get(reference, self.photo_cameras[row]))
+                stands.append((centres[row] - matrix @ sensor.position, matrix))
+            self.mounts += [
+                Mount(self.photo_ids[row], name, frame.rig.sensors[camera])
+                for camera, row in frame.photos.items()
+                if camera != reference
+            ]
         self._poses = (
-            np.vstack([centres, *(each.centre[np.newaxis] for each in stands)]),
-            np.concatenate([matrices, *(each.matrix[np.newaxis] for each in stands)]),
+            np.vstack([centres, *(centre for centre, _ in stands)]),
+            np.concatenate([matrices, *(matrix[np.newaxis] for _, matrix in stands)]),
         )
         free = np.full((len(stands), 3), np.inf)
         if np.ndim(self.position_sd):
