@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
+from typing import Any
 
-from photogram.arguments.fields import check_fields
+from photogram.arguments.arrays import number
+from photogram.arguments.fields import check_fields, option
 from photogram.errors import InputError
 from photogram.io.angles import ARCSEC
-from photogram.lazy_dataclasses import dataclass, fields
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.stellar.sky import Site
 from photogram.words import phrase
 
@@ -15,6 +18,11 @@ __all__ = ["Options"]
 
 _DAYS = 20 * math.pi  # A time of ten days, in radians
 _STEPS = 10_000  # Largest number of rows of a curve table
+
+
+def _number(default: float | None, rule: str = "not-negative") -> Any:
+    """Return a field of finite numbers with a rule."""
+    return field(default=default, metadata={"check": partial(number, rule=rule)})
 
 
 def core_threads(threads: int | None) -> int:
@@ -79,45 +87,26 @@ class Options:
     reference: Site | None = None
     pole: tuple[float, float] = (0.0, 0.0)
     plate_list: bool = False
-    max_iterations_minimum: int = 0
-    max_iterations: int = 0
-    mean_error: float = 0.0
+    max_iterations_minimum: int = option(0, 0)
+    max_iterations: int = option(0, 0)
+    mean_error: float = _number(0.0)
     histogram: bool = False
-    tolerance: float = 1e-10
-    refraction_tolerance: float = 1e-4 * ARCSEC
-    distortion_tolerance: float = 1e-10
-    movement_factor: float = 0.0
-    movement_time: float = 0.0
-    crossover: float = 0.0
-    interval: float = 0.005
-    extent: float = 0.1
-    comparator_angle: float | None = None
-    distortion_first: float = 0.0
+    tolerance: float = _number(1e-10)
+    refraction_tolerance: float = _number(1e-4 * ARCSEC, "positive")
+    distortion_tolerance: float = _number(1e-10)
+    movement_factor: float = _number(0.0, "finite")
+    movement_time: float = option(0.0, -_DAYS, _DAYS)
+    crossover: float = _number(0.0)
+    interval: float = _number(0.005, "positive")
+    extent: float = _number(0.1)
+    comparator_angle: float | None = _number(None, "finite")
+    distortion_first: float = _number(0.0, "finite")
     as_published: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self)
         if self.pre_run and not self.minimum_stars:
             raise InputError(phrase("error.requires", name="pre_run", other="minimum_stars"))
-        largest = {"movement_time": _DAYS}
-        positive = ("refraction_tolerance", "interval")
-        signed = ("movement_factor", "movement_time", "comparator_angle", "distortion_first")
-        for field in fields(self):
-            name, value = field.name, getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                continue
-            code = ""
-            if not math.isfinite(value):
-                code = "error.finite"
-            elif not abs(value) <= largest.get(name, math.inf):
-                code = "error.range"
-            elif name in positive and not value > 0:
-                code = "error.positive"
-            elif name not in signed and value < 0:
-                code = "error.not-negative"
-            if code:
-                limits = {"low": -_DAYS, "high": _DAYS, "value": value}
-                raise InputError(phrase("error.at", what=name, message=phrase(code, **limits)))
         if self.curves and self.extent > _STEPS * self.interval:
             raise InputError(
                 phrase("stars.curve-steps", extent=self.extent, interval=self.interval, most=_STEPS)
