@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.arguments.objects import path_of
+from photogram.arguments.objects import path_of, require
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
 from photogram.comparator.readings import Reading, Session, collect_cases
 from photogram.errors import InputError
-from photogram.io.places import Failing, Place
+from photogram.io.places import Failing, Place, at_place
 from photogram.io.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
@@ -147,9 +147,8 @@ def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
 
 def check_number(place: Failing, what: str, number: int, low: int, high: int) -> None:
     """Reject a case or leg number outside its range."""
-    if not low <= number <= high:
-        message = phrase("error.range", value=number, low=low, high=high)
-        raise place.error(phrase("error.at", what=what, message=message))
+    with at_place(place):
+        require(low <= number <= high, what, "range", value=number, low=low, high=high)
 
 
 class _Deck:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.fits import LEAST_POINTS
 from photogram.comparator.grid import Grid
@@ -21,6 +22,7 @@ from photogram.comparator.pointing import (
 )
 from photogram.comparator.readings import Case
 from photogram.errors import InputError
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.neighbours import mutually_nearest
@@ -59,9 +61,7 @@ def detect_orientation(grid: Grid, points: Indices, xy_um: Floats) -> Orientatio
     """
     plate = grid.xy_um[grid.rows_of(points)]
     largest = np.abs([plate, xy_um]).max(initial=0.0)
-    if not largest < _SQUARED:
-        too_large = phrase("error.less", value=float(largest), high=_SQUARED)
-        raise InputError(phrase("error.at", what="x, y", message=too_large))
+    require(largest < _SQUARED, "x, y", "less", value=float(largest), high=_SQUARED)
     centred = plate - plate.mean(axis=0)
     matrix, _, rank, _ = np.linalg.lstsq(centred, xy_um - xy_um.mean(axis=0), rcond=1e-6)
     if rank < 2:
@@ -149,11 +149,8 @@ def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
         if present < len(LEGS):
             messages.append(place.message(phrase("comparators.legs", point=point, present=present)))
             continue
-        try:
+        with at_place(place, phrase("comparators.point", case=case.number, point=point)):
             xy_um[rows[0]] = intersect_legs(np.array([case.xy_um[leg].mean(axis=0) for leg in legs]))
-        except InputError as error:
-            name = phrase("comparators.point", case=case.number, point=point)
-            raise place.error(phrase("error.at", what=name, message=error.phrase)) from None
         keep[rows[0]] = True
         reduced.add(point)
     rows = np.flatnonzero(keep)
@@ -207,10 +204,8 @@ def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[Plac
     means = np.array([reading.mean_um for reading in readings])
     _refuse_equal_places(reduced, points, means)
     messages += _identical(reduced, readings)
-    try:
+    with at_place(case.place, name):
         orientation = detect_orientation(grid, points, means)
-    except InputError as error:
-        raise case.place.error(phrase("error.at", what=name, message=error.phrase)) from None
     placed = PlacedCase(
         case=case,
         readings=readings,

@@ -6,9 +6,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from photogram.arguments.objects import require
 from photogram.io.column_table import ColumnTable, TableRow
 from photogram.io.delimited import read_records
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.messages import unknown_name
 from photogram.words import phrase
 
@@ -34,9 +35,10 @@ class Setting:
 
     def switch(self) -> bool:
         """Return a Boolean given as yes or no."""
-        if self.text.lower() not in ("yes", "no"):
-            choice = phrase("error.choice", value=self.text, names=["yes", "no"])
-            raise self.place.error(phrase("error.at", what=self.key, message=choice))
+        with at_place(self.place):
+            require(
+                self.text.lower() in ("yes", "no"), self.key, "choice", value=self.text, names=["yes", "no"]
+            )
         return self.text.lower() == "yes"
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from photogram.arguments.objects import path_of
+from photogram.arguments.objects import path_of, require
 from photogram.comparator.cards import MAX_LEG, check_number, read_cards
 from photogram.comparator.csvfile import Setting, Table, read_table
 from photogram.comparator.grid import Grid, find_grid
@@ -17,6 +17,7 @@ from photogram.comparator.readings import LARGEST_UM, Reading, Session, collect_
 from photogram.errors import InputError
 from photogram.io.column_table import TableRow
 from photogram.io.numbers import is_whole_number
+from photogram.io.places import at_place
 from photogram.words import phrase
 
 T = TypeVar("T")
@@ -130,9 +131,8 @@ def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) ->
 
 def _range_centre_um(setting: Setting) -> float:
     value = setting.number()
-    if abs(value) > LARGEST_UM:
-        limit = phrase("error.most", value=value, high=LARGEST_UM)
-        raise setting.place.error(phrase("error.at", what=setting.key, message=limit))
+    with at_place(setting.place):
+        require(abs(value) <= LARGEST_UM, setting.key, "most", value=value, high=LARGEST_UM)
     return value
 
 

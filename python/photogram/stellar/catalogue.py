@@ -10,8 +10,8 @@ from typing import Self
 import numpy as np
 
 from photogram.arguments.fields import check_fields
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import InputError
 from photogram.io.angles import ARCSEC
 from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records, renaming
@@ -77,9 +77,8 @@ class Catalogue:
         }
         for name, shape in shapes.items():
             array = getattr(self, name)
-            if array is not None and array.shape != shape:
-                fields = {"shape": str(shape), "actual": str(array.shape)}
-                raise InputError(phrase("error.at", what=name, message=phrase("error.shape", **fields)))
+            if array is not None:
+                require(array.shape == shape, name, "shape", shape=shape, actual=array.shape)
 
     @classmethod
     def hipparcos(cls) -> Self:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.objects import path_of
+from photogram.arguments.objects import path_of, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
 from photogram.io.angles import ARCSEC
@@ -233,10 +233,9 @@ def _descriptors(card: Card) -> tuple[dict[int, int], float]:
         ends = np.cumsum(widths).tolist()
         numbers = [card.integer(end - width + 1, end) for width, end in zip(widths, ends, strict=True)]
         mean_error = card.real(18, 31)
-    if min(numbers) < 0 or mean_error < 0:
-        value = min(*numbers, mean_error)
-        message = phrase("error.not-negative", value=value)
-        raise card.error(phrase("error.at", what="options", message=message))
+    with at_place(card):
+        least = min(*numbers, mean_error)
+        require(least >= 0, "options", "not-negative", value=least)
     return dict(enumerate(numbers, 1)), mean_error
 
 
@@ -244,9 +243,8 @@ def _site(card: Card, air: Air) -> Site:
     south = card.real(33, 33, 0) != 0
     degrees, minutes, seconds = card.sexagesimal(36, 49, 4)
     latitude, longitude = _degrees(abs(degrees), minutes, seconds), _degrees(*card.sexagesimal(53, 66, 4))
-    if latitude > 90:
-        limits = phrase("error.most", high=90, value=latitude)
-        raise card.error(phrase("error.at", what="latitude", message=limits))
+    with at_place(card):
+        require(latitude <= 90, "latitude", "most", high=90, value=latitude)
     return Site(
         latitude=(-latitude if south else latitude) * _DEGREE,
         longitude_west=longitude * _DEGREE,
@@ -281,9 +279,9 @@ def _initial(cards: Cards) -> Floats:
     parameters[9:22] = values[3:16]
     parameters[9] *= GRAD
     parameters[21] *= GRAD
-    if not (parameters[12] > 0 and parameters[13] > 0):
-        values_c = phrase("error.positive", value=float(min(parameters[12:14])))
-        raise card.error(phrase("error.at", what="principal distance (cards 13 to 18)", message=values_c))
+    with at_place(card):
+        least = float(min(parameters[12:14]))
+        require(least > 0, "principal distance (cards 13 to 18)", "positive", value=least)
     return parameters
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.fields import check_fields
+from photogram.arguments.fields import check_fields, option
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -89,10 +90,10 @@ class Night(Brief):
     camera: SkyCamera
     exposures: Sequence[Exposure]
     names: tuple[str, ...]
-    pixel_sd: float = 0.1
+    pixel_sd: float = option(0.1, 0.0, is_open=True)
     attitude_error: float = float(np.radians(1.0))
-    tolerance: float = 8.0
-    rejection: float = 4.0
+    tolerance: float = option(8.0, 0.0, is_open=True)
+    rejection: float = option(4.0, 0.0)
     fixed: tuple[str, ...] = ()
     prior: SkyCamera | None = None
     weigh_stars: bool = False
@@ -112,31 +113,18 @@ class Night(Brief):
         exposures, names = len(self.exposures), len(self.names)
         if not exposures or names != exposures:
             raise InputError(phrase("stars.names-of-exposures", exposures=exposures, names=names))
-        positive = {
-            "width": self.frame[0],
-            "height": self.frame[1],
-            "pixel_sd": self.pixel_sd,
-            "tolerance": self.tolerance,
-        }
-        for name, value in positive.items():
-            if not value > 0:
-                raise InputError(_at(name, phrase("error.positive", value=value)))
-        if not self.rejection >= 0:
-            raise InputError(_at("rejection", phrase("error.not-negative", value=self.rejection)))
-        if not 0 < self.field_error <= 0.5:
-            limits = phrase("error.range", low=0, high=0.5, value=self.field_error)
-            raise InputError(_at("field_error", limits))
+        for name, value in zip(("width", "height"), self.frame, strict=True):
+            require(value > 0, name, "positive", value=value)
+        field_error = self.field_error
+        require(0 < field_error <= 0.5, "field_error", "range", low=0, high=0.5, value=field_error)
         for lens in self.lenses:
             lens_named(lens)
         for name in self.confirmed:
             if name not in self.names:
-                raise InputError(_at("confirmed", unknown_name("exposure", name, self.names)))
+                unknown = unknown_name("exposure", name, self.names)
+                raise InputError(phrase("error.at", what="confirmed", message=unknown))
         if self.lenses and self.prior is not None:
             raise InputError(phrase("stars.lenses-with-prior"))
-
-
-def _at(name: str, message: Phrase) -> Phrase:
-    return phrase("error.at", what=name, message=message)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -8,6 +8,7 @@ from typing import Any
 
 from photogram.arguments.arrays import number
 from photogram.arguments.fields import check_fields, option
+from photogram.arguments.objects import require
 from photogram.errors import InputError
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field
@@ -27,8 +28,7 @@ def _number(default: float | None, rule: str = "not-negative") -> Any:
 
 def core_threads(threads: int | None) -> int:
     """Return the number of threads for the core; 0: default of the core."""
-    if threads is not None and threads < 1:
-        raise InputError(phrase("error.at", what="threads", message=phrase("error.positive", value=threads)))
+    require(threads is None or threads >= 1, "threads", "positive", value=threads)
     return threads or 0
 
 

@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.stellar.sky import Site
-from photogram.words import phrase
 
 
 def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
@@ -31,8 +30,7 @@ def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
         If an angle is infinite.
     """
     for name, angle in (("azimuth", azimuth), ("elevation", elevation), ("roll", roll)):
-        if math.isinf(angle):
-            raise InputError(phrase("error.at", what=name, message=phrase("error.finite", value=angle)))
+        require(not math.isinf(angle), name, "finite", value=angle)
     north, east = -math.cos(elevation) * math.cos(azimuth), -math.cos(elevation) * math.sin(azimuth)
     zenith = math.sin(elevation)
     alpha, omega = math.atan2(north, zenith), math.asin(max(-1.0, min(1.0, east)))

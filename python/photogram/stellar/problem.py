@@ -7,7 +7,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import argument_error
 from photogram.arguments.fields import Checked, check_fields
+from photogram.arguments.objects import require
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -126,17 +128,14 @@ class Problem(Brief):
         }
         for name, shape in shapes.items():
             array = getattr(self, name)
-            if array.shape != shape:
-                fields = {"shape": str(shape), "actual": str(array.shape)}
-                raise InputError(phrase("error.at", what=name, message=Phrase("error.shape", fields)))
+            require(array.shape == shape, name, "shape", shape=shape, actual=array.shape)
             infinite = name == "star_weights"
             if np.isnan(array).any() or not (infinite or np.isfinite(array).all()):
                 raise InputError(phrase("stars.not-finite", name=name))
         for name, count in (("image_stars", stars), ("image_groups", 3)):
             for image in np.flatnonzero((getattr(self, name) < 0) | (getattr(self, name) >= count))[:1]:
-                wrong = {"value": int(getattr(self, name)[image]), "low": 0, "high": count - 1}
-                message = Phrase("error.whole-range", wrong)
-                raise InputError(phrase("error.at", what=f"{name}[{image}]", message=message))
+                limits = {"value": int(getattr(self, name)[image]), "low": 0, "high": count - 1}
+                raise argument_error(f"{name}[{image}]", "whole-range", **limits)
         pairs = zip(self.image_points, self.image_stars, strict=True)
         points = [phrase("stars.point", point=point, star=self.star_ids[star]) for point, star in pairs]
         _refuse_indefinite(points, self.image_weights)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import shaped, truth_value
 from photogram.arguments.fields import Checked, check_fields
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.angles import ARCSEC as ARCSEC
@@ -225,9 +226,7 @@ def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tu
     weight = shaped("weight", weight, (2, 2))
     if not 0 < elevation < np.pi / 2:
         raise InputError(phrase("stars.elevation", value=float(np.degrees(elevation))))
-    if not np.isfinite(azimuth):
-        message = phrase("error.finite", value=float(azimuth))
-        raise InputError(phrase("error.at", what="azimuth", message=message))
+    require(np.isfinite(azimuth), "azimuth", "finite", value=float(azimuth))
     azimuth = np.remainder(azimuth, 2 * np.pi)
     steps = _STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     azimuths, elevations = (np.array([azimuth, elevation]) + steps).T

@@ -15,6 +15,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.arrays import LARGEST_SD, shaped, truth_value
 from photogram.arguments.fields import Checked
+from photogram.arguments.objects import require
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -191,9 +192,7 @@ def calibrate_exposures(
         raise InputError(unknown_name("camera parameter", name, camera.names))
     if not exposures:
         raise InputError(phrase("error.missing", name="exposures"))
-    if not 0 < pixel_sd < LARGEST_SD:
-        limits = phrase("error.range", low=0, high=LARGEST_SD, value=pixel_sd)
-        raise InputError(phrase("error.at", what="pixel_sd", message=limits))
+    require(0 < pixel_sd < LARGEST_SD, "pixel_sd", "range", low=0, high=LARGEST_SD, value=pixel_sd)
     if prior is not None and (prior.lens, prior.common_scale) != (camera.lens, common_scale):
         lenses = _described(prior.lens, prior.common_scale), _described(camera.lens, common_scale)
         raise InputError(phrase("stars.prior-lens", prior=lenses[0], camera=lenses[1]))

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import truth_value
+from photogram.arguments.arrays import argument_error, truth_value
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
@@ -32,8 +32,7 @@ def weight_of(covariance: Floats) -> Floats:
     try:
         lower = np.linalg.cholesky(covariance / np.outer(sd, sd))
     except np.linalg.LinAlgError:
-        message = phrase("error.covariance")
-        raise InputError(phrase("error.at", what="covariance", message=message)) from None
+        raise argument_error("covariance", "covariance") from None
     root = np.linalg.solve(lower, np.diag(1.0 / sd))
     return np.asarray(root.T @ root, float)
 
