@@ -191,7 +191,7 @@ def test_dates_are_those_of_the_report_or_of_today():
 def test_damaged_documents_are_refused_with_what_is_wrong(tmp_path):
     good = json.loads(year(0).to_json())
     for member, value, words in (
-        (("joint", "sigma_random_um"), 0.0, "error.positive value=0.0"),
+        (("joint", "sigma_random_um"), 0.0, "what=random_um message=error.positive"),
         (("cases", 0, "points", 3), 99, "99"),
         (("joint", "cases", 0, "rotation_rad"), "north", ""),
         (("plates", 0, "corrected_plate_um", 0), [1.0], ""),

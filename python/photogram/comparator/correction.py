@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 import orjson
 
-from photogram.arguments.arrays import argument_error, is_covariance, number, truth_value
-from photogram.arguments.fields import check_fields
+from photogram.arguments.arrays import argument_error, is_covariance, number, shaped, truth_value
+from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.types import Floats
-from photogram.comparator.polynomial import Frame, Polynomial, design
+from photogram.comparator.polynomial import COUNT, Frame, Polynomial, design
 from photogram.comparator.readings import Session
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.network.cameras import Camera
 from photogram.words import phrase
 
 
 @dataclass(frozen=True)
-class Identity:
+class Identity(Checked):
     """Identification of a correction.
 
     Attributes
@@ -52,6 +52,11 @@ class Identity:
     low_um: tuple[float, float]
     high_um: tuple[float, float]
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (np.array(self.low_um) < self.high_um).all():
+            raise InputError(phrase("comparators.range", value=str([self.low_um, self.high_um])))
+
     @classmethod
     def of(cls, session: Session, means_um: Sequence[Floats]) -> Identity:
         """Return the identity of a session with mean readings (n, 2) of its cases."""
@@ -78,31 +83,6 @@ class Identity:
         """Calibrated range as text."""
         (low_x, low_y), (high_x, high_y) = self.low_um, self.high_um
         return f"x {low_x:.0f} to {high_x:.0f}, y {low_y:.0f} to {high_y:.0f} um"
-
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any]) -> Identity:
-        """Return the identity from the members of a JSON document.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError
-            If the document is invalid.
-        """
-        numbers = np.array([document["low_um"], document["high_um"]], dtype=float)
-        if numbers.shape != (2, 2) or not (numbers[0] < numbers[1]).all():
-            raise InputError(phrase("comparators.range", value=str(numbers.tolist())))
-        low, high = ((float(x), float(y)) for x, y in numbers)
-        temperature = document["temperature_c"]
-        return cls(
-            int(document["comparator"]),
-            bool(document["secondary"]),
-            str(document["date"]),
-            tuple(int(plate) for plate in document["plates"]),
-            int(document["cases"]),
-            None if temperature is None else float(temperature),
-            low,
-            high,
-        )
 
 
 PARAMETERS = 21  # scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y
@@ -318,18 +298,18 @@ class Correction:
         """
         polynomial = None
         if (members := document["polynomial"]) is not None:
-            x, y = _numbers(members["centre_um"], (2,)).tolist()
-            half_x, half_y = _numbers(members["half_range_um"], (2,)).tolist()
-            scaled = [_numbers(members[f"coefficients_{axis}_um"], (9,)) for axis in "xy"]
-            frame = Frame((x, y), (half_x, half_y))
-            polynomial = Polynomial(frame, np.array(scaled), np.zeros((18, 18)))
-        scale_x, scale_y, lean = (
-            _numbers(document[name], ()).item() for name in ("scale_x", "scale_y", "nonorthogonality_rad")
+            scaled = [members[f"coefficients_{axis}_um"] for axis in "xy"]
+            polynomial = Polynomial(
+                Frame(members["centre_um"], members["half_range_um"]),
+                shaped("coefficients_um", scaled, (2, COUNT)),
+                np.zeros((2 * COUNT, 2 * COUNT)),
+            )
+        linear = (document[name] for name in ("scale_x", "scale_y", "nonorthogonality_rad"))
+        given = document["identity"]
+        identity = (
+            None if given is None else Identity(**{own.name: given[own.name] for own in fields(Identity)})
         )
-        covariance = _numbers(document["covariance"], (PARAMETERS, PARAMETERS))
-        members = document["identity"]
-        identity = None if members is None else Identity.from_document(members)
-        return cls(scale_x, scale_y, lean, polynomial, covariance, identity)
+        return cls(*linear, polynomial, document["covariance"], identity)
 
     def to_json(self) -> bytes:
         """Return the correction as a JSON document (UTF-8)."""
@@ -386,11 +366,3 @@ def _deviations(camera: Camera) -> dict[str, float]:
     if deviations["b1"] or deviations["b2"]:
         raise InputError(phrase("comparators.camera-free", camera=camera.title))
     return {name: deviations[name] for name in camera.names if name not in affine}
-
-
-def _numbers(value: Any, shape: tuple[int, ...]) -> Floats:
-    array = np.array(value)
-    if array.shape != shape or array.dtype.kind not in "iuf":
-        size = " x ".join(map(str, shape)) or "1"
-        raise InputError(phrase("error.numbers", count=size, value=str(value)))
-    return array.astype(float)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import MISSING
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import orjson
 
+from photogram.arguments.fields import Checked, option
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
@@ -29,7 +30,7 @@ FIRST_YEAR = 50  # Two-digit years from this one on are in the 20th century, ear
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedCase:
+class RecordedCase(Checked):
     """Mean readings of a case, and the plate orientation.
 
     Attributes
@@ -54,9 +55,17 @@ class RecordedCase:
     rotation_rad: float
     translation_um: Floats
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.means_um.shape != (len(self.points), 2):
+            name = phrase("comparators.case", case=self.number)
+            shape = str(self.means_um.shape)
+            wrong = phrase("comparators.grid-shape", count=len(self.points), shape=shape)
+            raise InputError(phrase("error.at", what=name, message=wrong))
+
 
 @dataclass(frozen=True, eq=False)
-class RecordedCalibration:
+class RecordedCalibration(Checked):
     """Calibration record with measurements and joint correction.
 
     Attributes
@@ -82,8 +91,8 @@ class RecordedCalibration:
     name: str
     day: date
     correction: Correction
-    random_um: float
-    freedom: int
+    random_um: float = option(MISSING, 0, is_open=True)
+    freedom: int = option(MISSING, 1)
     pointing_um: tuple[float, float]
     pointing_covariance_um2: float
     pointing_freedom: int
@@ -152,75 +161,42 @@ def _from_document(document: Any, name: str) -> RecordedCalibration:
         raise InputError(phrase("comparators.no-identity"))
     counts = {(each["case"], each["point"]): each["readings"] for each in document["pointing"]["points"]}
     total = document["pointing"]["total"]
-    freedom = int(total["degrees_of_freedom"])
+    freedom = total["degrees_of_freedom"]
     placed = {each["case"]: each for each in joint["cases"]}
     grids = {
         plate["plate"]: _grid(plate, own)
         for plate, own in zip(document["plates"], joint["plates"], strict=True)
     }
-    cases = tuple(_case(each, placed[each["case"]], counts) for each in document["cases"])
+    cases = tuple(
+        RecordedCase(
+            number=each["case"],
+            **{name: each[name] for name in ("operator", "plate", "left_handed", "points", "means_um")},
+            counts=[counts[each["case"], point] for point in each["points"]],
+            rotation_rad=placed[each["case"]]["rotation_rad"],
+            translation_um=placed[each["case"]]["translation_um"],
+        )
+        for each in document["cases"]
+    )
     for case in cases:
         if (missing := np.setdiff1d(case.points, grids[case.plate].points)).size:
             raise InputError(phrase("comparators.no-point", plate=case.plate, point=int(missing[0])))
+    operators = {}
+    for each in document["pointing"]["operators"]:
+        if (own := each["degrees_of_freedom"]) > 0:
+            x, y = each["sd_um"]
+            operators[int(each["operator"])] = (x**2, y**2, own)
     return RecordedCalibration(
         name=name,
         day=day_of(str(document["date"])),
         correction=correction,
-        random_um=_positive(joint["sigma_random_um"]),
-        freedom=int(_positive(joint["degrees_of_freedom"])),
-        pointing_um=_pair(total["sd_um"]) if freedom > 0 else (0.0, 0.0),
-        pointing_covariance_um2=float(total["covariance_um2"] or 0.0),
+        random_um=joint["sigma_random_um"],
+        freedom=joint["degrees_of_freedom"],
+        pointing_um=total["sd_um"] if freedom > 0 else (0.0, 0.0),
+        pointing_covariance_um2=total["covariance_um2"] or 0.0,
         pointing_freedom=freedom,
-        operators=_operators(document["pointing"]["operators"]),
+        operators=operators,
         cases=cases,
         grids=grids,
-    )
-
-
-def _pair(values: Any) -> tuple[float, float]:
-    x, y = (_finite(each) for each in values)
-    return x, y
-
-
-def _finite(value: Any) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise InputError(phrase("error.finite", value=number))
-    return number
-
-
-def _positive(value: Any) -> float:
-    if (number := _finite(value)) <= 0:
-        raise InputError(phrase("error.positive", value=number))
-    return number
-
-
-def _operators(members: Iterable[Any]) -> dict[int, tuple[float, float, int]]:
-    operators = {}
-    for member in members:
-        if (freedom := int(member["degrees_of_freedom"])) > 0:
-            x, y = _pair(member["sd_um"])
-            operators[int(member["operator"])] = (x**2, y**2, freedom)
-    return operators
-
-
-def _case(members: Any, placed: Any, counts: Mapping[tuple[int, int], int]) -> RecordedCase:
-    points = np.array(members["points"], dtype=np.int64)
-    means = np.array(members["means_um"], dtype=float)
-    if means.shape != (len(points), 2) or not np.isfinite(means).all():
-        name = phrase("comparators.case", case=int(members["case"]))
-        wrong = phrase("comparators.grid-shape", count=len(points), shape=str(means.shape))
-        raise InputError(phrase("error.at", what=name, message=wrong))
-    return RecordedCase(
-        number=int(members["case"]),
-        operator=int(members["operator"]),
-        plate=int(members["plate"]),
-        left_handed=bool(members["left_handed"]),
-        points=points,
-        counts=np.array([counts[members["case"], point] for point in points.tolist()], dtype=np.int64),
-        means_um=means,
-        rotation_rad=_finite(placed["rotation_rad"]),
-        translation_um=np.array(_pair(placed["translation_um"])),
     )
 
 
