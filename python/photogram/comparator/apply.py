@@ -7,14 +7,16 @@ import io
 
 import numpy as np
 
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.comparator.correction import Correction
 from photogram.comparator.csvfile import Table
 from photogram.comparator.readings import LARGEST_UM
 from photogram.errors import InputError
 from photogram.io.delimited import cells
+from photogram.io.places import at_place
 from photogram.messages import Message
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 CORRECTED = ("corrected_x_um", "corrected_y_um", "sd_x_um", "sd_y_um", "in_range")
 READINGS = ("reading_x_um", "reading_y_um", "in_range")
@@ -30,17 +32,13 @@ def correct_table(
     Standard deviations are propagated from the correction without the readings. The column `in_range` is yes
     inside the calibrated range. With `invert`, readings are computed from corrected coordinates.
     """
-    places = []
-    for row in table.records.rows:
-        xy = table.coordinates_um(row)
-        if xy is None:
-            raise row.error(_of_coordinates(phrase("error.empty")))
-        if (largest := max(map(abs, xy))) > LARGEST_UM:
-            raise row.error(_of_coordinates(phrase("error.most", value=largest, high=LARGEST_UM)))
-        places.append(xy)
-    if not places:
+    xy_um = table.xy_um
+    for row in np.flatnonzero(~(np.abs(xy_um).max(axis=1, initial=0.0) <= LARGEST_UM))[:1].tolist():
+        with at_place(table.records.place(row)):
+            require(not np.isnan(xy_um[row]).any(), "x, y", "empty")
+            require(False, "x, y", "most", value=float(np.abs(xy_um[row]).max()), high=LARGEST_UM)
+    if not len(xy_um):
         raise InputError(phrase("error.empty-file", content="measurements"), file=table.records.path)
-    xy_um = np.array(places)
     if invert:
         columns: tuple[str, ...] = READINGS
         values = readings = correction.invert(xy_um)
@@ -63,10 +61,6 @@ def correct_table(
         texts = [f"{number:.4f}" for number in numbers]
         writer.writerow([*cells(row.place, table.records.delimiter), *texts, within])
     return buffer.getvalue().encode(), remarks
-
-
-def _of_coordinates(message: Phrase) -> Phrase:
-    return phrase("error.at", what="x, y", message=message)
 
 
 def _outside(

@@ -13,8 +13,9 @@ import numpy as np
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
-from photogram.comparator.csvfile import read_table
+from photogram.comparator.csvfile import Keys, read_table, settings_lines, text_of
 from photogram.errors import InputError
+from photogram.io.csv_text import csv_text
 from photogram.io.numbers import is_whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
@@ -24,7 +25,11 @@ from photogram.words import phrase
 
 BUILT_IN = (773, 1320, 778)  # The master grids of the program, in the order of its option MASTER (0, 1, 2)
 # Settings above the coordinates of a plate
-KEYS = ("grid", "owner", "adopted", "sigma_um", "temperature_c", "expansion_per_k")
+KEYS: Keys = {
+    "grid": Place.whole,
+    **dict.fromkeys(("owner", "adopted"), text_of),
+    **dict.fromkeys(("sigma_um", "temperature_c", "expansion_per_k"), Place.number),
+}
 MOST_EXPANSION = 1e-3  # per kelvin; steel has 1.2e-5, glass 8e-6
 
 
@@ -111,14 +116,10 @@ class Grid(Brief):
 
     def to_csv(self) -> bytes:
         """Return the plate as a file for :func:`read_grid`."""
-        lines = [f"# grid = {self.number}"]
-        lines += [f"# adopted = {self.adopted}"] if self.adopted else []
-        lines += [f"# sigma_um = {self.sigma_um:g}"] if self.sigma_um is not None else []
-        lines += [f"# temperature_c = {self.temperature_c:g}"] if self.temperature_c is not None else []
-        lines += [f"# expansion_per_k = {self.expansion_per_k:g}"] if self.expansion_per_k is not None else []
-        rows = zip(self.points.tolist(), self.xy_um.tolist(), strict=True)
-        lines += ["point,x_um,y_um", *(f"{point},{x!r},{y!r}" for point, (x, y) in rows)]
-        return ("\n".join(lines) + "\n").encode()
+        settings = {name: getattr(self, name) for name in KEYS if hasattr(self, name)}
+        x, y = self.xy_um.T
+        columns = {"point": self.points, "x_um": x, "y_um": y}
+        return csv_text(columns, settings_lines({"grid": self.number, **settings}))
 
 
 def read_grid(path: Path) -> Grid:
@@ -139,25 +140,14 @@ def read_grid(path: Path) -> Grid:
     """
     path = path_of("path", path)
     table = read_table(path, "point", keys=KEYS)
-    points, xy = [], []
-    for row in table.records.rows:
-        coordinates = table.coordinates_um(row)
-        if coordinates is not None:
-            points.append(row.integer("point"))
-            xy.append(coordinates)
-    number = table.settings.get("grid")
-    numbers = {
-        key: table.settings[key].number()
-        for key in ("sigma_um", "temperature_c", "expansion_per_k")
-        if key in table.settings
-    }
+    rows = [row for row, x in zip(table.records.rows, table.xy_um[:, 0], strict=True) if not np.isnan(x)]
+    settings = {name: value for name, value in table.settings.items() if name not in ("grid", "owner")}
     return Grid(
-        0 if number is None else number.integer(),
-        np.array(points, dtype=np.int64),
-        np.array(xy, dtype=float).reshape(-1, 2),
-        adopted=table.text("adopted"),
+        table.settings.get("grid", 0),
+        np.array([row.integer("point") for row in rows], dtype=np.int64),
+        table.xy_um[[row.row for row in rows]],
         source=path,
-        **numbers,
+        **settings,
     )
 
 

@@ -5,25 +5,39 @@ Tables have the columns case, point, x_um, y_um and optionally plate, leg, opera
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from photogram.arguments.objects import path_of, require
 from photogram.comparator.cards import MAX_LEG, check_number, read_cards
-from photogram.comparator.csvfile import Setting, Table, read_table
+from photogram.comparator.csvfile import Keys, Table, read_table, settings_lines, switch, text_of
 from photogram.comparator.grid import Grid, find_grid
 from photogram.comparator.readings import LARGEST_UM, Reading, Session, collect_cases
 from photogram.errors import InputError
 from photogram.io.column_table import TableRow
 from photogram.io.numbers import is_whole_number
-from photogram.io.places import at_place
+from photogram.io.places import Place, at_place
 from photogram.words import phrase
 
-T = TypeVar("T")
+
+def _centre(place: Place, text: str, key: str) -> float:
+    value = place.number(text, key)
+    with at_place(place):
+        require(abs(value) <= LARGEST_UM, key, "most", value=value, high=LARGEST_UM)
+    return value
+
 
 # Settings above the table
-KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "temperature_c")
+KEYS: Keys = {
+    "grid": text_of,
+    "comparator": Place.whole,
+    "date": text_of,
+    "left_handed": switch,
+    "range_centre_um": _centre,
+    "temperature_c": Place.number,
+}
 
 
 def read(
@@ -99,46 +113,33 @@ def read_csv(
         raise InputError(phrase("comparators.no-grid"), file=paths[0])
     only_plate = next(iter(plates)) if len(plates) == 1 else 0
     cases = collect_cases(
-        _reading(row, xy, only_plate)
+        _reading(row, (x, y), only_plate)
         for table in tables
-        for row in table.records.rows
-        if (xy := table.coordinates_um(row)) is not None
+        for row, (x, y) in zip(table.records.rows, table.xy_um.tolist(), strict=True)
+        if not math.isnan(x)
     )
-    session = Session(
-        cases=cases,
-        grids=plates,
-        comparator=_one(tables, "comparator", Setting.integer) or 0,
-        date=next((table.text("date") for table in tables if table.text("date")), ""),
-        left_handed=left_handed if left_handed is not None else _one(tables, "left_handed", Setting.switch),
-        range_centre_um=_one(tables, "range_centre_um", _range_centre_um),
-        temperature_c=_one(tables, "temperature_c", Setting.number),
-        source=paths[0],
-    )
+    settings = _settings(tables, {} if left_handed is None else {"left_handed": left_handed})
+    session = Session(cases=cases, grids=plates, source=paths[0], **settings)
     session.check()
     return session
 
 
-def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) -> T | None:
-    """Return a setting of the tables of a calibration, None if it is missing."""
-    settings = [table.settings[key] for table in tables if key in table.settings]
-    values = [value_of(setting) for setting in settings]
-    for setting, value in zip(settings, values, strict=True):
-        if value != values[0]:
-            fields = {"key": key, "value": setting.text, "other": settings[0].text}
-            raise setting.place.error(phrase("comparators.contradiction", **fields))
-    return values[0] if values else None
-
-
-def _range_centre_um(setting: Setting) -> float:
-    value = setting.number()
-    with at_place(setting.place):
-        require(abs(value) <= LARGEST_UM, setting.key, "most", value=value, high=LARGEST_UM)
-    return value
+def _settings(tables: Sequence[Table], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return given settings and others of the tables of a calibration; reject contradictions."""
+    settings = dict(given)
+    for table in tables:
+        for key, value in table.settings.items():
+            if key in ("grid", *given) or (key == "date" and (not value or key in settings)):
+                continue
+            if settings.setdefault(key, value) != value:
+                fields = {"key": key, "value": str(value), "other": str(settings[key])}
+                raise table.places[key].error(phrase("comparators.contradiction", **fields))
+    return settings
 
 
 def _named_grids(table: Table) -> list[Grid]:
     """Return the plates named in a table: built in, or files in its folder."""
-    names = [name.strip() for name in table.text("grid").split(",") if name.strip()]
+    names = [name.strip() for name in table.settings.get("grid", "").split(",") if name.strip()]
     folder = table.records.path.parent
     return [find_grid(name if is_whole_number(name) else str(folder / name)) for name in names]
 
@@ -159,15 +160,9 @@ def _reading(row: TableRow, xy_um: tuple[float, float], only_plate: int) -> Read
 
 def to_csv(session: Session) -> bytes:
     """Return the measurements in micrometres as a table for :func:`read_csv`."""
-    lines = [f"# comparator = {session.comparator}"]
-    lines += [f"# grid = {', '.join(str(number) for number in session.grids)}"]
-    lines += [f"# date = {session.date}"] if session.date else []
-    if session.range_centre_um is not None:
-        lines.append(f"# range_centre_um = {session.range_centre_um:g}")
-    if session.temperature_c is not None:
-        lines.append(f"# temperature_c = {session.temperature_c:g}")
-    if session.left_handed is not None:
-        lines.append(f"# left_handed = {'yes' if session.left_handed else 'no'}")
+    names = ("comparator", "grid", "date", "range_centre_um", "temperature_c", "left_handed")
+    settings = {name: getattr(session, name, ", ".join(map(str, session.grids))) for name in names}
+    lines = [f"# {line}" for line in settings_lines(settings)]
     lines.append("plate,case,operator,leg,point,x_um,y_um")
     for case in session.cases:
         rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
