@@ -262,17 +262,27 @@ class Hypotheses:
         return float(max(self.single_odds, rivals, *self.log_odds[self.common(rivals)[:1]]))
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
-        """Return messages on these errors, the most likely first."""
+        """Return messages on these errors, the most likely first, then single errors that are as likely."""
         found = self.common(rivals)
-        return [
-            phrase(
-                f"common.{'error' if row == found[0] else 'alternative'}{'.checks' * (row in self.relative)}",
-                named=self.name(row),
-                size=self._size(row),
-                odds=math.exp(self.log_odds[found[0]] - self.log_odds[row]),
-            )
-            for row in found
-        ]
+        return [self._common_error(row, found[0]) for row in (*found, *self._singles(found))]
+
+    def _common_error(self, row: int, first: int) -> Phrase:
+        named, odds = self.name(row), math.exp(self.log_odds[first] - self.log_odds[row])
+        if row >= len(self.sets):
+            return phrase("common.single", named=named, odds=odds)
+        code = f"common.{'error' if row == first else 'alternative'}{'.checks' * (row in self.relative)}"
+        return phrase(code, named=named, size=self._size(row), odds=odds)
+
+    def _singles(self, common: list[int]) -> list[int]:
+        """Return rows of single errors that are as likely as a common error, one of each group."""
+        if not common:
+            return []
+        odds = np.nan_to_num(self.log_odds, nan=-math.inf)
+        likely = np.flatnonzero(odds > odds[common[0]] - math.log(ALTERNATIVES))
+        likely = likely[(likely >= len(self.sets)) & (self.probability[likely] < DETECTION[0])]
+        likely = likely[np.argsort(-odds[likely], kind="stable")]
+        first = np.unique(self.group[likely], return_index=True)[1]
+        return [int(row) for row in likely[np.sort(first)]]
 
     def _size(self, row: int) -> str:
         """Return the estimate of a set with its standard deviation; the largest of several."""
