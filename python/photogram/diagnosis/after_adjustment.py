@@ -59,7 +59,7 @@ def explained(result: Result) -> list[Message]:
     if result.WHOLE and not found and (not result.converged or is_suspected(result)):
         from photogram.diagnosis.mistakes import Adjuster
 
-        found = hints_at("misfit", result.block, Adjuster.of(result)) or hints_at("residuals", result)
+        found = hints_at("misfit", result.block, Adjuster.of(result))
     return found
 
 

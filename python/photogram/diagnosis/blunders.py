@@ -1,8 +1,9 @@
-"""The adjustment of a check, and gross errors by data snooping (Appendix H, 3-sigma rule).
+"""The adjustment of a check: exchanged names, and gross errors by data snooping (Appendix H, 3-sigma rule).
 
 The search is :func:`photogram.snoop`, with single components of control and an unknown unit weight, because
-standard deviations may be wrong by a factor. It starts without the observations that intersection suspects
-(:mod:`photogram.diagnosis.gross`), and tests these against the others.
+standard deviations may be wrong by a factor. It starts without points that the adjustment cannot determine
+in spite of their rays, and without control that distorts the photos, and tests these against the others.
+Exchanged names are corrected before single errors are reported.
 """
 
 from __future__ import annotations
@@ -16,37 +17,34 @@ from photogram.arguments.types import Bools, Indices
 from photogram.diagnosis.control_sets import without_outliers
 from photogram.diagnosis.findings import Finding, Section, section_of
 from photogram.diagnosis.gross import Suspects
-from photogram.diagnosis.misfits import Misfits, list_test_values
+from photogram.diagnosis.misfits import Misfits, exchanged, list_test_values
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.robust import mad_sd
-from photogram.diagnosis.tested_values import (
-    FOUND,
-    ROUNDING,
-    outliers,
-    sizes_of_tests,
-    spread_of,
-)
+from photogram.diagnosis.tested_values import FOUND, ROUNDING, outliers, sizes_of_tests, spread_of
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.subset import kept_images, of_photos
+from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
-from photogram.results.snooping_log import Aside
+from photogram.results.snooping_log import Aside, Exchange
 from photogram.results.snooping_options import SnoopOptions
 
 DISTORTING = 50.0  # Test value of control whose error distorts the photos
 HOPELESS = 5.0  # Spread of the test values of photos that are removed, if they did not fit before
+RAYS = 3  # Rays of a point whose position is undetermined only if one of them is wrong
+MOST_EXCHANGES = 5  # Maximum number of successive corrections of names
 
 
 @dataclass
 class Edited:
     """The adjustment and the removed observations."""
 
-    first: Result | None  # The first and the last adjustment; None if it failed
-    last: Result | None
-    reason: str  # The reason for the failure
     section: Section  # List of gross errors
-    gross: list[Finding] = field(default_factory=list)  # Findings on images that intersection suspects
+    first: Result | None = None  # The first and the last adjustment; None if it failed
+    last: Result | None = None
+    reason: str = ""  # The reason for the failure
+    gross: list[Finding] = field(default_factory=list)  # Findings on photos, names and undetermined points
     # Findings on removed components of control, by point
     control: dict[str, list[Finding]] = field(default_factory=dict)
     asked: bool = True  # Whether an adjustment was requested
@@ -63,42 +61,44 @@ class Edited:
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
-    """Adjust a block and remove gross errors."""
-    edited = Edited(None, None, "", section_of("blunders"))
-    block, suspected = _fitting(block, suspects, adjusted, edited)
-    first = edited.first if edited.first is not None and edited.first.converged else None
-    fits = first is not None and not any(own.any() for own in outliers(first).values())
-    if fits and not suspected.any():
-        edited.last = first
-    else:
-        control = _wrong_control(kept_images(block, ~suspected), first, adjusted)
-        control = np.union1d(control, np.flatnonzero(suspects.control))
-        _remove(block, suspected, control, adjusted, edited)
+    """Adjust a block without suspects, exchange names, and remove gross errors."""
+    edited = Edited(section_of("blunders"))
+    block = _fitting(block, suspects, adjusted, edited)
+    result = edited.last = edited.first
+    suspected = suspects.points[block.image_points]
+    for _ in range(MOST_EXCHANGES):
+        exchanges = _remove(block, suspected, suspects.control, result, adjusted, edited)
+        if not exchanges:
+            break
+        edited.gross += exchanged(exchanges)
+        block = _with_names(block, exchanges)
+        suspected = np.zeros_like(suspected)
+        result, edited.reason = _adjusted(block, adjusted)
+        edited.last = result
     if edited.last is not None:
         list_test_values(edited.last, edited.section)
     return edited
 
 
-def _fitting(block: Block, suspects: Suspects, adjusted: Adjuster, edited: Edited) -> tuple[Block, Bools]:
-    """Adjust without suspected images, and without suspected photos if they do not fit then.
+def _fitting(block: Block, suspects: Suspects, adjusted: Adjuster, edited: Edited) -> Block:
+    """Adjust without suspected points, and without bad photos if they do not fit then.
 
-    Returns the block without these photos, and its (m,) suspected images.
+    Returns the block without these photos.
     """
-    bad, suspected = suspects.photos, suspects.images
-    good = kept_images(block, ~suspected)
+    bad, good = suspects.photos, kept_images(block, ~suspects.points[block.image_points])
     edited.first, edited.reason = _adjusted(good, adjusted)
     if edited.first is not None and edited.first.converged and spread_of(edited.first) < HOPELESS:
         values = edited.first.standardized
         own = [mad_sd(values[good.image_photos == photo]) for photo in range(len(bad))]
         bad = bad & ~(np.array(own) < HOPELESS)
     if not bad.any():
-        return block, suspected
+        return block
     names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]
     edited.section.remark("check.remark.without-photos", photos=names)
     if edited.reason:
         edited.section.remark("check.remark.with-photos", reason=edited.reason)
     edited.first, edited.reason = _adjusted(of_photos(good, ~bad), adjusted)
-    return of_photos(block, ~bad), suspected[~bad[block.image_photos]]
+    return of_photos(block, ~bad)
 
 
 def _adjusted(block: Block, adjusted: Adjuster) -> tuple[Result | None, str]:
@@ -107,6 +107,18 @@ def _adjusted(block: Block, adjusted: Adjuster) -> tuple[Result | None, str]:
         return adjusted(block), ""
     except AdjustmentError as error:
         return None, str(error)
+
+
+def _undetermined(block: Block, first: Result | None) -> Bools:
+    """(m,) images of points that the adjustment excluded, because their rays do not intersect."""
+    if first is None:
+        return np.zeros(len(block.image_xy), dtype=bool)
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids)).tolist()
+    wrong = [
+        name in first.dropped and (first.dropped[name] in HARMFUL or count >= RAYS)
+        for name, count in zip(block.point_ids, rays, strict=True)
+    ]
+    return np.array(wrong)[block.image_points]
 
 
 def _wrong_control(block: Block, first: Result | None, adjusted: Adjuster) -> Indices:
@@ -121,21 +133,56 @@ def _wrong_control(block: Block, first: Result | None, adjusted: Adjuster) -> In
     return np.empty(0, dtype=np.int64) if found is None else found[1]
 
 
-def _remove(block: Block, suspected: Bools, control: Indices, adjusted: Adjuster, edited: Edited) -> None:
-    """Remove gross errors, and add the findings."""
-    first = edited.first
-    aside = Aside(np.flatnonzero(suspected), {}, control=control)
-    start = aside if suspected.any() or control.size else None
+def _remove(
+    block: Block,
+    suspected: Bools,
+    control: Bools,
+    first: Result | None,
+    adjusted: Adjuster,
+    edited: Edited,
+) -> list[Exchange]:
+    """Remove gross errors, and add the findings; return exchanged names instead, if there are any.
+
+    `first` is the adjustment without (m,) suspected images; (n,) `control` is also suspected.
+    """
+    suspected = suspected | _undetermined(block, first)
+    converged = first if first is not None and first.converged else None
+    fits = converged is not None and not any(own.any() for own in outliers(converged).values())
+    if fits and not suspected.any():
+        return []
+    distorting = _wrong_control(kept_images(block, ~suspected), converged, adjusted)
+    start = Aside(np.flatnonzero(suspected), {}, control=np.union1d(distorting, np.flatnonzero(control)))
     # The variance of rounding errors would make all of them gross errors.
-    rounded = first is not None and first.converged and mad_sd(first.standardized) <= ROUNDING
+    rounded = converged is not None and mad_sd(converged.standardized) <= ROUNDING
     options = SnoopOptions(level=FOUND, unit_weight="known" if rounded else "unknown")
     try:
-        found = snoop_block(block, options, start=start, control="components", **adjusted.options)
+        found = snoop_block(
+            block,
+            options,
+            start=start if len(start.images) + len(start.control) else None,
+            control="components",
+            **adjusted.options,
+        )
     except AdjustmentError as error:
         edited.reason, edited.last = str(error), first
-        return
+        return []
     assert isinstance(found.result, Result)
-    edited.first, edited.last = first or found.result, found.result
+    if found.exchanged:
+        return [*found.exchanged]
+    edited.first, edited.last = edited.first or found.result, found.result
     misfits = Misfits(block, suspected, found, found.result)
     edited.section.findings += misfits.in_section
-    edited.gross, edited.control = misfits.of_suspects, misfits.control
+    edited.gross += misfits.of_suspects
+    edited.control = misfits.control
+    return []
+
+
+def _with_names(block: Block, exchanges: list[Exchange]) -> Block:
+    """Return a block with exchanged names of points."""
+    points = block.image_points.copy()
+    for each in exchanges:
+        on = block.image_photos == block.photo_ids.index(each.photos[0])
+        one, other = map(block.point_ids.index, each.points)
+        points[on & (block.image_points == one)] = other
+        points[on & (block.image_points == other)] = one
+    return block.replace(image_points=points)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.diagnosis.blunders import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note, section_of
+from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, section_of
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -22,8 +22,7 @@ def control(edited: Edited, words: Words) -> Section:
     controls = int((np.isfinite(block.point_sd).any(axis=1) & result.used_points).sum())
     common = len(edited.control) > max(MANY * controls, 3)
     if common:
-        message = phrase("check.control-system", n=len(edited.control))
-        note(section, "grave", message, [], list(edited.control))
+        section.note("grave", "check.control-system", [], [*edited.control], n=len(edited.control))
     spoilt = {point for blunder in edited.section.findings for point in blunder.points}
     for name, findings in edited.control.items():
         section.findings.append(_misfit(result, name, findings, name in spoilt, common, words))

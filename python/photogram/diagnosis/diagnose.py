@@ -20,13 +20,13 @@ from photogram.diagnosis.after_adjustment import diagnosis_of
 from photogram.diagnosis.blunders import Edited, edit
 from photogram.diagnosis.control import control
 from photogram.diagnosis.diagnosis import Diagnosis
-from photogram.diagnosis.findings import Finding, Section, Words, finding, note, section_of
+from photogram.diagnosis.findings import Finding, Section, Words, section_of
 from photogram.diagnosis.gross import Suspects, gross
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.orientation import orientation, spare_explained
-from photogram.diagnosis.registry import at, hints_at
+from photogram.diagnosis.registry import at
 from photogram.diagnosis.residuals import residuals
 from photogram.diagnosis.stations import stations, two_ray_heights
 from photogram.diagnosis.structure import structure_section
@@ -37,10 +37,8 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import as_seen
 from photogram.network.rays import Rays
-from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
-from photogram.words import phrase
 
 __all__ = ["Manner", "check_block", "diagnose"]
 
@@ -140,17 +138,17 @@ def _started(block: Block) -> tuple[Block | None, Section]:
         found: FirstValues = first_values(block)
         usable = found.usable()
     except (AdjustmentError, InputError) as error:
-        note(section, "grave", phrase("check.no-first-values.all", reason=str(error)))
+        section.note("grave", "check.no-first-values.all", reason=str(error))
         return None, section
     section.remark("check.remark.started", n=len(found.sources), count=len(block.photo_ids))
     for photo, why in found.missing.items():
-        note(section, "grave", phrase("check.no-first-values.photo", photo=photo, reason=why), [photo])
+        section.note("grave", "check.no-first-values.photo", [photo], photo=photo, reason=why)
     aside = found.set_aside
     if aside.any():
         points = sorted({block.point_ids[point] for point in block.image_points[aside]})
         photos = sorted({block.photo_ids[photo] for photo in block.image_photos[aside]})
-        message = phrase("check.set-aside", n=int(aside.sum()), points=points, photos=photos)
-        note(section, "look", message, photos, points)
+        fields = {"n": int(aside.sum()), "points": points, "photos": photos}
+        section.note("look", "check.set-aside", photos, points, **fields)
     return usable, section
 
 
@@ -167,21 +165,17 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     sets.findings[:0] = lens
     errors, suspects = gross(oriented.seen, oriented.unit)
     if not manner.intersect_only:
-        oriented, changed = _sets(sets, oriented, suspects, adjusted)
-        if changed:
+        start = oriented
+        oriented = _sets(sets, oriented, suspects, adjusted)
+        if oriented is not start:
             errors, suspects = gross(oriented.seen, oriented.unit)
     if suspects.photos.any():
         spare_explained(upright, oriented.seen, suspects.photos)
     edited = _edited(oriented, suspects, manner, adjusted)
-    errors.findings = _judged(errors.findings, suspects, edited)
+    errors.findings = _judged(errors.findings, edited)
     if edited.first is not None and edited.last is not None:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
-    if edited.first is not None:
-        hints = hints_at("residuals", edited.first)
-        rolls = [finding("grave", each.phrase) for each in hints if each.phrase]
-        # A rolling shutter can look like errors of a lens, of control or of single observations.
-        sets.findings, exact = [*rolls, *sets.findings], exact and not rolls
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, words)
     if edited.last is not None and edited.last.converged:
@@ -199,10 +193,10 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     return sections, edited.last
 
 
-def _judged(findings: list[Finding], suspects: Suspects, edited: Edited) -> list[Finding]:
+def _judged(findings: list[Finding], edited: Edited) -> list[Finding]:
     """Return the findings of intersection, as far as the adjustment has not explained or disproved them."""
     if edited.last is None or not edited.is_settled:
-        return [*findings, *(edited.gross or suspects.findings)]
+        return [*findings, *edited.gross]
     known, fitting = {*edited.control}, {*edited.last.block.photo_ids}
     found = []
     for each in findings:
@@ -216,14 +210,10 @@ def _judged(findings: list[Finding], suspects: Suspects, edited: Edited) -> list
     return [*found, *edited.gross]
 
 
-def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:
-    """Correct mistakes in control, or in observed positions of photos, as a whole.
-
-    Returns the view, and whether it has changed.
-    """
-    start = view
+def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> View:
+    """Return the view with corrected mistakes in control, or in observed positions of photos, as a whole."""
     for _ in range(MOST_SETS):
-        good = of_photos(kept_images(view.block, ~view.images(suspects.images)), ~suspects.photos)
+        good = suspects.excluded_from(view.block)
         mistakes = ((each, each(good, adjusted)) for each in at("set"))
         mistake, found = next((pair for pair in mistakes if pair[1] is not None), (None, None))
         if mistake is None or found is None:
@@ -232,12 +222,11 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
         if not found.judged.explained:
             break
         view = view.changed(found.best[0].change)
-    return view, view is not start
+    return view
 
 
 def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) -> Edited:
     """Adjust the block, or only intersect it if its stations are good enough."""
-    suspects = replace(suspects, images=view.images(suspects.images))
     if not manner.intersect_only:
         return edit(view.block, suspects, adjusted)
     met = Rays.of(view.seen).intersect()
@@ -245,7 +234,7 @@ def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) 
     if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
         return edit(view.block.with_fixed_photos(), suspects, adjusted)
     reason = f"{manner.intersect_only}, and the stations are not adjusted ones"
-    return Edited(None, None, reason, section_of("blunders"), asked=False)
+    return Edited(section_of("blunders"), reason=reason, asked=False)
 
 
 def _after_adjustment(view: View, edited: Edited, words: Words) -> list[Section]:

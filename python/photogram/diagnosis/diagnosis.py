@@ -26,7 +26,6 @@ CONVENTIONS = frozenset(
         "sense-of-rotation",
         "convention",
         "lens",
-        "rolling-shutter",
         "control-set",
         "control-system",
         "observed-positions",

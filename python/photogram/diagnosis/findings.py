@@ -19,7 +19,6 @@ __all__ = [
     "Words",
     "finding",
     "likely",
-    "note",
     "note_all",
     "note_verdict",
     "section_of",
@@ -97,6 +96,19 @@ class Section:
         sentence = str(phrase(code, **fields))
         self.parts.append(Text(f"{sentence[:1].upper()}{sentence[1:].removesuffix('.')}."))
 
+    def note(
+        self,
+        level: Level,
+        code: str,
+        photos: Sequence[str] = (),
+        points: Sequence[str] = (),
+        values: dict[str, float] | None = None,
+        /,
+        **fields: object,
+    ) -> None:
+        """Add a finding; see :func:`finding`."""
+        self.findings.append(finding(level, phrase(code, **fields), photos, points, values))
+
     def figure(self, name: str, value: object) -> None:
         """Add a named value with its unit."""
         fact = Fact(f"{name[:1].upper()}{name[1:]}", str(value))
@@ -124,18 +136,6 @@ def finding(
     """Return a finding; its default kind is the second part of its message code."""
     kind = kind or message.code.split(".")[1]
     return Finding(kind, level, str(message), list(photos), list(points), values or {}, message)
-
-
-def note(
-    section: Section,
-    level: Level,
-    message: Phrase,
-    photos: Sequence[str] = (),
-    points: Sequence[str] = (),
-    values: dict[str, float] | None = None,
-) -> None:
-    """Add a finding to a section; see :func:`finding`."""
-    section.findings.append(finding(level, message, photos, points, values=values))
 
 
 def note_all(section: Section, kind: str, level: Level, messages: Sequence[Message | Phrase | str]) -> None:

@@ -1,31 +1,25 @@
-"""Suspects at initial stations, by intersection: photos, observations, control (Appendix H).
-
-Coarse stations leave large residuals with a pattern; a break in the pattern indicates an error. The
-adjustment decides about suspects (:mod:`photogram.diagnosis.blunders`).
-"""
+"""Suspects at initial stations, by intersection: photos and control (Appendix H)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations, pairwise
+from itertools import chain, combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.diagnosis.findings import Finding, Level, Section, finding, note, section_of
-from photogram.diagnosis.robust import fit, mad_sd
-from photogram.lazy_dataclasses import dataclass
+from photogram.diagnosis.findings import Level, Section, section_of
+from photogram.diagnosis.robust import mad_sd
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import Rays, meet
-from photogram.words import phrase
+from photogram.network.subset import kept_images, of_photos
 
 BAD_PHOTO = 4.0  # A bad photo exceeds the median residual of the median photo by this factor,
 BAD_PHOTO_SD = 4.3
 """... and exceeds all photos by this number of robust standard deviations (of the logarithm)."""
-BREAK = 10.0  # Robust standard deviations from the pattern of the photo that are a break
-EXPLAINED = 0.35  # Largest part of the residuals that remains without a wrong image
-FLAGRANT = 24.0  # A break that is grave without an adjustment
+MISSING = 10.0  # Residual of a ray that misses its point, relative to the median of its photo
 CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
 """Control differences in robust standard deviations that are reported."""
 FEWEST_CONTROL = 4  # Control points that a comparison needs
@@ -36,40 +30,30 @@ AS_WELL = 3.0  # Least ratio of the remaining residual without one ray to that o
 MOST_PHOTOS = 20
 
 
-@dataclass(frozen=True, eq=False)
-class Suspects:
+class Suspects(NamedTuple):
     """Observations that the adjustment may have to exclude."""
 
-    images: Bools  # (m,) images that break the pattern of residuals
     photos: Bools  # (P,) bad photos
+    points: Bools  # (n,) points whose rays miss each other
     control: Bools  # (n,) control points far from the intersections of their rays
-    # Findings on these points if there is no adjustment
-    findings: Sequence[Finding] = ()
+
+    def excluded_from(self, block: Block) -> Block:
+        """Return a block without suspects."""
+        return of_photos(kept_images(block, ~self.points[block.image_points]), ~self.photos)
 
 
 def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
-    """Find bad photos, points with gross errors, and distant control.
+    """Find bad photos, points whose rays miss each other, and control far from its rays.
 
     `unit` is the printed unit of image coordinates.
     """
     section = section_of("gross")
     rays, bad = _bad_photos(Rays.of(block, unit=unit), section)
-    met = rays.intersect()
-    departure = _departures(rays, met.residuals)
-    meeting = _Meeting(rays)
-    images, findings = np.zeros(len(block.image_xy), dtype=bool), []
-    for point in np.unique(block.image_points[departure > BREAK]).tolist():
-        rows = np.flatnonzero(rays.used & (block.image_points == point))
-        before, largest = float(np.nanmax(met.sizes[rows])), float(departure[rows].max())
-        images[meeting.suspected(rows)] = True
-        photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
-        fields = {"point": block.point_ids[point], "before": before, "unit": rays.unit, "photos": photos}
-        values = {f"residual_{rays.unit}": before, "departure_sd": largest}
-        level: Level = "grave" if largest > FLAGRANT else "look"
-        message = phrase("check.gross-error.some", **fields)
-        findings.append(finding(level, message, photos, [block.point_ids[point]], values))
-    control = _control(rays.without(images), section)
-    return section, Suspects(images, bad, control, findings)
+    sizes = rays.intersect().sizes
+    usual = _medians(block, sizes, rays.used)[block.image_photos]
+    points = np.zeros(len(block.point_ids), dtype=bool)
+    points[block.image_points[rays.used & (sizes > MISSING * np.maximum(usual, block.image_sd.max()))]] = True
+    return section, Suspects(bad, points, _control(rays.without(points[block.image_points]), section))
 
 
 class _Meeting:
@@ -111,12 +95,6 @@ class _Meeting:
         is_parted = left < PARTED * before and AS_WELL * left < self.without_one(rows)[0]
         return (one, other, before) if is_parted else None
 
-    def suspected(self, rows: Indices) -> Indices:
-        """Return the image of a point without which the others intersect well; all if there is none."""
-        left, place = self.without_one(rows)
-        is_one = left < EXPLAINED * self.largest(rows) and self.parted(rows) is None
-        return rows[[place]] if is_one else rows
-
 
 def parted_rays(block: Block, points: Sequence[int]) -> Iterator[tuple[int, Indices, Indices, float]]:
     """Yield points whose rays meet in two groups: the photos of both, and the largest residual of all.
@@ -150,9 +128,9 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
         photo, usual, rays = worst
         bad[photo] = True
         name, size, unit = block.photo_ids[photo], float(medians[photo]), rays.unit
-        message = phrase("check.bad-photo.residuals", photo=name, residual=size, others=usual, unit=unit)
+        fields = {"photo": name, "residual": size, "others": usual, "unit": unit}
         values = {f"median_residual_{unit}": size, "times_usual": size / usual}
-        note(section, "grave", message, [name], values=values)
+        section.note("grave", "check.bad-photo.residuals", [name], [], values, **fields)
     return rays, bad
 
 
@@ -191,35 +169,8 @@ def _medians(block: Block, sizes: Floats, used: Bools) -> Floats:
     return medians
 
 
-def _departures(rays: Rays, residuals: Floats) -> Floats:
-    """(m,) robust standardized distances of residuals from their photo's linear pattern."""
-    block = rays.block
-    rows = np.flatnonzero(rays.used & np.isfinite(residuals).all(axis=1))
-    rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
-    photos = np.unique(block.image_photos[rows])
-    bounds = np.searchsorted(block.image_photos[rows], [*photos.tolist(), len(block.photo_ids)]).tolist()
-    departures = np.zeros(len(block.image_xy))
-    spreads = np.zeros(len(photos))
-    for index, (first, last) in enumerate(pairwise(bounds)):
-        own = rows[first:last]
-        xy = block.image_xy[own]
-        design = np.column_stack([np.ones(len(own)), xy / 100]) if len(own) >= 8 else np.ones((len(own), 1))
-        left = residuals[own] - design @ fit(design, residuals[own])
-        departures[own] = np.linalg.norm(left, axis=1)
-        spreads[index] = mad_sd(left)
-    usual = float(np.median(spreads)) if spreads.size else 0.0
-    smallest = block.image_sd.max(axis=1)
-    spread = np.zeros(len(block.photo_ids))
-    spread[photos] = np.maximum(spreads, usual)
-    scaled: Floats = departures / np.maximum(spread[block.image_photos], smallest)
-    return scaled
-
-
 def _control(rays: Rays, section: Section) -> Bools:
-    """Compare control with intersected positions and report conspicuous differences.
-
-    Returns (n,) the points with grave differences.
-    """
+    """Compare control with intersected positions; report and return (n,) conspicuous differences."""
     block = rays.block
     held = np.isfinite(block.point_sd)
     met = rays.intersect().positions
@@ -231,8 +182,9 @@ def _control(rays: Rays, section: Section) -> Bools:
     differences = np.where(held[control], met[control] - rays.axes.positions(given), np.nan)
     for axis, name in enumerate(("east", "north", "up") if block.geographic else ("X", "Y", "Z")):
         _control_component(block, control, differences[:, axis], name, section)
-    grave = [each for each in section.findings if each.kind == "control-difference" and each.level == "grave"]
-    return np.isin(block.point_ids, [name for finding in grave for name in finding.points])
+    return np.isin(
+        block.point_ids, [*chain(*(each.points for each in section.findings if each.level == "grave"))]
+    )
 
 
 def _control_component(
@@ -257,5 +209,5 @@ def _control_component(
             point, difference = block.point_ids[control[row]], float(differences[row])
             fields = {"point": point, "axis": name, "difference": difference, "unit": unit}
             level: Level = "grave" if size > CONTROL_GRAVE else "look"
-            message = phrase("check.control-difference", **fields)
-            note(section, level, message, [], [point], values={f"difference_{name}": difference})
+            values = {f"difference_{name}": difference}
+            section.note(level, "check.control-difference", [], [point], values, **fields)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection
 
 from photogram.diagnosis.blunders import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note, section_of, small_unit
+from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, section_of, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
@@ -23,7 +23,7 @@ def key_numbers(edited: Edited, words: Words) -> Section:
     first, last = edited.first, edited.last
     if first is None or last is None:
         level: Level = "grave" if edited.asked else "look"
-        note(section, level, phrase("check.no-adjustment", reason=edited.reason))
+        section.note(level, "check.no-adjustment", reason=edited.reason)
         return section
     _statuses(first, last, section)
     rows = [("as it is", first)] if first is last else [("as it is", first), ("without what is named", last)]
@@ -55,18 +55,20 @@ def _squares(last: Result, words: Words, section: Section) -> None:
 def _statuses(first: Result, last: Result, section: Section) -> None:
     section.figure("status", f"{last.status} after {len(last.iterations)} iterations")
     if not last.converged:
-        note(section, "grave", phrase("check.not-converged.last", status=last.status))
+        section.note("grave", "check.not-converged.last", status=last.status)
     elif not first.converged:
-        note(section, "look", phrase("check.not-converged.first", status=first.status))
+        section.note("look", "check.not-converged.first", status=first.status)
 
 
 def _variance(result: Result, section: Section) -> None:
     variance = result.variance_of_unit_weight
     if variance is None:
-        note(section, "grave", phrase("check.no-redundancy"))
+        section.note("grave", "check.no-redundancy")
     elif not VARIANCE[0] < variance < VARIANCE[1] and result.unit_variance != "unity":
-        message = phrase("check.weights.variance", variance=variance, factor=math.sqrt(variance))
-        note(section, "look", message, values={"variance_of_unit_weight": variance})
+        fields = {"variance": variance, "factor": math.sqrt(variance)}
+        section.note(
+            "look", "check.weights.variance", [], [], {"variance_of_unit_weight": variance}, **fields
+        )
 
 
 def _between(low: str, high: str, unit: str) -> str:
@@ -85,8 +87,8 @@ def _weights(result: Result, words: Words, section: Section) -> None:
     )
     usual = words.usual_um
     if usual is not None and unit == "um" and (low < usual[0] or high > usual[1]):
-        message = phrase("check.weights.usual", low=low, high=high, least=usual[0], most=usual[1])
-        note(section, "look", message, values={"least_um": low, "largest_um": high})
+        fields = {"low": low, "high": high, "least": usual[0], "most": usual[1]}
+        section.note("look", "check.weights.usual", [], [], {"least_um": low, "largest_um": high}, **fields)
 
 
 def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block, flown_by
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
-from photogram.results.snooping_log import Removal
+from photogram.results.snooping_log import Exchange, Removal
 from photogram.results.snooping_result import Snooped
 from photogram.show.quantity import Axis, Table, column
 from photogram.statistics.limits import normal_limit
@@ -35,7 +36,7 @@ SHOWN = 20
 
 
 class Misfits:
-    """Findings on a block of which (m,) images were suspected before data snooping."""
+    """Findings on a block of which (m,) images of undetermined points were excluded before data snooping."""
 
     def __init__(self, block: Block, suspected: Bools, found: Snooped, result: Result) -> None:
         assert isinstance(found.suspects, BlockSuspects)
@@ -47,7 +48,7 @@ class Misfits:
         self.tail = max(1.0, float(np.quantile(values, 0.95)) / TWENTIETH) if values.size else 1.0
 
         self.in_section: list[Finding] = []  # on observations of the adjustment
-        self.of_suspects: list[Finding] = []  # on photos, names, and images that intersection suspects
+        self.of_suspects: list[Finding] = []  # on photos, names, and images of undetermined points
         self.control: dict[str, list[Finding]] = {}  # on components of control, by point
         # Errors against the others are exact, also if they are large.
         entries = [
@@ -55,7 +56,7 @@ class Misfits:
             for entry in found.log
             if entry.returned is None
         ]
-        explained = self._exchanged() | (set() if flown_by(block) else self._parted(entries))
+        explained = set() if flown_by(block) else self._parted(entries)
         for entry in entries:
             if self._image_of(entry) not in explained:
                 self._add(entry)
@@ -81,19 +82,6 @@ class Misfits:
             self.of_suspects += self._errors(entry)
         else:
             self.in_section += self._errors(entry)
-
-    def _exchanged(self) -> set[int]:
-        """Add exchanged names; return the images that they explain."""
-        block, explained = self.block, set[int]()
-        for each in self.found.exchanged:
-            photo, points = each.photos[0], list(each.points)
-            message = phrase("check.exchanged-points", points=points, photo=photo)
-            values = {"statistic_as_named": each.as_named, "statistic_exchanged": each.exchanged}
-            self.of_suspects.append(finding("grave", message, [photo], points, values))
-            rows = [block.point_ids.index(point) for point in points]
-            on = np.isin(block.image_points, rows) & (np.array(block.photo_ids)[block.image_photos] == photo)
-            explained |= {*np.flatnonzero(on).tolist()}
-        return explained
 
     def _parted(self, entries: list[Removal]) -> set[int]:
         """Add names of two points, the rays of which intersect in two groups; return their images."""
@@ -174,6 +162,16 @@ class Misfits:
             code = f"check.rival.{'two-rays' if two else 'images'}"
         others = [ids[of[own]] for own in rivals if of[own] >= 0]
         return phrase(code, names=others) if others else "", others
+
+
+def exchanged(exchanges: Iterable[Exchange]) -> list[Finding]:
+    """Return findings on exchanged names."""
+    found = []
+    for each in exchanges:
+        message = phrase("check.exchanged-points", points=list(each.points), photo=each.photos[0])
+        values = {"statistic_as_named": each.as_named, "statistic_exchanged": each.exchanged}
+        found.append(finding("grave", message, [each.photos[0]], each.points, values))
+    return found
 
 
 def _shown(error: float, unit: str, kind: int) -> tuple[float, str]:

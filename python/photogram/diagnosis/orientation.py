@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.conventions import distances_in_millimetres, latitudes, readings, verdicts
-from photogram.diagnosis.findings import Finding, Section, Words, finding, note, note_all, section_of
+from photogram.diagnosis.findings import Finding, Section, Words, finding, note_all, section_of
 from photogram.diagnosis.hypotheses import KAPPA, TURNS
 from photogram.diagnosis.predictions import Predicted
 from photogram.diagnosis.views import View
@@ -71,7 +71,7 @@ def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: 
     cost = _mean(_costs(after, met_after))
     section.findings += _unexplained(_above(rays, met), explanations, whole, view.seen) + explanations
     if cost > SUSPICIOUS:
-        note(section, "grave", phrase("check.rays-do-not-meet", sense=words.sense), values={"cost": cost})
+        section.note("grave", "check.rays-do-not-meet", [], [], {"cost": cost}, sense=words.sense)
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
     section.figure("rays that meet behind their camera", f"{behind} of {int(known.sum())}")

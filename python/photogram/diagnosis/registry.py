@@ -11,12 +11,12 @@ from typing import Any, Literal
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
-Stage = Literal["lens", "set", "data", "misfit", "residuals", "fit"]
+Stage = Literal["lens", "set", "data", "misfit", "fit"]
 """When a mistake is sought, and the arguments of the function.
 
 `lens`, `set`: before gross errors, of a block and an adjuster; explained by adjustments.
 `data`: of a block that cannot be adjusted or fits badly. `misfit`: the same, of a block and an adjuster.
-`residuals`: of a result that does not fit. `fit`: of a converged result."""
+`fit`: of a converged result."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,6 @@ REGISTRY = (
     Mistake("convention", "data", "conventions.hints"),
     Mistake("trajectory", "data", "trajectory_hints.flown_hints"),
     Mistake("readout", "misfit", "shutters.readout_hints"),
-    Mistake("rolling-shutter", "residuals", "shutters.rolling_hints"),
     Mistake("backward-readout", "fit", "shutters.backward_readouts"),
     Mistake("clock", "fit", "clocks.known_offsets"),
     Mistake("seam", "fit", "film_scans.seam_hints"),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.diagnosis.findings import Section, note, section_of, small_unit
+from photogram.diagnosis.findings import Section, section_of, small_unit
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
@@ -15,7 +15,6 @@ from photogram.results.result import Result
 from photogram.show.quantity import Axis, Table, column
 from photogram.statistics.limits import normal_limit
 from photogram.statistics.patterns import group_patterns
-from photogram.words import phrase
 
 CHANCE = 0.01  # Probability that any photo of a correct network is named
 WORTH = 0.3  # Notable amplitude of a common pattern (sd of an image coordinate)
@@ -84,9 +83,7 @@ def _sums(result: Result, section: Section) -> None:
         if sizes[point].max() > limit:
             x, y = factor * sums[point]
             name = block.point_ids[point]
-            note(
-                section, "look", phrase("check.unbalanced-point", point=name, x=x, y=y, unit=unit), [], [name]
-            )
+            section.note("look", "check.unbalanced-point", [], [name], point=name, x=x, y=y, unit=unit)
 
 
 def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
@@ -130,7 +127,7 @@ def _frame_pattern(result: Result, plain: Block, spread: float, section: Section
             fields = {"pattern": name, "amplitude": factor * amplitude, "unit": unit}
             fields |= {"radius": size, "image_unit": block.image_unit}
             values = {f"amplitude_{unit}": factor * amplitude, "significance_sd": significance}
-            note(section, "look", phrase("check.systematic-pattern", **fields), values=values)
+            section.note("look", "check.systematic-pattern", [], [], values, **fields)
 
 
 def _photo_patterns(result: Result, spread: float, section: Section) -> None:
@@ -147,5 +144,5 @@ def _photo_patterns(result: Result, spread: float, section: Section) -> None:
         fields = {"x": x, "y": y, "unit": unit, "statistic": float(statistics[photo])}
         values = {f"mean_x_{unit}": x, f"mean_y_{unit}": y, "statistic": fields["statistic"]}
         name = block.photo_ids[photo]
-        note(section, "look", phrase("check.photo-pattern", photo=name, **fields), [name], values=values)
+        section.note("look", "check.photo-pattern", [name], [], values, photo=name, **fields)
     section.figure("photos tested for a pattern of their own", f"{int(tested.sum())} of {count}")

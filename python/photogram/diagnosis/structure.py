@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.diagnosis.findings import Section, Words, note, section_of
+from photogram.diagnosis.findings import Section, Words, section_of
 from photogram.network.block import Block
 from photogram.network.structuring import FEWEST_TIES, structure, ties
 from photogram.results.document import bandwidths
 from photogram.results.result import Result
-from photogram.words import phrase
 
 
 def structure_section(block: Block, result: Result | None, words: Words) -> Section:
@@ -28,8 +27,8 @@ def structure_section(block: Block, result: Result | None, words: Words) -> Sect
     tied = ties(block)
     for photo in np.flatnonzero(tied < FEWEST_TIES).tolist():
         name, count = block.photo_ids[photo], int(tied[photo])
-        message = phrase("check.few-ties", photo=name, n=count, least=FEWEST_TIES)
-        note(section, "grave", message, [name], values={"ties": float(count)})
+        fields = {"photo": name, "n": count, "least": FEWEST_TIES}
+        section.note("grave", "check.few-ties", [name], [], {"ties": float(count)}, **fields)
     _parts(block, section)
     return section
 
@@ -62,7 +61,7 @@ def _parts(block: Block, section: Section) -> None:
     largest = numbers[sizes.argmax()]
     for number in numbers[numbers != largest].tolist():
         names = [block.photo_ids[photo] for photo in np.flatnonzero(parts == number).tolist()]
-        note(section, "grave", phrase("check.separate-part", photos=names), names)
+        section.note("grave", "check.separate-part", names, photos=names)
 
 
 def parts_of(block: Block) -> Indices:

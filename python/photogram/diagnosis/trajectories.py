@@ -14,8 +14,8 @@ import numpy as np
 from photogram.adjustment.snooping import snoop
 from photogram.diagnosis.after_adjustment import explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.findings import Section, note, note_all, note_verdict, section_of
-from photogram.diagnosis.misfits import Misfits
+from photogram.diagnosis.findings import Section, note_all, note_verdict, section_of
+from photogram.diagnosis.misfits import Misfits, exchanged
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.registry import hints_at
 from photogram.diagnosis.structure import structure_section
@@ -25,7 +25,6 @@ from photogram.network.block import Block, flown_by
 from photogram.network.motion import timed_photos
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
-from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.diagnosis.findings import Words
@@ -48,7 +47,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     try:
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
-        note(section, "grave", phrase("check.no-adjustment", reason=str(error)))
+        section.note("grave", "check.no-adjustment", reason=str(error))
         hints = hints_at("data", block) or hints_at("misfit", block, adjusted)
         note_all(section, "convention", "grave", hints)
         return [structure, section], None
@@ -62,7 +61,12 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
         and (result.converged or found.result.converged)
     ):
         misfits = Misfits(block, np.zeros(len(block.image_xy), dtype=bool), found, found.result)
-        section.findings += [*misfits.of_suspects, *misfits.in_section, *chain(*misfits.control.values())]
+        section.findings += [
+            *exchanged(found.exchanged),
+            *misfits.of_suspects,
+            *misfits.in_section,
+            *chain(*misfits.control.values()),
+        ]
     note_verdict(section, result.verdict)
     return [structure, section], result
 

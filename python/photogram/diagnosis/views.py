@@ -6,7 +6,6 @@ from typing import Self
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Indices
 from photogram.diagnosis.mistakes import Change
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
@@ -34,29 +33,22 @@ class View:
     # Without distortion, and without photos on frames, which lack poses of their own. Photos and points are
     # the same as in `block`
     seen: Block
-    rows: Indices  # (k,) rows in `block` of the observations of `seen`
 
     @classmethod
     def of(cls, block: Block) -> Self:
         """Return the view of a block whose photos have poses."""
         if not block.cameras and not block.mounts:
-            return cls(block, block, np.arange(len(block.image_xy)))
+            return cls(block, block)
         plain, visible = seen_without_lenses(block)
         block = block if visible.all() else kept_images(block, np.flatnonzero(visible))
         mounted = np.isin(block.photo_ids, [each.photo for each in block.mounts])
         rows = np.flatnonzero(~mounted[block.image_photos])
-        return cls(block, kept_images(plain.replace(mounts=()), rows), rows)
+        return cls(block, kept_images(plain.replace(mounts=()), rows))
 
     @property
     def unit(self) -> str:
         """Unit of image coordinates."""
         return self.block.image_unit
-
-    def images(self, of_seen: Bools) -> Bools:
-        """(m,) mask of observations of `block` from a (k,) mask of `seen`."""
-        found = np.zeros(len(self.block.image_xy), dtype=bool)
-        found[self.rows] = of_seen
-        return found
 
     def changed(self, change: Change) -> Self:
         """Return the view of the corrected block."""
@@ -76,4 +68,4 @@ class View:
         if same and np.array_equal(meant.known_distances("checks"), self.seen.known_distances("checks")):
             block = self.block.replace(**{name: getattr(meant, name) for name in _SHARED})
             return replace(self, block=block, seen=meant)
-        return replace(self, block=meant, seen=meant, rows=np.arange(len(meant.image_xy)))
+        return replace(self, block=meant, seen=meant)

@@ -9,7 +9,7 @@ were free (Rao's score, :func:`photogram.score_test`). T is chi-square with the 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -209,65 +209,19 @@ def how_to_calibrate(block: Block) -> Phrase | None:
 TAKEN_UP = 1e-9  # Smaller parts of the partials are rounding errors
 
 
-@dataclass(frozen=True, eq=False)
-class Scores:
-    """Scores of unknowns that a network does not have."""
-
-    partials: Floats  # (k, m, 2) B, in standard deviations of the images
-    projected: Floats  # (k, m, 2) R B
-    residuals: Floats  # (m, 2) v, in standard deviations; zero for unused images
-
-    @classmethod
-    def of(cls, factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> Scores:
-        return cls(partials, factor.project_images(partials, threads=0, progress=None), residuals)
-
-    @cached_property
-    def vector(self) -> Floats:
-        """(k,) c = B' v."""
-        return np.asarray(self.partials.reshape(len(self.partials), -1) @ self.residuals.ravel())
-
-    @cached_property
-    def matrix(self) -> Floats:
-        """(k, k) C = B' R B."""
-        k = len(self.partials)
-        matrix = self.partials.reshape(k, -1) @ self.projected.reshape(k, -1).T
-        return np.asarray((matrix + matrix.T) / 2)
-
-    @cached_property
-    def sizes(self) -> Floats:
-        """(k,) roots of the diagonal of B' B."""
-        return np.asarray(np.sqrt(np.einsum("kmi,kmi->k", self.partials, self.partials)))
-
-    def estimate(self, groups: Indices) -> tuple[float, float]:
-        """Return the first-order estimate of the first unknown, and its sd.
-
-        It follows from the differences of (m,) groups of images in it, c_g - x C_g, which include individual
-        deformations of each group. It is arbitrary if unknowns absorb it.
-        """
-        # R v = v: the absorbed part of B does not contribute to either sum.
-        of_images = [(self.projected[0] * each).sum(axis=1) for each in (self.residuals, self.projected[0])]
-        c, own = (np.bincount(groups, each) for each in of_images)
-        total = float(own.sum())
-        if not total > TAKEN_UP * self.sizes[0] ** 2:
-            return 0.0, np.inf
-        value = float(c.sum()) / total
-        return value, float(np.sqrt(((c - value * own) ** 2).sum())) / total
-
-    def fall(self, first: int = 0) -> float:
-        """Return T = c' C^-1 c of scores from `first` on, without absorbed parts."""
-        return self.fall_and_absorbed(first)[0]
-
-    def fall_and_absorbed(self, first: int = 0) -> tuple[float, bool]:
-        """Return this T, and whether unknowns absorb a part, or no image depends on one."""
-        own = np.flatnonzero(self.sizes[first:] > 0) + first
-        sizes = self.sizes[own]
-        values, vectors = np.linalg.eigh(self.matrix[np.ix_(own, own)] / np.outer(sizes, sizes))
-        kept = values > TAKEN_UP
-        along = vectors[:, kept].T @ (self.vector[own] / sizes)
-        return float((along**2 / values[kept]).sum()), int(kept.sum()) < len(self.sizes) - first
-
-
 def score(factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> float | None:
-    """Return T = c' C^-1 c; None if absorbed; see :meth:`Scores.of`."""
-    statistic, is_absorbed = Scores.of(factor, partials, residuals).fall_and_absorbed()
-    return None if is_absorbed else statistic
+    """Return T = c' C^-1 c of (k, m, 2) `partials` B; None if unknowns absorb a part of B.
+
+    `partials` and (m, 2) `residuals` are in standard deviations of the images; those of unused images are 0.
+    """
+    flat = partials.reshape(len(partials), -1)
+    sizes = np.sqrt(np.einsum("kr,kr->k", flat, flat))
+    if not (sizes > 0).all():
+        return None
+    projected = factor.project_images(partials, threads=0, progress=None).reshape(flat.shape)
+    matrix = flat @ projected.T
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2 / np.outer(sizes, sizes))
+    if not (values > TAKEN_UP).all():
+        return None
+    along = vectors.T @ (flat @ residuals.ravel() / sizes)
+    return float((along**2 / values).sum())
