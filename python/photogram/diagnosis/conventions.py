@@ -9,7 +9,6 @@ The criterion is the ratio of the misfit m under a hypothesis to the misfit of t
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,13 +16,12 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.hypotheses import attitude_readings, hypotheses, turns
 from photogram.diagnosis.mistakes import Adjuster, Proposal
-from photogram.diagnosis.predictions import EACH, PASSES, SUSPICION, Predicted, predict
+from photogram.diagnosis.predictions import EACH, SUSPICION, Predicted, predict
 from photogram.diagnosis.regression import (
     LEAST,
     MOST,
     UNKNOWN,
     control_misfit,
-    control_residuals,
     eligible,
     given_points,
     misfits,
@@ -32,6 +30,7 @@ from photogram.diagnosis.regression import (
     view,
 )
 from photogram.diagnosis.views import View
+from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block, checked
@@ -70,70 +69,56 @@ def verdicts(block: Block) -> list[Predicted]:
     photos = eligible(block)
     if not len(photos):
         return []
-    seen = misfits(view(block, photos), photos)
-    chosen = spread(photos, MOST)
-    looked = view(block, chosen)
-    if np.median(seen) > SUSPICION:
-        fits = regressions(looked, chosen)
-        tried, misfit = hypotheses(looked, fits), partial(misfits, photos=chosen)
-        if (found := predict(tried, looked, fits.misfit, misfit)) is not None:
+    seen, chosen = misfits(view(block, photos), photos), spread(photos, MOST)
+    looked, common = view(block, chosen), bool(np.median(seen) > SUSPICION)
+    if common:
+        tried = hypotheses(looked, regressions(looked, chosen))
+        if (found := predict(tried, looked, partial(misfits, photos=chosen))) is not None:
             return [found]
     worst = photos[np.argsort(-seen)][:MOST]
     some = _of_groups(block, photos) or _single(block, np.sort(worst[np.sort(-seen)[:MOST] < -SUSPICION]))
-    return some or (_of_control(looked, chosen) if np.median(seen) <= SUSPICION else [])
+    return some or ([] if common else _of_control(looked, chosen))
 
 
 def _of_groups(block: Block, photos: Indices) -> list[Predicted]:
     """Try turned images of all photos with the same principal distance."""
     distances, found = block.known_distances("hints"), []
     for distance in np.unique(distances) if np.ptp(distances) else ():
-        own = spread(photos[distances[photos] == distance], MOST)
-        looked = view(block, own)
-        given = misfits(looked, own)
-        if len(own) and np.median(given) > SUSPICION:
-            names = [block.photo_ids[photo] for photo in np.flatnonzero(distances == distance).tolist()]
-            of = {"photos": names, "distance": float(distance)}
-            tried, misfit = turns(block, distances == distance), partial(misfits, photos=own)
-            if (fitting := predict(tried, looked, given, misfit, **of)) is not None:
-                found.append(fitting)
-    return found
+        own, group = spread(photos[distances[photos] == distance], MOST), distances == distance
+        names = [block.photo_ids[photo] for photo in np.flatnonzero(group).tolist()]
+        of = {"photos": names, "distance": float(distance)}
+        found.append(predict(turns(block, group), view(block, own), partial(misfits, photos=own), **of))
+    return [each for each in found if each is not None]
 
 
 def _of_control(looked: Block, photos: Indices) -> list[Predicted]:
     """Find hypotheses for rays that intersect well but miss the given points."""
-    given = control_misfit(looked)
-    if not given_points(looked)[looked.image_points].any() or given <= SUSPICION:
-        return []
-    before = float(np.median(control_residuals(looked)))
+    _, before = control_misfit(looked)
 
     def misfit(meant: Block) -> Floats:
         # Most observations must improve, not only the ones of a few distant points.
-        improves = float(np.median(control_residuals(meant))) < EACH * before
-        fits = improves and np.median(misfits(meant, photos)) < SUSPICION
-        return np.array([control_misfit(meant) if fits else UNKNOWN])
+        found, median = control_misfit(meant)
+        fits = meant is looked or (median < EACH * before and np.median(misfits(meant, photos)) < SUSPICION)
+        return np.array([found if fits else UNKNOWN])
 
-    found = predict(hypotheses(looked), looked, np.array([given]), misfit)
+    found = predict(hypotheses(looked), looked, misfit)
     return [] if found is None else [found]
 
 
 def _single(block: Block, photos: Indices) -> list[Predicted]:
-    """Try photos one by one, with the other photos unchanged."""
-    by_names: dict[tuple[str, ...], tuple[dict[str, float], float, list[int]]] = {}
+    """Try photos one by one, with the other photos unchanged; join photos with the same mistake."""
+    alike: dict[tuple[str, ...], Predicted] = {}
+    rows = np.arange(len(block.photo_ids))
     for photo in photos.tolist():
         own = np.array([photo])
-        looked = view(block, own)
-        given = float(misfits(looked, own)[0])
-        tried = turns(block, np.arange(len(block.photo_ids)) == photo)
-        left = {each.name: float(misfits(each.change(looked), own)[0]) for each in tried}
-        fitting = {name: misfit for name, misfit in left.items() if misfit < min(PASSES * given, SUSPICION)}
-        if fitting:
-            by_names.setdefault(tuple(sorted(fitting)), (fitting, given, []))[2].append(photo)
-    found = []
-    for fitting, given, alike in by_names.values():
-        tried = turns(block, np.isin(np.arange(len(block.photo_ids)), alike))
-        best = [(fitting[each.name], each) for each in tried if each.name in fitting]
-        found.append(Predicted(best, given, [block.photo_ids[photo] for photo in alike]))
-    return found
+        found = predict(turns(block, rows == photo), view(block, own), partial(misfits, photos=own))
+        if found is not None:
+            first = alike.get((*found.names,), found)
+            names = [*first.photos, block.photo_ids[photo]]
+            tried = {each.name: each for each in turns(block, np.isin(block.photo_ids, names))}
+            best = [tried[name] for name in found.names]
+            alike[(*found.names,)] = replace(first, best=best, photos=names)
+    return [*alike.values()]
 
 
 def latitudes(block: Block) -> list[Message]:

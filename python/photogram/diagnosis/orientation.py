@@ -44,7 +44,7 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
             blocks = blocks or [view.seen, view.seen]
         else:
             section.findings.append(finding("grave", found.message, kind="convention"))
-        view, exact = view.changed(found.change), exact and found.exact
+        view, exact = view.changed(found.best[0].change), exact and found.best[0].exact
         if side and len(found.photos) != 1:
             blocks[1] = view.seen
     bars = distances_in_millimetres(view.seen)

@@ -13,8 +13,9 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.diagnosis.mistakes import Proposal
 from photogram.diagnosis.regression import UNKNOWN
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 SUSPICION = 0.35  # Misfit m above which photos are examined
 PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
@@ -24,51 +25,46 @@ EACH = 0.5
 AS_GOOD = 1.5  # Another proposal is as good if its misfit is below this multiple of the least
 
 
+@dataclass(frozen=True, eq=False)
 class Predicted:
-    """Proposals with which predictions fit, best first; several if the data do not decide.
+    """Proposals with which predictions fit, best first; several if the data do not decide."""
 
-    `photos` lists the photos with the mistake, empty for all photos; `distance` is their principal distance,
-    if they are all photos with it. `change` and `exact` belong to the first proposal.
-    """
+    best: list[Proposal]
+    before: float  # Median misfit of the given and of the corrected data
+    after: float
+    photos: Sequence[str] = ()  # With the mistake; empty for all photos
+    what: str = "images"
+    distance: float | None = None  # Principal distance of these photos, if they are all photos with it
 
-    def __init__(
-        self,
-        found: list[tuple[float, Proposal]],
-        given: float,
-        photos: Sequence[str] = (),
-        what: str = "images",
-        distance: float | None = None,
-    ) -> None:
-        found.sort(key=lambda each: each[0])
-        least = found[0][0]
-        best = [each for misfit, each in found if misfit <= AS_GOOD * least]
-        # The same mistake may occur in several forms.
-        best = list({str(each.message): each for each in reversed(best)}.values())[::-1]
-        self.names = [each.name for each in best]
-        self.change, self.exact = best[0].change, best[0].exact
-        self.photos, self.distance = photos, distance
-        self.before, self.after = given, least
-        self.message = phrase(
-            f"convention.{'likely' if len(best) == 1 else 'one-of'}",
-            causes=[each.message for each in best],
-            photos=phrase("convention.photos", n=len(photos), photos=list(photos)) if photos else "",
-            misfit=phrase(f"convention.misfit.{what}", misfit=least),
-            before=phrase("convention.before", misfit=given) if given < UNKNOWN else "",
+    @property
+    def names(self) -> list[str]:
+        """Names of the mistakes."""
+        return [each.name for each in self.best]
+
+    @property
+    def message(self) -> Phrase:
+        """The message on the mistakes."""
+        photos = list(self.photos)
+        return phrase(
+            f"convention.{'likely' if len(self.best) == 1 else 'one-of'}",
+            causes=[each.message for each in self.best],
+            photos=phrase("convention.photos", n=len(photos), photos=photos) if photos else "",
+            misfit=phrase(f"convention.misfit.{self.what}", misfit=self.after),
+            before=phrase("convention.before", misfit=self.before) if self.before < UNKNOWN else "",
         )
 
 
 def predict(
-    proposals: Iterable[Proposal],
-    block: Block,
-    given: Floats,
-    misfits_of: Callable[[Block], Floats],
-    **of: Any,
+    proposals: Iterable[Proposal], block: Block, misfits_of: Callable[[Block], Floats], **of: Any
 ) -> Predicted | None:
-    """Return the proposals with which the photos of a block fit, if any.
+    """Return the proposals with which the photos of a block fit, if they do not fit without.
 
-    `given` are (k,) misfits of the photos. `misfits_of` returns the misfits of a changed block. `of` are
-    arguments of :class:`Predicted`.
+    `misfits_of` returns the (k,) misfits of a changed block. `of` are members of :class:`Predicted`.
     """
+    given = misfits_of(block)
+    before = float(np.median(given)) if len(given) else 0.0
+    if not before > SUSPICION:
+        return None
     found: dict[str, tuple[float, Proposal]] = {}
     for proposal in proposals:
         left = misfits_of(proposal.change(block))
@@ -76,6 +72,11 @@ def predict(
         limit = PASSES_ROUGH if median > ROUGH else PASSES
         each = (ratio < EACH) | (np.maximum(left, given) < SUSPICION)
         if np.median(ratio) < limit and each.all() and median < SUSPICION:
-            now = (median, proposal)
-            found[proposal.name] = min(found.get(proposal.name, now), now, key=lambda each: each[0])
-    return Predicted([*found.values()], float(np.median(given)), **of) if found else None
+            # The same mistake may occur in several forms.
+            key = str(proposal.message) if proposal.exact else proposal.name
+            found[key] = min(found.get(key, (np.inf, proposal)), (median, proposal), key=lambda own: own[0])
+    if not found:
+        return None
+    after = min(misfit for misfit, _ in found.values())
+    best = sorted(found.values(), key=lambda own: own[0])
+    return Predicted([own for misfit, own in best if misfit <= AS_GOOD * after], before, after, **of)

@@ -12,6 +12,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays
+from photogram.network.subset import kept_images
 
 LEAST = 6  # Known or intersected points that a photo needs
 MOST = 12  # Maximum number of examined photos,
@@ -39,12 +40,7 @@ def view(block: Block, photos: Indices) -> Block:
     seen = np.zeros(len(block.point_ids), dtype=bool)
     seen[block.image_points[chosen]] = True
     seen &= ~given_points(block)
-    images = chosen | seen[block.image_points]
-    return block.replace(
-        image_photos=block.image_photos[images],
-        image_points=block.image_points[images],
-        image_xy=block.image_xy[images],
-        image_sd=block.image_sd[images],
+    return kept_images(block, chosen | seen[block.image_points]).replace(
         photo_position_sd=np.inf,
         photo_attitude_sd=np.inf,
         photo_positions_observed=None,
@@ -78,38 +74,18 @@ def predictions(block: Block) -> Floats:
 def misfits(block: Block, photos: Indices) -> Floats:
     """(k,) m of some photos; very large with too few predicted points."""
     predicted = predictions(block)
-    return np.array([_misfit(block, predicted, photo) for photo in photos])
+    rows = [_rows(block, predicted, photo) for photo in photos]
+    return np.array([relative(block.image_xy[own], predicted[own]) for own in rows])
 
 
-def control_misfit(block: Block) -> float:
-    """Return m of all observations of given points together; very large with too few."""
-    rows = _control_rows(block)
-    if len(rows) < LEAST:
-        return UNKNOWN
-    found = relative(block.image_xy[rows] - predictions(block)[rows], block.image_xy[rows])
-    return found if np.isfinite(found) else UNKNOWN
-
-
-def control_residuals(block: Block) -> Floats:
-    """(k,) relative residuals of given points; infinite without prediction."""
-    rows = _control_rows(block)
-    xy = block.image_xy[rows]
-    spread = float(np.sqrt(((xy - xy.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    found = np.linalg.norm(xy - predictions(block)[rows], axis=1) / spread
-    return np.where(np.isfinite(found), found, np.inf)
-
-
-def _control_rows(block: Block) -> Indices:
-    found: Indices = np.flatnonzero(given_points(block)[block.image_points])
-    return found
-
-
-def _misfit(block: Block, predicted: Floats, photo: int) -> float:
-    rows = _rows(block, predicted, photo)
-    if len(rows) < LEAST:
-        return UNKNOWN
-    found = relative(block.image_xy[rows] - predicted[rows], block.image_xy[rows])
-    return found if np.isfinite(found) else UNKNOWN
+def control_misfit(block: Block) -> tuple[float, float]:
+    """Return m of all observations of given points, very large with too few, and their median residual."""
+    rows = np.flatnonzero(given_points(block)[block.image_points])
+    if not len(rows):
+        return 0.0, 0.0
+    xy, predicted = block.image_xy[rows], predictions(block)[rows]
+    sizes = np.linalg.norm(xy - predicted, axis=1)
+    return relative(xy, predicted), float(np.median(np.where(np.isfinite(sizes), sizes, np.inf)))
 
 
 def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
@@ -117,24 +93,21 @@ def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
     return found
 
 
-def relative(residuals: Floats, observed: Floats) -> float:
-    """Return the rms of residuals relative to the observations about their mean."""
-    return float(np.sqrt((residuals**2).sum() / ((observed - observed.mean(axis=0)) ** 2).sum()))
+def relative(observed: Floats, predicted: Floats) -> float:
+    """Return the rms of residuals relative to the observations about their mean; large with too few."""
+    if len(observed) < LEAST:
+        return UNKNOWN
+    squares = ((observed - predicted) ** 2).sum() / ((observed - observed.mean(axis=0)) ** 2).sum()
+    return float(np.sqrt(squares)) if np.isfinite(squares) else UNKNOWN
 
 
 def regressions(block: Block, photos: Indices) -> Regression:
     """Compute the regression for some photos with enough points."""
     predicted = predictions(block)
     rows = [_rows(block, predicted, photo) for photo in photos]
-    each = [_regressed(block.image_xy[own], predicted[own]) for own in rows]
-    scale, turn, shift, rest = zip(*each, strict=True)
-    return Regression(
-        misfit=np.array([_misfit(block, predicted, photo) for photo in photos]),
-        scale=np.array(scale),
-        turn=np.array(turn),
-        shift=np.array(shift),
-        rest=np.array(rest),
-    )
+    given = [(block.image_xy[own], predicted[own]) for own in rows]
+    columns = zip(*(_regressed(*each) for each in given), strict=True)
+    return Regression(np.array([relative(*each) for each in given]), *map(np.array, columns))
 
 
 def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floats, float]:
@@ -144,8 +117,8 @@ def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floa
     solved = np.linalg.lstsq(design, observed, rcond=None)[0]
     linear = solved[:2].T
     left, _, right = np.linalg.svd(linear)
-    rest = relative(observed - design @ solved, observed)
-    return float(np.sqrt(abs(np.linalg.det(linear)))), left @ right, solved[2], rest
+    scale = float(np.sqrt(abs(np.linalg.det(linear))))
+    return scale, left @ right, solved[2], relative(observed, design @ solved)
 
 
 def spread(photos: Indices, most: int) -> Indices:
@@ -153,9 +126,9 @@ def spread(photos: Indices, most: int) -> Indices:
     return photos[np.unique(np.linspace(0, len(photos) - 1, min(most, len(photos))).round().astype(np.int64))]
 
 
-def eligible(block: Block) -> Indices:
+def eligible(block: Block, least: int = LEAST, most: int = SCANNED) -> Indices:
     """Return a selection of photos with enough points that are given or on two photos."""
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     usable = (given_points(block) | (rays > 1))[block.image_points]
     counts = np.bincount(block.image_photos[usable], minlength=len(block.photo_ids))
-    return spread(np.flatnonzero(counts >= LEAST), SCANNED)
+    return spread(np.flatnonzero(counts >= least), most)

@@ -22,8 +22,8 @@ from photogram.diagnosis.clocks import differences
 from photogram.diagnosis.hypotheses import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
 from photogram.diagnosis.positions import arm_of
-from photogram.diagnosis.predictions import SUSPICION, Predicted, predict
-from photogram.diagnosis.regression import UNKNOWN, given_points, relative, spread
+from photogram.diagnosis.predictions import Predicted, predict
+from photogram.diagnosis.regression import UNKNOWN, eligible, given_points, relative
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -48,21 +48,15 @@ def flown_hints(block: Block) -> list[Message]:
 
 def _of_images(block: Block) -> Predicted | None:
     looked, photos = flown_view(block)
-    given = flown_misfits(looked, photos)
-    if not len(photos) or np.median(given) <= SUSPICION:
-        return None
-    return predict(flown_hypotheses(looked, photos), looked, given, partial(flown_misfits, photos=photos))
+    return predict(flown_hypotheses(looked, photos), looked, partial(flown_misfits, photos=photos))
 
 
 def _of_records(block: Block) -> Predicted | None:
-    given = _records_misfit(block)
-    if not given[0] > SUSPICION:
-        return None
     tried = (
         Proposal(f"records {seconds:+g} s", message, partial(shifted_records, seconds=seconds))
         for message, seconds in shifts("records")
     )
-    return predict(tried, block, given, _records_misfit, what="records")
+    return predict(tried, block, _records_misfit, what="records")
 
 
 def _records_misfit(block: Block) -> Floats:
@@ -71,22 +65,21 @@ def _records_misfit(block: Block) -> Floats:
     for each in block.observations.of_type(Position):
         if (moment := each.moment) is not None:
             records.setdefault(id(moment.trajectory), []).append((moment, each))
-    apart, places, inside = [np.zeros((0, 3))], [np.zeros((0, 3))], 0
+    observed, computed, inside = list[Floats](), list[Floats](), list[bool]()
     for own in records.values():
         trajectory = own[0][0].trajectory
         clocks = [0.0 if at.clock is None else float(at.clock.position[0]) for at, _ in own]
         times = np.array([at.time for at, _ in own]) + clocks
-        ends = trajectory.reach
-        inside += int(np.count_nonzero((times >= ends[0]) & (times <= ends[1])))
-        centres, turned = given_poses(trajectory, np.clip(times, *ends))
-        computed = centres + np.einsum("nij,nj->ni", turned, np.array([arm_of(each) for _, each in own]))
-        places.append(np.array([np.asarray(each.position) for _, each in own]))
-        apart.append(places[-1] - computed)
-    observed = np.concatenate(places)
-    if not len(observed):
+        clipped = np.clip(times, *trajectory.reach)
+        centres, turned = given_poses(trajectory, clipped)
+        computed += [
+            *(centres + np.einsum("nij,nj->ni", turned, np.array([arm_of(each) for _, each in own])))
+        ]
+        observed += [np.asarray(each.position) for _, each in own]
+        inside += [*(times == clipped)]
+    if not observed:
         return np.zeros(1)
-    m = relative(np.concatenate(apart), observed) if 2 * inside >= len(observed) else UNKNOWN
-    return np.array([m])
+    return np.array([relative(np.array(observed), np.array(computed)) if np.mean(inside) >= 0.5 else UNKNOWN])
 
 
 KILOMETRE = 1000.0
@@ -219,15 +212,11 @@ SEEN = 0.8  # Least part of the points of a photo that its trajectory passes
 
 def flown_view(block: Block) -> tuple[Block, Indices]:
     """Return the part of a block for comparing photos on trajectories, and these photos."""
-    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
-    usable = (given_points(block) | (rays > 1))[block.image_points]
-    counts = np.bincount(block.image_photos[usable], minlength=len(block.photo_ids))
-    photos = spread(np.flatnonzero(timed_photos(block) & (counts >= LEAST)), MOST)
-    own = np.flatnonzero(usable & np.isin(block.image_photos, photos))
-    points = np.unique(block.image_points[own])
+    moving = kept_images(block, timed_photos(block)[block.image_photos])
+    photos = eligible(moving, LEAST, MOST)
+    points = np.unique(moving.image_points[np.isin(moving.image_photos, photos)])
     points = points[:: max(1, len(points) // (POINTS * max(len(photos), 1)))]
-    moving = timed_photos(block)[block.image_photos]
-    looked = kept_images(block, np.isin(block.image_points, points) & moving)
+    looked = kept_images(moving, np.isin(moving.image_points, points))
     return looked.replace(observations=(), refraction=None), photos
 
 
