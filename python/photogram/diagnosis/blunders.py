@@ -2,7 +2,7 @@
 
 The search is :func:`photogram.snoop`, with single components of control and an unknown unit weight, because
 standard deviations may be wrong by a factor. It starts without points that the adjustment cannot determine
-in spite of their rays, and without control that distorts the photos, and tests these against the others.
+in spite of their rays, and without control far from its rays, and tests these against the others.
 Exchanged names are corrected before single errors are reported.
 """
 
@@ -13,8 +13,7 @@ import math
 import numpy as np
 
 from photogram.adjustment.snooping import snoop_block
-from photogram.arguments.types import Bools, Indices
-from photogram.diagnosis.control_sets import without_outliers
+from photogram.arguments.types import Bools
 from photogram.diagnosis.findings import Finding, Section, section_of
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.misfits import Misfits, exchanged, list_test_values
@@ -121,16 +120,16 @@ def _undetermined(block: Block, first: Result | None) -> Bools:
     return np.array(wrong)[block.image_points]
 
 
-def _wrong_control(block: Block, first: Result | None, adjusted: Adjuster) -> Indices:
-    """Return control points without which the control fits, if one of them has the largest test value.
+def _distorting(block: Block, first: Result | None) -> Bools:
+    """(n,) the control point with the largest test value, if it distorts distant photos.
 
-    Large errors of control that few observations test distort distant photos, which would be removed instead.
+    Otherwise these would be removed, because few observations test the point.
     """
     sizes = {} if first is None else sizes_of_tests(first)
-    largest = {kind: own.max(initial=0.0) for kind, own in sizes.items()}
-    doubted = largest.get("control", 0.0) >= max([DISTORTING, *largest.values()])
-    found = without_outliers(block, adjusted) if doubted else None
-    return np.empty(0, dtype=np.int64) if found is None else found[1]
+    worst = max((float(own.max(initial=0.0)) for own in sizes.values()), default=0.0)
+    if first is None or not worst > DISTORTING or sizes["control"].max() < worst:
+        return np.zeros(len(block.point_ids), dtype=bool)
+    return np.asarray(np.arange(len(block.point_ids)) == sizes["control"].max(axis=1).argmax())
 
 
 def _remove(
@@ -150,8 +149,8 @@ def _remove(
     fits = converged is not None and not any(own.any() for own in outliers(converged).values())
     if fits and not suspected.any():
         return []
-    distorting = _wrong_control(kept_images(block, ~suspected), converged, adjusted)
-    start = Aside(np.flatnonzero(suspected), {}, control=np.union1d(distorting, np.flatnonzero(control)))
+    control = control | _distorting(block, converged)
+    start = Aside(np.flatnonzero(suspected), {}, control=np.flatnonzero(control))
     # The variance of rounding errors would make all of them gross errors.
     rounded = converged is not None and mad_sd(converged.standardized) <= ROUNDING
     options = SnoopOptions(level=FOUND, unit_weight="known" if rounded else "unknown")
