@@ -15,16 +15,16 @@ and v = R e with about r on the diagonal of R.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.tested_values import FOUND
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 FEWEST_OF_HALVES = 12  # Observations of a photo
 EXPLAINED = 0.4  # Least part of a photo's sum of squares that a shift of one half explains
@@ -37,41 +37,34 @@ def seam_hints(result: Result) -> list[Message]:
     An affine deformation is estimated together with the step. Marks hardly show the step, because the film
     parameters absorb it. Overlapping photos show a part of it.
     """
-    block, forms, found = result.block, result.film_forms, []
+    block, forms, found = result.block, result.film_forms, [(0.0, 0.0, 0, 0, 1.0)]
     used = np.isfinite(result.residuals).all(axis=1)
     for row, film in result.films:
         own = np.flatnonzero((block.image_photos == row) & used)
         if len(own) >= FEWEST_OF_HALVES:
             # The two parts join at the middle of the photo.
-            given = block.image_xy[own] - forms[block.photo_ids[row]].matrix[:, 0], result.residuals[own]
-            found += [
-                (*_step(*given, block.image_sd[own], axis), axis, row, film.readings.pitch) for axis in (0, 1)
-            ]
-    value, step, axis, row, pitch = max(found, default=(0.0, 0.0, 0, 0, 1.0))
+            away = block.image_xy[own] - forms[block.photo_ids[row]].matrix[:, 0]
+            for axis, k in product((0, 1), (0, 1)):
+                step = _step(away, axis, result.residuals[own, k], block.image_sd[own, k])
+                found.append((*step, axis, row, film.readings.pitch))
+    value, step, axis, row, pitch = max(found)
     if not value > normal_limit(4 * len(result.films), FOUND):
         return []
-    code = f"film-check.seam.{('column', 'row')[axis]}"
-    unit = "mm" if pitch == 1.0 else "px"
-    return [Message(phrase(code, photo=block.photo_ids[row], step=step, unit=unit))]
+    fields = {"photo": block.photo_ids[row], "step": step, "unit": "mm" if pitch == 1.0 else "px"}
+    return [Message(phrase(f"film-check.seam.{('column', 'row')[axis]}", **fields))]
 
 
-def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float, float]:
-    """Return the test value of a step, and the larger step of x or y; 0 if not significant.
+def _step(away: Floats, axis: int, residuals: Floats, sd: Floats) -> tuple[float, float]:
+    """Return the test value of a step of x or y, and the step; 0 if not significant.
 
     `away` are (n, 2) readings relative to the middle of the photo.
     """
     design = np.column_stack([np.ones(len(away)), away / np.abs(away).max(), np.sign(away[:, axis]) / 2])
-    best = 0.0, 0.0
-    for k in (0, 1):
-        own = residuals[:, k] / sd[:, k]
-        basis, triangle = np.linalg.qr(design / sd[:, k : k + 1])
-        if abs(triangle[3, 3]) < 1e-9 * abs(triangle[0, 0]):
-            continue
-        gain = float(basis[:, 3] @ own)
-        step = abs(gain / triangle[3, 3])
-        if step > BEYOND * float(np.median(sd[:, k])) and gain**2 > EXPLAINED * float(own @ own):
-            best = max(best, (abs(gain), step))
-    return best
+    values = residuals / sd
+    basis, triangle = np.linalg.qr(design / sd[:, np.newaxis])
+    gain, size = abs(float(basis[:, 3] @ values)), abs(float(triangle[3, 3]))
+    known = size >= 1e-9 * abs(triangle[0, 0]) and gain > BEYOND * float(np.median(sd)) * size
+    return (gain, gain / size) if known and gain**2 > EXPLAINED * float(values @ values) else (0.0, 0.0)
 
 
 FEWEST = 20  # Observations of a photo
@@ -83,17 +76,6 @@ WORTH = 0.5  # Least common error of a line, in standard deviations of a reading
 TINY = 1e-9
 
 
-@dataclass(frozen=True)
-class _Found:
-    """Jitter along rows (1) or columns (0) of x or y: z, s and distance in pixels."""
-
-    z: float
-    jitter: float
-    lines: int
-    axis: int
-    within: float
-
-
 def line_hints(result: Result) -> list[Message]:
     """Name scanners with jittering lines, with standard deviations that include it."""
     scanners: dict[int, tuple[str, list[int]]] = {}
@@ -103,35 +85,26 @@ def line_hints(result: Result) -> list[Message]:
     limit = normal_limit(4 * (len(WINDOWS) - FAR) * max(len(scanners), 1), CHANCE)
     messages = []
     for name, rows in scanners.values():
-        jitter = max(_of_scanner(result, rows), key=lambda each: each.z, default=None)
-        if jitter is not None and jitter.z > limit:
-            messages.append(Message(_jitter_message(result, name, rows, jitter)))
+        found = max(_of_scanner(result, rows), key=lambda each: each[1]["z"], default=None)
+        if found is not None and found[1]["z"] > limit:
+            fields = {"scanner": name, "axis": "xy"[found[0][1]], **found[1]}
+            code = f"film-check.jitter.{('columns', 'rows')[found[0][0]]}"
+            messages.append(Message(phrase(code, **fields)))
     return messages
 
 
-def _jitter_message(result: Result, scanner: str, rows: list[int], found: _Found) -> Phrase:
-    images = np.isin(result.block.image_photos, rows)
-    return phrase(
-        f"film-check.jitter.{('columns', 'rows')[found.lines]}",
-        scanner=scanner,
-        axis="xy"[found.axis],
-        within=found.within,
-        jitter=found.jitter,
-        z=found.z,
-        sd=float(np.hypot(np.median(result.block.image_sd[images]), found.jitter)),
-    )
-
-
-def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
-    """Yield the jitter of lines if it exceeds the correlation across the lines."""
-    images = _of_photos(result, rows)
-    if images is None:
+def _of_scanner(result: Result, rows: list[int]) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
+    """Yield lines (rows: 1), axis and size of jitter if it exceeds the correlation across the lines."""
+    order, values = _smoothed(result, rows)
+    if not len(order):
         return
-    extent = float(np.ptp(images.xy, axis=0).max())
+    block, redundancy = result.block, result.redundancy[order]
+    xy, sd = block.image_xy[order], float(np.median(block.image_sd[order]))
+    extent = float(np.ptp(xy, axis=0).max())
     # Offsets separate the photos: no distance reaches from one to another.
-    at = images.xy + 2.0 * extent * images.photos[:, np.newaxis]
+    at = xy + 2.0 * extent * block.image_photos[order][:, np.newaxis]
     for axis in (0, 1):
-        own = images.values[:, axis], images.redundancy[:, axis]
+        own = values[:, axis], redundancy[:, axis]
         near = np.array(
             [[_pairs(at[:, lines], *own, window * extent) for window in WINDOWS] for lines in (0, 1)]
         )
@@ -144,37 +117,25 @@ def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
             k = int((z[lines] >= z[lines].max() / 2).argmax())
             jitter = float(np.sqrt(max(total[lines, k], 0.0) / max(near[lines, k, 2], TINY)))
             if z[lines].max() > OTHERWISE * z[1 - lines].max() and jitter > WORTH:
-                yield _Found(float(z[lines].max()), images.sd * jitter, lines, axis, WINDOWS[k] * extent)
+                sizes = {"jitter": sd * jitter, "sd": float(np.hypot(sd, sd * jitter))}
+                yield (lines, axis), {"z": float(z[lines].max()), "within": WINDOWS[k] * extent, **sizes}
 
 
-@dataclass(frozen=True, eq=False)
-class _Images:
-    """Observations of a scanner, photo by photo."""
-
-    photos: Indices  # (m,) photos and (m, 2) readings
-    xy: Floats
-    values: Floats  # (m, 2) residuals in sd, reduced by a smooth function, and redundancy numbers
-    redundancy: Floats
-    sd: float  # Median standard deviation of a reading
-
-
-def _of_photos(result: Result, rows: list[int]) -> _Images | None:
-    """Return the observations of the photos that have enough; None without."""
-    block, residuals = result.block, result.residuals
-    photos, redundancy = block.image_photos, result.redundancy
-    used = np.isfinite(residuals).all(axis=1) & np.isfinite(redundancy).all(axis=1) & np.isin(photos, rows)
+def _smoothed(result: Result, rows: list[int]) -> tuple[Indices, Floats]:
+    """Return images of photos that have enough, and (k, 2) residuals in sd without a smooth function."""
+    block, photos = result.block, result.block.image_photos
+    used = np.isfinite(result.residuals).all(axis=1) & np.isfinite(result.redundancy).all(axis=1)
+    used &= np.isin(photos, rows)
     used &= np.bincount(photos[used], minlength=len(block.photo_ids))[photos] >= FEWEST
     order = np.flatnonzero(used)
-    order = order[np.argsort(photos[order], kind="stable")]
-    if not len(order):
-        return None
-    xy, sd = block.image_xy[order], block.image_sd[order]
-    values = residuals[order] / sd
-    for own in np.split(np.arange(len(order)), np.flatnonzero(np.diff(photos[order])) + 1):
-        x, y = ((xy[own] - xy[own].mean(axis=0)) / np.ptp(xy[own], axis=0).max()).T
-        smooth = np.column_stack([np.ones(len(own)), x, y, x * x, x * y, y * y, x**3, y**3])
+    values = result.residuals[order] / block.image_sd[order]
+    for photo in np.unique(photos[order]):
+        own = photos[order] == photo
+        xy = block.image_xy[order[own]]
+        x, y = ((xy - xy.mean(axis=0)) / np.ptp(xy, axis=0).max()).T
+        smooth = np.column_stack([np.ones(len(x)), x, y, x * x, x * y, y * y, x**3, y**3])
         values[own] -= smooth @ np.linalg.lstsq(smooth, values[own], rcond=None)[0]
-    return _Images(photos[order], xy, values, redundancy[order], float(np.median(sd)))
+    return order, values
 
 
 def _pairs(at: Floats, values: Floats, redundancy: Floats, within: float) -> Floats:

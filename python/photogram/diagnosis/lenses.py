@@ -14,30 +14,27 @@ from photogram.diagnosis.findings import Finding, finding
 from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.wider_models import calibrated, calibration_words, freed
+from photogram.network.wider_models import calibrated, calibration_words
 from photogram.results.result import Result
 from photogram.statistics.evidence import Evidence
 from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[AKk]([1-6])")
 SIGNIFICANT = 5.0
-PITCH = (1e-3, 3e-2)  # Range of pixel sizes of cameras, millimetres
 HALF, NEARLY = 0.5, 0.1  # Pixels
-TINY = 1e-300
 
 
 def wrong_terms(block: Block, adjusted: Adjuster) -> Explained | None:
     """Return the mistake in given radial terms that explains the residuals, if any.
 
-    Proposals are the opposite sign, and terms for image coordinates in another unit: divided by the principal
-    distance, or pixels. The estimated K1 defines the pixel size.
+    Proposals are the opposite sign, and terms for image coordinates divided by the principal distance or not.
     """
     if not any(_given_terms(camera) for camera in block.cameras):
         return None
     first = adjusted.converged(block)
     if first is not None and not (first.global_test and first.global_test.rejected_high):
         return None
-    found = explain(block, _proposals(block, adjusted), adjusted)
+    found = explain(block, _proposals(block), adjusted)
     return found if found is not None and found.is_certain else None
 
 
@@ -73,18 +70,13 @@ def _given_terms(camera: Camera) -> dict[str, int]:
     }
 
 
-def _proposals(block: Block, adjusted: Adjuster) -> Iterator[Proposal]:
+def _proposals(block: Block) -> Iterator[Proposal]:
     scales = [camera.scale for camera in block.cameras]
     causes: list[tuple[Phrase, list[float], int]] = [
         (phrase("mistake.lens.sign"), [-1.0] * len(scales), 0),
         (phrase("mistake.lens.divided"), [1 / scale for scale in scales], 2),
         (phrase("mistake.lens.measured", unit=block.image_unit), scales, 2),
     ]
-    factor = math.sqrt(max(_free_ratio(block, adjusted), 0.0))
-    pitch = factor if block.image_unit == "px" else 1 / max(factor, TINY)
-    if PITCH[0] < pitch < PITCH[1]:
-        code = "mistake.lens.mm" if block.image_unit == "px" else "mistake.lens.px"
-        causes.append((phrase(code, pitch=pitch), [factor] * len(scales), 2))
     for message, factors, power in causes:
         yield Proposal(message.code, message, partial(_scaled, factors=factors, power=power))
 
@@ -101,24 +93,6 @@ def radial_scaled(camera: Camera, factor: float, power: int = 0) -> Camera:
     for name, number in _given_terms(camera).items():
         changed[name] *= factor ** (power * number) if power else factor
     return replace(camera, parameters=changed)
-
-
-def _free_ratio(block: Block, adjusted: Adjuster) -> float:
-    """Return estimated over given first radial term; 0 if not significant."""
-    row = next(row for row, camera in enumerate(block.cameras) if _given_terms(camera))
-    camera, terms = block.cameras[row], _given_terms(block.cameras[row])
-    name = min(terms, key=lambda each: terms[each])
-    cameras = list(block.cameras)
-    without = {**camera.parameters, **dict.fromkeys(terms, 0.0)}
-    cameras[row] = replace(freed(camera, [name.lower()]), parameters=without)
-    result = adjusted.converged(block.replace(cameras=cameras))
-    if result is None:
-        return 0.0
-    found = result.cameras[row]
-    place = camera.names.index(name)
-    if not abs(found.values[place]) > SIGNIFICANT * found.sd[place]:
-        return 0.0
-    return float(found.values[place] / camera.parameters[name])
 
 
 def half_pixel(result: Result) -> list[Finding]:

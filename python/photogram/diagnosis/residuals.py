@@ -1,4 +1,4 @@
-"""Patterns of residuals: by rays, points, photos, across the frame (Appendix H)."""
+"""Patterns of residuals: by rays, photos, across the frame (Appendix H)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,12 @@ from photogram.statistics.patterns import group_patterns
 CHANCE = 0.01  # Probability that any photo of a correct network is named
 WORTH = 0.3  # Notable amplitude of a common pattern (sd of an image coordinate)
 ROUNDING = 0.01  # Least used sd of residuals (sd of an image coordinate)
-SHOWN = 5
 
 
 def residuals(result: Result, spread: float) -> Section:
     """Describe residuals and test patterns; `spread` is the robust sd of test values."""
     section = section_of("patterns")
     _by_rays(result, section)
-    _sums(result, section)
     plain = without_lenses(result.block)
     if len(plain.image_xy) < len(result.block.image_xy):
         section.remark("check.remark.outside-lens")
@@ -52,38 +50,6 @@ def _by_rays(result: Result, section: Section) -> None:
         column("redundancy", [result.redundancy[rows].mean() for rows in own], "Mean redundancy", decimals=3),
     ]
     section.parts.append(Table("", "Residuals by number of rays", columns))
-
-
-def _sums(result: Result, section: Section) -> None:
-    block, used = result.block, result.used_images
-    count = len(block.point_ids)
-    points = block.image_points[used]
-    sums = np.column_stack(
-        [np.bincount(points, weights=result.residuals[used][:, k], minlength=count) for k in range(2)]
-    )
-    variances = np.column_stack(
-        [
-            np.bincount(
-                points, weights=(block.image_sd**2 * result.redundancy)[used][:, k].clip(0), minlength=count
-            )
-            for k in range(2)
-        ]
-    )
-    several = result.point_rays >= 3
-    unit, factor = small_unit(block.image_unit)
-    if not several.any():
-        return
-    rms = factor * np.sqrt((sums[several] ** 2).mean())
-    section.figure("rms of the sums of the residuals of a point", f"{rms:.2f} {unit} (3 and more rays)")
-    # The sums of points without redundancy are rounding errors.
-    floor = (ROUNDING * float(block.image_sd.min())) ** 2
-    sizes = np.abs(sums) / np.sqrt(np.maximum(variances, floor)) * several[:, np.newaxis]
-    limit = normal_limit(2 * int(several.sum()), CHANCE)
-    for point in np.argsort(-sizes.max(axis=1), kind="stable")[:SHOWN].tolist():
-        if sizes[point].max() > limit:
-            x, y = factor * sums[point]
-            name = block.point_ids[point]
-            section.note("look", "check.unbalanced-point", [], [name], point=name, x=x, y=y, unit=unit)
 
 
 def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
