@@ -11,36 +11,37 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.diagnosis.mistakes import Proposal, explain_test
 from photogram.diagnosis.tested_values import FOUND
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
-from photogram.results.parts import ObservedKind
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.limits import normal_limit
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 CERTIFICATE = "certificate"
 ALIKE = 0.7  # Comparable test values, as a part of the largest
 FEWEST_FAILING = 3  # Marks of a photo that all fail
 
 
-@dataclass(frozen=True)
-class _Tested:
-    """The largest test value of a reading, or of a mark in its certificate."""
+class _Tested(NamedTuple):
+    """The largest test value of a reading, or of a mark in its certificate (without photo)."""
 
     value: float
     mark: str
     photo: str = ""
+
+    @property
+    def message(self) -> Phrase:
+        return phrase("film-check.marks.reading", mark=self.mark, photo=self.photo, test=self.value)
 
 
 def mark_hints(result: Result) -> list[Message]:
@@ -50,32 +51,22 @@ def mark_hints(result: Result) -> list[Message]:
     side of the film or the camera are wrong. A single reading may refer to a wrong location. The largest test
     value decides.
     """
-    readings, marks = list(_readings(result)), list(_marks(result))
-    tested = [*readings, *marks]
-    largest = max((each.value for each in tested), default=0.0)
+    tested = sorted(_tested(result), key=lambda each: -each.value)
     limit = normal_limit(2 * len(tested), FOUND)
-    if not largest > limit:
+    if not tested or not tested[0].value > limit:
         return []
+    largest, readings = tested[0], [each for each in tested if each.photo]
     whole = _photos(readings, limit)
-    if any(each.value == largest and each.photo in whole for each in readings):
+    if largest.photo in whole:
         return [Message(phrase("film-check.marks.all", photos=whole))]
-    limit = max(limit, ALIKE * largest)
-    order = sorted((each for each in tested if each.value >= limit), key=lambda each: -each.value)
-    if order[0].photo:
-        named = [
-            phrase("film-check.marks.reading", mark=each.mark, photo=each.photo, test=each.value)
-            for each in order
-            if each.photo
-        ]
-        return [Message(phrase("film-check.marks.readings", readings=named))]
+    worst = [each for each in tested if each.value >= max(limit, ALIKE * largest.value)]
+    if largest.photo:
+        messages = [each.message for each in worst if each.photo]
+        return [Message(phrase("film-check.marks.readings", readings=messages))]
+    counts = Counter(each.mark for each in readings)
     named = [
-        phrase(
-            "film-check.marks.mark",
-            mark=each.mark,
-            test=each.value,
-            n=sum(own.mark == each.mark for own in readings),
-        )
-        for each in order
+        phrase("film-check.marks.mark", mark=each.mark, test=each.value, n=counts[each.mark])
+        for each in worst
         if not each.photo
     ]
     several = len(named) >= FEWEST_FAILING and all(film.pattern is None for _, film in result.films)
@@ -84,38 +75,29 @@ def mark_hints(result: Result) -> list[Message]:
 
 def _photos(readings: list[_Tested], limit: float) -> list[str]:
     """Return the worst photos on which at least three marks, and more than half, fail."""
-    found: dict[str, list[float]] = {}
+    found = defaultdict[str, list[float]](list)
     for each in readings:
-        found.setdefault(each.photo, []).append(each.value)
+        found[each.photo].append(each.value)
     size = {photo: float(np.sqrt(np.mean(np.square(values)))) for photo, values in found.items()}
-    worst = ALIKE * max(size.values(), default=0.0)
     return [
         photo
         for photo, values in found.items()
         if sum(each > limit for each in values) >= max(FEWEST_FAILING, len(values) / 2 + 0.5)
-        and size[photo] >= worst
+        and size[photo] >= ALIKE * max(size.values())
     ]
 
 
-def _readings(result: Result) -> Iterator[_Tested]:
-    kind = result.kinds.get(Fiducial.KIND)
-    for row, values in _rows(kind):
-        photo, mark = result.block.observations[row].of
-        yield _Tested(float(values.max()), mark, photo)
-
-
-def _marks(result: Result) -> Iterator[_Tested]:
-    for row, values in _rows(result.kinds.get(CERTIFICATE)):
-        own = result.block.observations[row]
-        assert isinstance(own, KnownTogether)
-        if all(isinstance(each, Mark) for each in own.joined):
-            pairs = values.reshape(-1, 2).max(axis=1).tolist()
-            yield from (_Tested(value, each.name) for value, each in zip(pairs, own.joined, strict=True))
-
-
-def _rows(kind: ObservedKind | None) -> Iterator[tuple[int, np.ndarray]]:
-    if kind is not None:
-        yield from zip(kind.rows.tolist(), np.abs(np.nan_to_num(kind.standardized)), strict=True)
+def _tested(result: Result) -> Iterator[_Tested]:
+    for kind in (result.kinds[name] for name in (Fiducial.KIND, CERTIFICATE) if name in result.kinds):
+        sizes = np.abs(np.nan_to_num(kind.standardized))
+        for row, values in zip(kind.rows.tolist(), sizes, strict=True):
+            own = result.block.observations[row]
+            if not isinstance(own, KnownTogether):
+                photo, mark = own.of
+                yield _Tested(float(values.max()), mark, photo)
+            elif all(isinstance(each, Mark) for each in own.joined):
+                pairs = values.reshape(-1, 2).max(axis=1).tolist()
+                yield from (_Tested(value, each.name) for value, each in zip(pairs, own.joined, strict=True))
 
 
 FEWEST = 4  # Marks of a photo: three fit any axis

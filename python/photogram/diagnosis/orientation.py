@@ -64,12 +64,13 @@ def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: 
     """Return the section on sides of cameras, with points above cameras and rays that do not meet."""
     section = section_of("sides")
     given, whole = blocks or [view.seen, view.seen]
-    rays = Rays.of(given)
-    met = rays.intersect()
-    after = rays if view.seen is given else Rays.of(view.seen)
-    met_after = met if view.seen is given else after.intersect()
+    rays, after = Rays.of(given), Rays.of(view.seen)
+    met, met_after = rays.intersect(), after.intersect()
+    # A wrong sign or kappa of many photos explains nearly all points above cameras, which the guide requires.
+    several = any(each.kind == "mirrored" and len(each.photos) > 1 for each in explanations)
+    gone = _above(rays if several else Rays.of(whole)).keys() - _above(after).keys()
+    section.findings += [each for name, each in _above(rays).items() if name not in gone] + explanations
     cost = _mean(_costs(after, met_after))
-    section.findings += _unexplained(_above(rays, met), explanations, whole, view.seen) + explanations
     if cost > SUSPICIOUS:
         section.note("grave", "check.rays-do-not-meet", [], [], {"cost": cost}, sense=words.sense)
     known = np.isfinite(met.sizes)
@@ -107,55 +108,33 @@ def _mean(values: Floats) -> float:
     return float(finite.mean()) if finite.size else 0.0
 
 
-def _above(rays: Rays, met: Intersection) -> list[Finding]:
-    block = rays.block
+def _above(rays: Rays) -> dict[str, Finding]:
+    """Return findings on control points above a camera that looks down, by their names."""
+    block, met = rays.block, rays.intersect()
     given = np.isfinite(block.point_sd).any(axis=1).take(block.image_points)
     looks_down = (rays.cameras[:, 2, 2] > UPRIGHT).take(block.image_photos)
-    heights, stations = met.positions[block.image_points, 2], rays.centres[block.image_photos, 2]
-    rows = np.flatnonzero(given & looks_down & (heights > stations))
-    points, first = np.unique(block.image_points[rows], return_index=True)
-    findings = []
-    for point, row in zip(points.tolist(), rows[first].tolist(), strict=True):
-        name, photo = block.point_ids[point], block.photo_ids[block.image_photos[row]]
-        above = float(heights[row] - stations[row])
-        fields = {"point": name, "photo": photo, "above": above, "unit": block.linear_unit}
-        message = phrase("check.control-above-camera", **fields)
-        findings.append(finding("grave", message, [photo], [name], values={"above": above}))
+    above = met.positions[block.image_points, 2] - rays.centres[block.image_photos, 2]
+    rows = np.flatnonzero(given & looks_down & (above > 0))
+    findings = {}
+    for row in rows[np.unique(block.image_points[rows], return_index=True)[1]].tolist():
+        name, photo = block.point_ids[block.image_points[row]], block.photo_ids[block.image_photos[row]]
+        values = {"above": float(above[row])}
+        message = phrase(
+            "check.control-above-camera", point=name, photo=photo, unit=block.linear_unit, **values
+        )
+        findings[name] = finding("grave", message, [photo], [name], values)
     return findings
-
-
-def _unexplained(
-    above: list[Finding], explanations: list[Finding], whole: Block, last: Block
-) -> list[Finding]:
-    """Remove points above cameras explained by mirrored plates or a photo's kappa.
-
-    A wrong sign or kappa of many photos explains nearly all. The guide requires the points in this case as
-    well.
-    """
-    if last is whole and not any(finding.kind == "mirrored" for finding in explanations):
-        return above
-    before, after = (
-        {name for finding in _above(rays, rays.intersect()) for name in finding.points}
-        for rays in (Rays.of(whole), Rays.of(last))
-    )
-    if any(finding.kind == "mirrored" and len(finding.photos) > 1 for finding in explanations):
-        return [finding for finding in above if after.issuperset(finding.points)]
-    return [finding for finding in above if not (before - after).issuperset(finding.points)]
 
 
 def spare_explained(section: Section, block: Block, photos: Bools) -> None:
     """Remove findings explained by bad photos: points above a camera, divergent rays."""
     rays = Rays.of(block).without(photos[block.image_photos])
-    met = rays.intersect()
-    above = {name for finding in _above(rays, met) for name in finding.points}
-    gone = (
-        {"rays-do-not-meet"} if _mean(np.where(rays.used, _costs(rays, met), np.nan)) <= SUSPICIOUS else set()
-    )
+    above, cost = _above(rays), _mean(np.where(rays.used, _costs(rays, rays.intersect()), np.nan))
     section.findings = [
-        finding
-        for finding in section.findings
-        if finding.kind not in gone
-        and (finding.kind != "control-above-camera" or above.issuperset(finding.points))
+        each
+        for each in section.findings
+        if (each.kind != "rays-do-not-meet" or cost > SUSPICIOUS)
+        and (each.kind != "control-above-camera" or above.keys() >= {*each.points})
     ]
 
 

@@ -9,13 +9,11 @@ from __future__ import annotations
 from itertools import chain
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from photogram.adjustment.snooping import snoop
 from photogram.diagnosis.after_adjustment import explained, remarks
+from photogram.diagnosis.blunders import edit
 from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.findings import Section, note_all, note_verdict, section_of
-from photogram.diagnosis.misfits import Misfits, exchanged
+from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.registry import hints_at
 from photogram.diagnosis.structure import structure_section
@@ -24,7 +22,6 @@ from photogram.messages import counted
 from photogram.network.block import Block, flown_by
 from photogram.network.motion import timed_photos
 from photogram.results.result import Result
-from photogram.results.snooping_result import Snooped
 
 if TYPE_CHECKING:
     from photogram.diagnosis.findings import Words
@@ -54,26 +51,8 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     note_all(section, "convention", "grave", explained(result))
     note_all(section, "moving", "look", remarks(result))
     section.findings += counted_lines(block, adjusted)
-    found = _snooped(block, adjusted)
-    if (
-        found is not None
-        and isinstance(found.result, Result)
-        and (result.converged or found.result.converged)
-    ):
-        misfits = Misfits(block, np.zeros(len(block.image_xy), dtype=bool), found, found.result)
-        section.findings += [
-            *exchanged(found.exchanged),
-            *misfits.of_suspects,
-            *misfits.in_section,
-            *chain(*misfits.control.values()),
-        ]
+    edited = edit(block, Suspects.none(block), adjusted)
+    if edited.last is not None and (result.converged or edited.last.converged):
+        section.findings += [*edited.gross, *edited.section.findings, *chain(*edited.control.values())]
     note_verdict(section, result.verdict)
     return [structure, section], result
-
-
-def _snooped(block: Block, adjusted: Adjuster) -> Snooped | None:
-    """Remove gross errors; None if the block cannot be tested."""
-    try:
-        return snoop(block, threads=adjusted.options.get("threads"))
-    except (AdjustmentError, InputError):
-        return None
