@@ -15,13 +15,14 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.cards import Card
-from photogram.formats.dbat.tables import DbatBuilder, Sensor, sensor_of
+from photogram.formats.dbat.tables import DbatBuilder, sensor_of
 from photogram.formats.project import Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
+from photogram.network.cameras import Camera
 from photogram.words import Phrase, option_sd, phrase
 
 TITLE = "PhotoModeler export"
@@ -100,7 +101,7 @@ def _size(card: Card) -> Size:
     return width, height
 
 
-def _sensor(card: Card, first: int, name: str, size: Size) -> Sensor:
+def _sensor(card: Card, first: int, name: str, size: Size) -> tuple[Camera, Size, float]:
     c, px, py, width, height, *terms = card.numbers(first, _CAMERA).tolist()
     sides = width / size[0], height / size[1]
     if not (c > 0 and min(sides) > 1e-5 and max(sides) < 1 and 0.5 < sides[0] / sides[1] < 2):
@@ -124,12 +125,12 @@ class _Cameras:
         words = tuple(card.words[1:11])
         last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]
         if (np.abs(given - own) <= np.array(last)).all():
-            if "camera" not in self.content.sensors:
-                self.content.sensor("camera", self.common)
+            if "camera" not in self.content.camera_rows:
+                self.content.camera(*self.common, key="camera")
             return "camera"
         if words not in self.others:
             name = self.others[words] = f"camera of photo {number}"
-            self.content.sensor(name, _sensor(card, 1, name, self.size))
+            self.content.camera(*_sensor(card, 1, name, self.size), key=name)
             remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
             self.content.messages.append(Message(remark, card.place.file))
         return self.others[words]

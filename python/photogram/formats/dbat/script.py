@@ -6,13 +6,10 @@ import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
-
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError
 from photogram.formats.dbat.tables import (
     DbatBuilder,
-    Sensor,
     sensor_of,
     take_images,
     take_photos,
@@ -20,6 +17,7 @@ from photogram.formats.dbat.tables import (
     take_poses,
     titled,
     untitled,
+    whole_numbers,
 )
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
@@ -28,10 +26,10 @@ from photogram.formats.project import Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.column_table import ColumnTable
-from photogram.io.delimited import cells
-from photogram.io.files import read_beginning, read_lines
-from photogram.io.places import Place, at_place, image_size, one_word, positive
+from photogram.io.files import read_beginning
+from photogram.io.places import at_place, image_size, one_word, positive
 from photogram.messages import Message
+from photogram.network.cameras import Camera
 from photogram.words import phrase
 
 TITLE = "DBAT script"
@@ -60,8 +58,7 @@ def read_script(path: Path, options: ReadOptions) -> DbatBuilder:
     cameras = given.need("cameras")
     if (file := cameras.child("file")) is not None:
         cameras = read_stream(_path(file, base), {}, "document").need("cameras")
-    for name, sensor in _cameras(cameras, content.messages).items():
-        content.sensor(name, sensor)
+    _cameras(cameras, content)
     for _, table in _tables(given.need("images"), base):
         take_photos(table, content)
     eo = given.child("prior_eo")
@@ -165,18 +162,14 @@ def _datum(operations: Element, content: DbatBuilder) -> None:
         content.options = AdjustOptions(datum="minimum")
 
 
-def _cameras(parent: Element, messages: list[Message]) -> dict[str, Sensor]:
-    """Return the cameras of an element by number; the first is 1."""
-    found: dict[str, Sensor] = {}
+def _cameras(parent: Element, content: DbatBuilder) -> None:
+    """Add the cameras of an element by number; the first is 1."""
     for row, each in enumerate(parent.all("camera"), 1):
         number = each.word("id", str(row))
-        if number in found:
-            raise each.error(phrase("format.repeated", what="camera", name=number))
         with at_place(each):
-            found[number] = _sensor(each, number, messages)
-    if not found:
+            content.camera(*_sensor(each, number, content.messages), key=number, place=each)
+    if not content.cameras:
         raise parent.error(phrase("format.missing", what="a camera"))
-    return found
 
 
 def _numbers(element: Element, name: str, count: int) -> list[float]:
@@ -187,7 +180,7 @@ def _numbers(element: Element, name: str, count: int) -> list[float]:
     return [own.place.number(word) for word in words]
 
 
-def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
+def _sensor(element: Element, number: str, messages: list[Message]) -> tuple[Camera, Size, float]:
     one_word(element, "unit", element.word("unit", "mm"), ["mm"])
     width, height = _numbers(element, "image", 2)
     size = image_size(element.need("image"), width, height)
@@ -284,27 +277,20 @@ def is_measurements(path: Path) -> bool:
 def _with_sensors(path: Path, title: str, options: ReadOptions) -> DbatBuilder:
     """Return a block with the cameras of the user's table, otherwise of a file in the folder."""
     content = DbatBuilder(path, title)
-    for name, sensor in _sensors(path, options, content.messages).items():
-        content.sensor(name, sensor)
-    return content
-
-
-def _sensors(path: Path, options: ReadOptions, messages: list[Message]) -> dict[str, Sensor]:
     if options.cameras is not None:
-        table = read_cameras(
-            Tables(Settings(path, tables={"cameras": options.cameras}, image="mm"), messages)
-        )
-        found = {}
+        settings = Settings(path, tables={"cameras": options.cameras}, image="mm")
+        table = read_cameras(Tables(settings, content.messages))
         for camera, size, pixel in zip(table.cameras, table.sizes, table.pixel_mm, strict=True):
             if size is None or pixel is None or camera.image_y != "up":
                 raise InputError(phrase("dbat.camera", camera=camera.title), file=options.cameras)
-            found[camera.name] = Sensor(camera, size, pixel)
-        return found
+            content.camera(camera, size, pixel)
+        return content
     folder = path if path.is_dir() else path.parent
     files = [each for each in sorted(folder.glob("*.xml")) if "dbat_camera_version" in root_of(each)[1]]
     if len(files) != 1:
         raise InputError(phrase("format.cameras"), file=path)
-    return _cameras(read_stream(files[0], {}, "document").need("cameras"), messages)
+    _cameras(read_stream(files[0], {}, "document").need("cameras"), content)
+    return content
 
 
 def read_folder(path: Path, options: ReadOptions) -> DbatBuilder:
@@ -322,38 +308,19 @@ def read_folder(path: Path, options: ReadOptions) -> DbatBuilder:
 def read_measurements(path: Path, options: ReadOptions) -> DbatBuilder:
     """Read `NAME-2dpts.txt`, with initial positions of `NAME-3dpts.txt`."""
     content = _with_sensors(path, "PhotoModeler measurements", options)
-    if len(content.sensors) > 1:
-        raise InputError(phrase("format.camera-column", n=len(content.sensors)), file=path)
-    camera = next(iter(content.sensors))
-    images = [
-        ([place.whole(cell, highest=2**53) for cell in own[:2]], [place.number(cell) for cell in own[2:4]])
-        for place, own in _cells(path, _HEADER, 4)
-    ]
-    for photo in sorted({photo for (_, photo), _ in images}):
+    camera, *others = content.camera_rows
+    if others:
+        raise InputError(phrase("format.camera-column", n=len(content.cameras)), file=path)
+    table = titled(path)
+    table.require("im")
+    for photo in sorted(set(whole_numbers(table, "im"))):
         content.numbered_photo(photo, str(photo), camera, content.place)
-    for (point, photo), (x, y) in images:
-        content.image(photo, point, x, y, sd=(math.nan, math.nan))
+    take_images(table, content)
     beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
     if path.name.endswith(MEASURED) and beside.is_file():
-        for place, own in _cells(beside, "id,name,photos (used),", 6):
-            position = np.array([place.number(cell) for cell in own[3:6]])
-            content.start(place.whole(own[0], highest=2**53), position, place)
+        table = titled(beside)
+        table.require("id", "x", "y", "z")
+        starts = zip(whole_numbers(table, "id"), table.given(("x", "y", "z")), strict=True)
+        for row, (number, xyz) in enumerate(starts):
+            content.start(number, xyz, table.at(row))
     return content
-
-
-def _cells(path: Path, header: str, least: int) -> list[tuple[Place, list[str]]]:
-    """Return the rows below a header, which follows free lines."""
-    lines = read_lines(path)
-    first = next((k for k, line in enumerate(lines[:_FREE]) if line.lower().startswith(header)), None)
-    if first is None:
-        raise InputError(phrase("dbat.header", header=header, n=_FREE), file=path)
-    found = []
-    for record, line in enumerate(lines[first + 1 :], first + 2):
-        if not line.strip():
-            continue
-        place = Place(path, record, line)
-        own = cells(place)
-        if len(own) < least:
-            raise place.error(phrase("format.count", n=len(own), required=f"at least {least}"))
-        found.append((place, own))
-    return found

@@ -9,7 +9,7 @@ Tables have commas, `#` comments, and columns by comment or script.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,20 +23,10 @@ from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import NAMELESS, read_columns, read_rows
 from photogram.io.numbers import whole_number
 from photogram.io.places import Failing, at_place, one_word, positive
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.words import Phrase, option_sd, phrase
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """A camera, its image size, and the side of its pixels in millimetres."""
-
-    camera: Camera
-    size: Size
-    pixel: float
 
 
 def sensor_of(
@@ -46,8 +36,8 @@ def sensor_of(
     principal: tuple[float, float, float],
     terms: dict[str, float],
     skew: float = 0.0,
-) -> Sensor:
-    """Return a camera from parameters of PhotoModeler and DBAT in millimetres.
+) -> tuple[Camera, Size, float]:
+    """Return a camera from parameters of PhotoModeler and DBAT in millimetres, with size and side of pixels.
 
     `sides` are width and height of a pixel; `principal` is c, and the principal point from the upper-left
     corner, to the right and down; `terms` are K1, K2, K3, P1, P2.
@@ -64,7 +54,7 @@ def sensor_of(
         "b2": skew,
         **terms,
     }
-    return Sensor(Camera("brown", parameters, name=name), size, down)
+    return Camera("brown", parameters, name=name), size, down
 
 
 class DbatBuilder(BlockBuilder):
@@ -72,7 +62,6 @@ class DbatBuilder(BlockBuilder):
 
     def __init__(self, path: Path, title: str) -> None:
         super().__init__(path, title)
-        self.sensors: dict[str, Sensor] = {}
         self.paths: list[str] = []  # Files of photos
 
         # Photos with fixed poses, and free parameters of cameras
@@ -80,12 +69,7 @@ class DbatBuilder(BlockBuilder):
         self.free: set[str] = set()
         self.options = AdjustOptions()
 
-    def sensor(self, name: str, sensor: Sensor) -> None:
-        """Add a camera."""
-        self.sensors[name] = sensor
-        self.camera(sensor.camera, sensor.size, sensor.pixel, key=name)
-
-    def numbered_photo(self, number: int, path: str, camera: str, place: Failing) -> None:
+    def numbered_photo(self, number: int, path: str, camera: Hashable, place: Failing) -> None:
         """Add a photo with its file."""
         self.photo(number, camera, place)
         self.paths.append(path)
@@ -108,7 +92,7 @@ class DbatBuilder(BlockBuilder):
             fields = {"number": 1.0, "unit": "pixel", "option": option_sd("images")}
             self.lacks.append(Phrase("read.images", fields))
         # Millimetres from the image centre, y up
-        middles = np.array([sensor.size for sensor in self.sensors.values()])[cameras] / 2
+        middles = np.array(self.sizes)[cameras] / 2
         xy = (pixels - middles) * side * [1, -1]
         self.images(photos, points, xy, sd)
         held = [[0.0 if number in self.held else np.inf] * 3 for number in self.photo_rows]
@@ -130,6 +114,8 @@ class DbatBuilder(BlockBuilder):
 
 
 _KNOWN = {
+    "object point id": "id",
+    "photo #": "im",
     "image": "im",
     "photo": "im",
     "frame": "im",
@@ -162,7 +148,8 @@ def untitled(path: Path, columns: Sequence[str]) -> ColumnTable:
     return read_rows(path, _spelled([column.strip().lower() for column in columns]), numbers=_NUMBERS)
 
 
-def _whole(table: ColumnTable, column: str) -> list[int]:
+def whole_numbers(table: ColumnTable, column: str) -> list[int]:
+    """Return a column of integers."""
     found, known = [], dict[str, int]()
     for row, text in enumerate(table.texts(column)):
         if text not in known:
@@ -175,11 +162,11 @@ def _whole(table: ColumnTable, column: str) -> list[int]:
 def take_photos(table: ColumnTable, content: DbatBuilder) -> None:
     """Add photos: numbers, paths and cameras; without camera column the only camera."""
     table.require("id", "path")
-    known = list(content.sensors)
+    known = list(map(str, content.camera_rows))
     if "cam" not in table and len(known) > 1:
         raise table.head.error(phrase("format.camera-column", n=len(known)))
     cameras = table.texts("cam", known[0] if len(known) == 1 else "")
-    rows = zip(_whole(table, "id"), table.texts("path"), cameras, strict=True)
+    rows = zip(whole_numbers(table, "id"), table.texts("path"), cameras, strict=True)
     for row, (number, path, camera) in enumerate(rows):
         content.numbered_photo(number, path, camera, table.at(row))
 
@@ -190,7 +177,7 @@ def take_poses(table: ColumnTable, content: DbatBuilder, unit: str = "degrees") 
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
     angles = table.given(("omega", "phi", "kappa")) * _RADIANS[unit]
     matrices = Attitudes.of("omega_phi_kappa", angles).matrices
-    poses = zip(_whole(table, "id"), table.given(("x", "y", "z")), matrices, strict=True)
+    poses = zip(whole_numbers(table, "id"), table.given(("x", "y", "z")), matrices, strict=True)
     for row, (number, centre, matrix) in enumerate(poses):
         content.check_photo(number, table.at(row))
         content.pose(number, centre, matrix, table.at(row))
@@ -206,7 +193,7 @@ def take_points(
 ) -> None:
     """Add control or check points; `sd` replaces their standard deviations."""
     table.require("id", "x", "y", "z")
-    numbers, positions = _whole(table, "id"), table.given(("x", "y", "z"))
+    numbers, positions = whole_numbers(table, "id"), table.given(("x", "y", "z"))
     deviations = _deviations(table, ("sx", "sy", "sz"), "sxyz")
     if sd is not None:
         deviations = np.broadcast_to(sd, deviations.shape)
@@ -238,13 +225,13 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
 def take_images(table: ColumnTable, content: DbatBuilder, sd: float = math.nan) -> None:
     """Add observations; `sd` is their default standard deviation, pixels."""
     table.require("id", "im", "x", "y")
-    photos = _whole(table, "im")
+    photos = whole_numbers(table, "im")
     for row, number in enumerate(photos):
         content.check_photo(number, table.at(row))
     own = _deviations(table, ("sx", "sy"), "sxy")
     own = np.where(np.isnan(own), sd, own)
     for row in np.argwhere(own == 0)[:, 0].tolist():
         positive(table.at(row), "the standard deviation", 0)
-    rows = zip(photos, _whole(table, "id"), table.given(("x", "y")).tolist(), own, strict=True)
+    rows = zip(photos, whole_numbers(table, "id"), table.given(("x", "y")).tolist(), own, strict=True)
     for photo, point, xy, deviations in rows:
         content.image(photo, point, *xy, sd=deviations)
