@@ -20,13 +20,13 @@ from photogram.formats.csm.reading import (
     constant_rotation,
     fitting,
     from_pixels,
+    isd_of,
     not_zero,
     read_drift,
-    read_isd,
     transformed,
 )
 from photogram.io.files import reading
-from photogram.io.json import Tree
+from photogram.io.json import Tree, read_json
 from photogram.io.places import at_place, one_word, positive
 from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.network.lens import Lens
@@ -301,7 +301,7 @@ def read_support(path: Path) -> Isd:
     InputError
         If the file is not a valid cube or ISD, or its instrument is unknown.
     """
-    return read_cube(path) if is_cube(path) else read_isd(path)
+    return read_cube(path) if is_cube(path) else isd_of(read_json(path))
 
 
 def read_list(path: Path) -> dict[str, Path]:

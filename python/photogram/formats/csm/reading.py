@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -21,7 +20,7 @@ from photogram.formats.csm.isd import (
     Turns,
     of_quaternions,
 )
-from photogram.io.json import Tree, read_json, unknown
+from photogram.io.json import Tree, unknown
 from photogram.io.places import at_place, positive
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens, LensModel
@@ -49,9 +48,8 @@ UNITS = {"m": 1.0, "km": 1000.0}  # Metres; default km
 APART = 0.01  # Largest difference of the time tables, relative to the span
 
 
-def read_isd(path: Path) -> Isd:
-    """Read the support data of an image."""
-    tree = read_json(path)
+def isd_of(tree: Tree) -> Isd:
+    """Return the support data in a document."""
     keywords = tree.get("naif_keywords", {})
     model = tree["name_model"]
     if model.text() not in _KINDS:
@@ -81,7 +79,7 @@ def read_isd(path: Path) -> Isd:
     elif "jitter" in tree:
         own["jitter"] = _jitter(tree["jitter"])
     return Isd(
-        path,
+        tree.file,
         kind,
         tree["name_platform"].text(),
         tree["name_sensor"].text(),

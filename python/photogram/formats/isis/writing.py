@@ -14,17 +14,14 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.csm.cubes import is_cube
 from photogram.formats.csm.isd import (
-    Isd,
     Polynomials,
-    Positions,
-    Turns,
     angle_axes,
     of_angles,
     to_angles,
     to_quaternions,
 )
 from photogram.formats.csm.photos import SupportedImage, to_camera, trajectory_of
-from photogram.formats.csm.reading import UNITS
+from photogram.formats.csm.reading import UNITS, isd_of
 from photogram.formats.isis.jigsaw_files import jigsaw_files
 from photogram.formats.isis.network import (
     HEADER,
@@ -35,7 +32,7 @@ from photogram.formats.isis.network import (
 )
 from photogram.formats.isis.outcome import Image, Outcome, contents_of
 from photogram.formats.project import Project
-from photogram.io.json import read_json
+from photogram.io.json import Tree, read_json
 from photogram.io.pvl import Group, Value, label_text
 from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.result import Result
@@ -175,7 +172,6 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
     """
     if is_cube(image.path):
         return None
-    document = read_json(image.path).value
     corrected = _Corrected(image, adjusted)
     truth = _adjusted_image(image, adjusted)
     samples, lines = (np.linspace(1.0, size, GRID) for size in image.supported.isd.size)
@@ -183,10 +179,10 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
     ground = truth.to_ground(rows.ravel(), columns.ravel())
     seen = truth.to_image(ground)
     for halvings in range(HALVINGS + 1):
-        isd = corrected.isd(halvings)
+        document = corrected.document(halvings)
+        isd = isd_of(Tree(document, image.path))
         apart = SupportedImage(isd, "updated", "isis", "isis").to_image(ground) - seen
         if not np.nanmax(np.abs(apart), initial=0.0) > CLOSE:
-            corrected.put(document, halvings)
             return orjson.dumps(document, option=orjson.OPT_INDENT_2)
     raise InputError(phrase("isis.tables", limit=CLOSE, n=HALVINGS), file=image.path)
 
@@ -217,43 +213,31 @@ class _Corrected:
         self.places = _total(own.position, own.coefficients[0], solving.position, adjusted.position)
         self.angles = _total(own.rotation, own.coefficients[1], solving.angles, adjusted.rotation)
         self.table = replace(trajectory_of(self.original, own.name, interpolation="isis"), body=None)
+        self.source = read_json(image.path).value
 
-    def isd(self, halvings: int) -> Isd:
-        """Return support data with corrected tables of halved intervals."""
-        found = self.original
+    def document(self, halvings: int) -> dict[str, Any]:
+        """Return the document with corrected tables of halved intervals; one record has no velocity."""
+        found = dict(self.source)
         if self.places is not None:
-            times = _halved(found.position.times, halvings)
-            places = self.places.at(times) + (self._flown(times)[0] if self.over[0] else 0.0)
-            found = replace(found, position=Positions(times, places))
-        if self.angles is not None:
-            times = _halved(found.pointing.times, halvings)
-            angles = self._before(times) + self.angles.at(times)
-            found = replace(found, pointing=Turns(times, of_angles(angles)))
-        return found
-
-    def put(self, document: dict[str, Any], halvings: int) -> None:
-        """Write the corrected tables into a document; for one record without velocity."""
-        isd = self.isd(halvings)
-        if self.places is not None:
-            own, times = document["instrument_position"], isd.position.times
+            own, times = found["instrument_position"], _halved(self.original.position.times, halvings)
+            before = self._flown(times)[0] if self.over[0] else np.zeros((len(times), 3))
             unit = UNITS[own.get("unit", "km")]
-            own["positions"] = (isd.position.places / unit).tolist()
+            own = own | {"positions": ((self.places.at(times) + before) / unit).tolist()}
             if len(times) > 1:
+                known = _given(own, "velocities", times)
+                known = np.gradient(before / unit, times, axis=0) if known is None else known
                 speeds = self.places.rates(times) / unit
-                if self.over[0]:
-                    known = _given(own, "velocities", times)
-                    if known is None:
-                        known = np.gradient(self._flown(times)[0] / unit, times, axis=0)
-                    speeds += known
-                own["velocities"] = speeds.tolist()
-            own["ephemeris_times"] = times.tolist()
+                own["velocities"] = (speeds + known if self.over[0] else speeds).tolist()
+            found["instrument_position"] = own | {"ephemeris_times": times.tolist()}
         if self.angles is not None:
-            own, times = document["instrument_pointing"], isd.pointing.times
+            own, times = found["instrument_pointing"], _halved(self.original.pointing.times, halvings)
+            matrices = of_angles(self._before(times) + self.angles.at(times))
             constant = np.reshape(own.get("constant_rotation", np.eye(3)), (3, 3))
-            own["quaternions"] = to_quaternions(constant.T @ isd.pointing.matrices).tolist()
+            own = own | {"quaternions": to_quaternions(constant.T @ matrices).tolist()}
             if len(times) > 1:
                 own["angular_velocities"] = self._turning(self.angles, own, times).tolist()
-            own["ephemeris_times"] = times.tolist()
+            found["instrument_pointing"] = own | {"ephemeris_times": times.tolist()}
+        return found
 
     def _before(self, times: Floats) -> Floats:
         """Return the angles to which the polynomials are added."""
