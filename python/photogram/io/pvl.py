@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 
 class Quantity(NamedTuple):
@@ -57,7 +57,8 @@ _TOKEN = re.compile(
     |"(?P<double>[^"]*)"|'(?P<single>[^']*)'
     |<(?P<unit>[^<>\n]*)>
     |(?P<sign>[=(){},;])
-    |(?P<word>(?:[^\s=(){},;"'<>/-]|/(?!\*)|-(?:\r?\n\s*)?)+)""",
+    |(?P<word>(?:[^\s=(){},;"'<>/-]|/(?!\*)|-(?:\r?\n\s*)?)+)
+    |(?P<end>\Z)|(?P<bad>(?s:.)+)""",
     re.VERBOSE,
 )
 _CONTINUED = re.compile(r"-\r?\n\s*")  # A hyphen at the end of a line: the text continues without it
@@ -72,19 +73,21 @@ _BEGINS = {"group": "group", "begin_group": "group", "object": "object", "begin_
 _ENDS = {"end_group": "group", "endgroup": "group", "end_object": "object", "endobject": "object"}
 
 
-class _Token(NamedTuple):
-    kind: str
-    text: str
-    start: int
-
-
 class _Reader:
     """A reader of consecutive tokens of a label."""
 
     def __init__(self, text: str, file: Path, numbers: bool) -> None:
-        self.text, self.file, self.at, self.numbers = text, file, 0, numbers
+        self.text, self.file, self.numbers = text, file, numbers
+        self.tokens = (each for each in _TOKEN.finditer(text) if each.lastgroup != "space")
         self.known = 0, 1
-        self.token = self._next()
+        self.take()
+
+    def take(self) -> None:
+        """Move to the next token."""
+        token = next(self.tokens)
+        self.kind, self.word, self.start = str(token.lastgroup), token[str(token.lastgroup)], token.start()
+        if self.kind == "bad":
+            raise self.error("pvl.text", text=self.word)
 
     def line(self, at: int) -> int:
         """Return the number of a line; counting continues from the previous request."""
@@ -92,30 +95,15 @@ class _Reader:
         self.known = at, line + self.text.count("\n", known, at)
         return self.known[1]
 
-    def error(self, message: str | Phrase, at: int | None = None) -> InputError:
-        return InputError(message, file=self.file, record=self.line(self.token.start if at is None else at))
-
-    def take(self) -> _Token:
-        """Return this token and move to the next."""
-        taken = self.token
-        self.token = self._next()
-        return taken
+    def error(self, code: str, at: int | None = None, **fields: str) -> InputError:
+        record = self.line(self.start if at is None else at)
+        return InputError(phrase(code, **fields), file=self.file, record=record)
 
     def skip(self, sign: str) -> bool:
         """Move past a sign if it is next; return whether it was."""
-        if there := self.token.kind == "sign" and self.token.text == sign:
-            self.token = self._next()
+        if there := self.kind == "sign" and self.word == sign:
+            self.take()
         return there
-
-    def _next(self) -> _Token:
-        while (found := _TOKEN.match(self.text, self.at)) is not None:
-            start, self.at = self.at, found.end()
-            kind = str(found.lastgroup)
-            if kind != "space":
-                return _Token(kind, found[kind], start)
-        if self.at < len(self.text):
-            raise self.error(phrase("pvl.text", text=self.text[self.at :]), self.at)
-        return _Token("end", "", self.at)
 
 
 def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
@@ -124,15 +112,20 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
     If `numbers` is False, numeric words remain text.
     """
     reader = _Reader(text, file, numbers)
-    label = Group("", "label")
-    open_groups = [label]
-    while reader.token.kind == "word" and reader.token.text.lower() != "end":
-        start, key = reader.token.start, reader.take().text
+    open_groups = [Group("", "label")]
+    while reader.kind == "word" and reader.word.lower() != "end":
+        start, key = reader.start, reader.word
+        reader.take()
         if (ended := _ENDS.get(key.lower())) is not None:
-            _close(reader, open_groups, ended, key, start)
+            if len(open_groups) == 1 or open_groups[-1].kind != ended:
+                raise reader.error("pvl.end", start, key=key)
+            name = open_groups.pop().name
+            if reader.skip("=") and str(_scalar(reader, key)).lower() != name.lower():
+                raise reader.error("pvl.open", start, kind=ended, name=name)
+            reader.skip(";")
             continue
         if not reader.skip("="):
-            raise reader.error(phrase("pvl.value", key=key), start)
+            raise reader.error("pvl.value", start, key=key)
         if (kind := _BEGINS.get(key.lower())) is None:
             open_groups[-1].items.append((key, _value(reader, key)))
         else:
@@ -141,49 +134,40 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
             open_groups.append(begun)
         reader.skip(";")
         if reader.skip("="):
-            raise reader.error(phrase("pvl.value", key=key), start)
-    if reader.token.kind not in ("word", "end"):
-        raise reader.error(phrase("pvl.text", text=reader.token.text))
+            raise reader.error("pvl.value", start, key=key)
+    if reader.kind not in ("word", "end"):
+        raise reader.error("pvl.text", text=reader.word)
     if len(open_groups) > 1:
-        raise reader.error(phrase("pvl.open", kind=open_groups[-1].kind, name=open_groups[-1].name))
-    return label
-
-
-def _close(reader: _Reader, open_groups: list[Group], kind: str, key: str, start: int) -> None:
-    """End the innermost group; its name may be repeated."""
-    if len(open_groups) == 1 or open_groups[-1].kind != kind:
-        raise reader.error(phrase("pvl.end", key=key), start)
-    ended = open_groups.pop()
-    if reader.skip("=") and str(_scalar(reader, key)).lower() != ended.name.lower():
-        raise reader.error(phrase("pvl.open", kind=kind, name=ended.name), start)
-    reader.skip(";")
+        raise reader.error("pvl.open", kind=open_groups[-1].kind, name=open_groups[-1].name)
+    return open_groups[0]
 
 
 def _value(reader: _Reader, key: str, depth: int = 0) -> Value:
-    opens = reader.token.kind == "sign" and reader.token.text in _OPENING
-    value = _list(reader, key, depth) if opens else _scalar(reader, key)
-    return Quantity(value, reader.take().text.strip()) if reader.token.kind == "unit" else value
+    closing = _OPENING.get(reader.word) if reader.kind == "sign" else None
+    value: Value = _list(reader, key, closing, depth) if closing else _scalar(reader, key)
+    if reader.kind == "unit":
+        value = Quantity(value, reader.word.strip())
+        reader.take()
+    return value
 
 
-def _list(reader: _Reader, key: str, depth: int) -> list[Value]:
+def _list(reader: _Reader, key: str, closing: str, depth: int) -> list[Value]:
     if depth == _DEEPEST:
-        raise reader.error(phrase("error.nested"))
-    start = reader.token.start
-    closing = _OPENING[reader.take().text]
-    values: list[Value] = []
+        raise reader.error("error.nested")
+    start, values = reader.start, list[Value]()
+    reader.take()
     while not reader.skip(closing):
         if values and not reader.skip(","):
-            raise reader.error(phrase("pvl.list", key=key), start)
+            raise reader.error("pvl.list", start, key=key)
         values.append(_value(reader, key, depth + 1))
     return values
 
 
 def _scalar(reader: _Reader, key: str) -> str | int | float:
-    kind, text, start = reader.token
+    kind, text = reader.kind, _CONTINUED.sub("", reader.word)
     if kind not in ("word", "double", "single"):
-        raise reader.error(phrase("pvl.value", key=key), start)
+        raise reader.error("pvl.value", key=key)
     reader.take()
-    text = _CONTINUED.sub("", text)
     if kind != "word":
         return _FOLDED.sub(" ", text)
     return _number(text) if reader.numbers else text
