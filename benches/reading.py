@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram import formats
-from photogram.formats.colmap.content import Camera, Images, Model, Points
+from photogram.formats.colmap.content import FEATURE, POINT, Camera, Image, Model
 from photogram.formats.colmap.files import binary_files, read_model
 from photogram.formats.isis.network import ControlMeasures, ControlNetwork, ControlPoints, read_network
 from photogram.formats.isis.writing import binary_network, network_text
@@ -109,29 +109,19 @@ def _control_network(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.
 
 
 def _model(photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> Model:
-    count, own = int(photos.max()) + 1, int(points.max()) + 1
-    places = [Place()] * count
+    own = int(points.max()) + 1
+    features = np.empty(len(xy), FEATURE)
+    features["xy"], features["point"] = xy, points + 1
+    table = np.zeros(own, POINT)
+    table["number"] = np.arange(1, own + 1)
     return Model(
         Path(),
         [Camera(1, "PINHOLE", 4000, 3000, (3000.0, 3000.0, 2000.0, 1500.0), Place())],
-        Images(
-            np.arange(1, count + 1),
-            np.ones(count, dtype=np.int64),
-            np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-            np.zeros((count, 3)),
-            [f"IMG_{photo:05d}.JPG" for photo in range(count)],
-            np.bincount(photos),
-            xy,
-            points + 1,
-            places,
-        ),
-        Points(
-            np.arange(1, own + 1),
-            np.zeros((own, 3)),
-            np.zeros((own, 3), dtype=np.int64),
-            np.zeros(own, dtype=np.int64),
-            [],
-        ),
+        [
+            Image(photo + 1, (1.0, *(0.0,) * 6), 1, f"IMG_{photo:05d}.JPG", part)
+            for photo, part in enumerate(np.split(features, np.cumsum(np.bincount(photos))[:-1]))
+        ],
+        table,
     )
 
 

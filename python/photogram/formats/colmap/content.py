@@ -7,13 +7,14 @@ the same declarations.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Indices
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field, fields
 
@@ -48,6 +49,9 @@ WORDS: dict[str, Sequence[str]] = {"model": tuple(MODELS), "sensor": SENSORS}
 FEATURE = np.dtype([("xy", "<f8", 2), ("point", "<i8")])
 POINT = np.dtype([("number", "<u8"), ("xyz", "<f8", 3), ("rgb", "u1", 3), ("error", "<f8"), ("track", "<u8")])
 """Features of images, and points up to their tracks, in binary files."""
+
+
+Table = NDArray[Any]
 
 
 class Form(NamedTuple):
@@ -96,7 +100,7 @@ class Image:
     pose: tuple[float, ...] = _form("d", _POSE)
     camera: int = _form("I", "CAMERA_ID")
     name: str = _form("name", "NAME")
-    features: np.ndarray[Any, Any] = _form("features", "POINTS2D")
+    features: Table = _form("features", "POINTS2D")
     place: Place = Place()
 
 
@@ -147,38 +151,31 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Images:
-    """The n images, with all f features one after the other."""
-
-    numbers: Indices
-    cameras: Indices
-    quaternions: Floats  # (n, 4) w, x, y, z, world to camera
-    translations: Floats
-    names: list[str]
-    counts: Indices  # (n,) features of each image
-    xy: Floats  # (f, 2) columns and rows from the corner
-    points: Indices  # (f,) ids of points, NO_POINT without
-    places: Sequence[Place] = ()
-
-
-@dataclass(frozen=True)
-class Points:
-    """The n points."""
-
-    numbers: Indices
-    positions: Floats
-    colours: Indices  # (n, 3)
-    tracks: Indices  # (n,) images in the track of each point
-    places: Sequence[Place] = ()
-
-
-@dataclass(frozen=True)
 class Model:
-    """A model; without rigs and frames each camera is a rig."""
+    """A model; without rigs and frames each camera is a rig.
+
+    `points` is a table of `POINT`, and `point_places` the locations of its rows in files.
+    """
 
     path: Path
     cameras: list[Camera]
-    images: Images
-    points: Points
+    images: list[Image]
+    points: Table
     rigs: list[Rig] = field(default_factory=list)
     frames: list[Frame] = field(default_factory=list)
+    point_places: Sequence[Place] = ()
+
+    @cached_property
+    def numbers(self) -> Indices:
+        """(n,) numbers of the images."""
+        return np.array([each.number for each in self.images], dtype=np.int64)
+
+    @cached_property
+    def counts(self) -> Indices:
+        """(n,) features of each image."""
+        return np.array([len(each.features) for each in self.images], dtype=np.int64)
+
+    @cached_property
+    def features(self) -> Table:
+        """The features of all images, one image after the other."""
+        return np.frombuffer(b"".join(each.features.data for each in self.images), FEATURE)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Indices
@@ -22,17 +21,15 @@ from photogram.formats.colmap.content import (
     Camera,
     Frame,
     Image,
-    Images,
     Model,
-    Points,
     Rig,
+    Table,
     layout,
 )
 from photogram.io.files import read_bytes, read_lines
 from photogram.io.places import Place
 from photogram.words import phrase
 
-Table = NDArray[Any]
 _Kind = TypeVar("_Kind")
 
 _EMPTY = 2.0**64  # 2^64 - 1, by which binary files mark features without a point, as a number of a text
@@ -205,30 +202,16 @@ def read_model(folder: Path) -> Model:
             return []
         return [_read(record, kind) for record in _sources(folder, name, binary)]
 
-    images = _images(_read(record, Image) for record in _sources(folder, "images", binary))
-    points = _binary_points(folder / "points3D.bin") if binary else _text_points(folder)
-    return Model(folder, cameras, images, points, further("rigs", Rig), further("frames", Frame))
+    images = [_read(record, Image) for record in _sources(folder, "images", binary)]
+    points, places = _binary_points(folder / "points3D.bin") if binary else _text_points(folder)
+    model = Model(folder, cameras, images, points, further("rigs", Rig), further("frames", Frame), places)
+    # The images share the table of all features, so that the bytes of the file are released.
+    for image, part in zip(images, np.split(model.features, np.cumsum(model.counts)[:-1]), strict=False):
+        object.__setattr__(image, "features", part)
+    return model
 
 
-def _images(images: Iterable[Image]) -> Images:
-    heads, poses, names, places = [], [], [], []
-    features = [np.zeros(0, FEATURE)]
-    for image in images:
-        places.append(image.place)
-        heads.append((image.number, image.camera))
-        poses.append(image.pose)
-        names.append(image.name)
-        features.append(image.features)
-    numbers, cameras = np.array(heads, dtype=np.int64).reshape(-1, 2).T
-    table, own = np.array(poses, dtype=float).reshape(-1, 7), np.concatenate(features)
-    counts = np.array([len(part) for part in features[1:]], dtype=np.int64)
-    xy = np.array(own["xy"]).reshape(-1, 2)
-    return Images(
-        numbers, cameras, table[:, :4], table[:, 4:], names, counts, xy, own["point"].copy(), places
-    )
-
-
-def _text_points(folder: Path) -> Points:
+def _text_points(folder: Path) -> tuple[Table, Sequence[Place]]:
     rows, places = [], []
     for place in filled_lines(folder / "points3D.txt"):
         line = _Line(place)
@@ -239,10 +222,10 @@ def _text_points(folder: Path) -> Points:
             raise place.error(phrase("colmap.groups", n=len(track), size=2, names=names))
         rows.append((number, xyz, rgb, error, len(track) // 2))
         places.append(place)
-    return _points(np.array(rows, POINT), places)
+    return np.array(rows, POINT), places
 
 
-def _binary_points(path: Path) -> Points:
+def _binary_points(path: Path) -> tuple[Table, Sequence[Place]]:
     file, size = _Bytes(path, POINT.itemsize), POINT.itemsize
     starts = np.empty(file.records, dtype=np.int64)
     unpack, data, last, at = struct.Struct("<Q").unpack_from, file.data, len(file.data), file.at
@@ -259,12 +242,7 @@ def _binary_points(path: Path) -> Points:
     for first in range(0, file.records, 1 << 16):
         part = starts[first : first + (1 << 16), np.newaxis] + np.arange(size)
         rows[first : first + (1 << 16)] = raw[part]
-    return _points(rows.reshape(-1).view(POINT), _Places(path, file.records))
-
-
-def _points(table: Table, places: Sequence[Place]) -> Points:
-    xyz, rgb = np.array(table["xyz"]).reshape(-1, 3), table["rgb"].astype(np.int64).reshape(-1, 3)
-    return Points(table["number"].astype(np.int64), xyz, rgb, table["track"].astype(np.int64), places)
+    return rows.reshape(-1).view(POINT), _Places(path, file.records)
 
 
 class _Places(Sequence[Place]):
@@ -309,7 +287,8 @@ def binary_files(model: Model) -> dict[str, bytes]:
         + b"".join(packed(*each) for record in records for each in _values(record))
         for name, records in _records(model).items()
     }
-    table, tracks = _point_table(model)
+    table, tracks = model.points.copy(), _tracks(model)
+    table["track"] = [len(track) for track in tracks]
     heads = table.view(f"V{POINT.itemsize}")
     points = (head.tobytes() + bytes(track) for head, track in zip(heads, tracks, strict=True))
     return files | {"points3D.bin": struct.pack("<Q", len(table)) + b"".join(points)}
@@ -332,11 +311,10 @@ def text_files(model: Model) -> dict[str, bytes]:
         name: [" ".join(words(*each) for each in _values(record)) for record in records]
         for name, records in _records(model).items()
     }
-    points = model.points
-    columns = (points.numbers.tolist(), points.positions.tolist(), points.colours.tolist())
+    columns = (model.points[name].tolist() for name in ("number", "xyz", "rgb"))
     lines["points3D"] = [
         " ".join(map(repr, [number, *xyz, *rgb, -1, *track.ravel().tolist()]))
-        for number, xyz, rgb, track in zip(*columns, _point_table(model)[1], strict=True)
+        for number, xyz, rgb, track in zip(*columns, _tracks(model), strict=True)
     ]
     return {
         f"{name}.txt": "\n".join([_HEADS[name], *own, ""]).replace(" \n", "\n").encode()
@@ -346,33 +324,17 @@ def text_files(model: Model) -> dict[str, bytes]:
 
 def _records(model: Model) -> dict[str, Sequence[Any]]:
     """Return the records of all files but points."""
-    images = model.images
-    features = np.empty(len(images.xy), FEATURE)
-    features["xy"], features["point"] = images.xy, images.points
-    parts = np.split(features, np.cumsum(images.counts))
-    poses = np.hstack([images.quaternions, images.translations]).tolist()
-    records = map(Image, images.numbers, map(tuple, poses), images.cameras, images.names, parts)
-    return {
-        "cameras": model.cameras,
-        "images": list(records),
-        "rigs": model.rigs,
-        "frames": model.frames,
-    }
+    return {name: getattr(model, name) for name in ("cameras", "images", "rigs", "frames")}
 
 
-def _point_table(model: Model) -> tuple[Table, list[Indices]]:
-    """Return points without error, and their tracks: images with the index of the feature there."""
-    images, points = model.images, model.points
-    rows = np.repeat(np.arange(len(images.counts)), images.counts)
-    within = np.arange(len(rows)) - np.repeat(np.cumsum(images.counts) - images.counts, images.counts)
-    places = {number: row for row, number in enumerate(points.numbers.tolist())}
-    owner = np.array([places.get(number, -1) for number in images.points.tolist()], dtype=np.int64)
+def _tracks(model: Model) -> list[Indices]:
+    """Return the tracks of points: images with the index of the feature there."""
+    counts = model.counts
+    within = np.concatenate([np.zeros(0, dtype=np.int64), *map(np.arange, counts.tolist())])
+    places = {number: row for row, number in enumerate(model.points["number"].tolist())}
+    owner = np.array([places.get(number, -1) for number in model.features["point"].tolist()], dtype=np.int64)
     order = np.argsort(owner, kind="stable")
     order = order[owner[order] >= 0]
-    pairs = np.column_stack([images.numbers[rows[order]], within[order]]).astype("<u4")
-    ends = np.searchsorted(owner[order], np.arange(len(points.numbers)), side="right")
-    tracks = np.split(pairs, ends)[:-1]
-    table = np.empty(len(points.numbers), POINT)
-    table["number"], table["xyz"], table["rgb"] = points.numbers, points.positions, points.colours
-    table["error"], table["track"] = -1.0, [len(track) for track in tracks]
-    return table, tracks
+    pairs = np.column_stack([np.repeat(model.numbers, counts)[order], within[order]]).astype("<u4")
+    ends = np.searchsorted(owner[order], np.arange(len(model.points)), side="right")
+    return np.split(pairs, ends)[:-1]

@@ -51,29 +51,31 @@ def read(path: Path, options: ReadOptions) -> Project:
 
 def _project(model: Model, path: Path) -> Project:
     block, images = BlockBuilder(path, TITLE), model.images
+    names, numbers, xy = [each.name for each in images], model.numbers, model.features["xy"]
     for each in model.cameras:
         block.camera(_camera(each), (each.width, each.height), key=each.number, place=each.place)
-    _check_model(model, block.camera_rows)
-    rotations, off = _rotations(images.quaternions, images.places)
+    _check_model(model, names, block.camera_rows)
+    table = np.array([each.pose for each in images]).reshape(-1, 7)
+    translations = table[:, 4:]
+    rotations, off = _rotations(table[:, :4], [each.place for each in images])
     if len(off):
-        names = [images.names[row] for row in off]
-        block.messages.append(Message.of("colmap.normalised", n=len(off), names=names))
-    translations = images.translations.copy()
+        remark = Message.of("colmap.normalised", n=len(off), names=[names[row] for row in off])
+        block.messages.append(remark)
     frames = _composed(model, rotations, translations, block.messages)
-    cameras = [block.camera_rows[number] for number in images.cameras.tolist()]
+    cameras = [block.camera_rows[each.camera] for each in images]
     centres = -np.einsum("nji,nj->ni", rotations, translations)
-    block.photos(images.names, cameras, centres, (Y_DOWN @ rotations).transpose(0, 2, 1))
+    block.photos(names, cameras, centres, (Y_DOWN @ rotations).transpose(0, 2, 1))
     block.rigs(frames)
     rows, points = _observed(model, block.messages)
-    block.points(list(map(str, model.points.numbers.tolist())), model.points.positions)
-    photos = np.repeat(np.arange(len(images.names)), images.counts)[rows]
-    block.images(photos, points, images.xy[rows])
+    block.points(list(map(str, model.points["number"].tolist())), model.points["xyz"].copy())
+    photos = np.repeat(np.arange(len(images)), model.counts)[rows]
+    block.images(photos, points, xy[rows])
     if len(rows):
         block.lacks.append(Phrase("read.placeless", {"option": Phrase("option.control")}))
     return block.project(
         details={
-            "image numbers": dict(zip(images.names, images.numbers.tolist(), strict=True)),
-            "colours": NamedValues(block.point_ids, model.points.colours),
+            "image numbers": dict(zip(names, numbers.tolist(), strict=True)),
+            "colours": NamedValues(block.point_ids, model.points["rgb"]),
         }
     )
 
@@ -86,34 +88,34 @@ def _camera(camera: Camera) -> HouseCamera:
         return HouseCamera(model, values, name=str(camera.number), unit="px")
 
 
-def _check_model(model: Model, cameras: Container[Hashable]) -> None:
+def _check_model(model: Model, names: Sequence[str], cameras: Container[Hashable]) -> None:
     """Reject invalid names, cameras and numbers."""
-    images, points = model.images, model.points
-    for name, camera, place in zip(images.names, images.cameras.tolist(), images.places, strict=True):
-        if not name.strip() or not name.isprintable():
-            raise place.error(phrase("format.name", what="image", name=name))
-        if camera not in cameras:
-            raise place.error(phrase("format.undefined", what="camera", name=str(camera)))
-    xy = np.isfinite(images.xy).all(axis=1)
-    if not xy.all():
-        row = int(np.searchsorted(np.cumsum(images.counts), np.argmin(xy), side="right"))
-        raise images.places[row].error(phrase("format.finite", name="a feature"))
-    for values, places, what in (
-        (images.translations, images.places, "the translation"),
-        (points.positions, points.places, "the position"),
+    for image in model.images:
+        if not image.name.strip() or not image.name.isprintable():
+            raise image.place.error(phrase("format.name", what="image", name=image.name))
+        if image.camera not in cameras:
+            raise image.place.error(phrase("format.undefined", what="camera", name=str(image.camera)))
+    places = [each.place for each in model.images]
+    places_of_features = np.repeat(np.arange(len(places)), model.counts)
+    translations = np.array([each.pose[4:] for each in model.images]).reshape(-1, 3)
+    for values, rows, own, what in (
+        (model.features["xy"], places_of_features, places, "a feature"),
+        (translations, None, places, "the translation"),
+        (model.points["xyz"], None, model.point_places, "the position"),
     ):
         finite = np.isfinite(values).all(axis=1)
         if not finite.all():
-            raise places[int(np.argmin(finite))].error(phrase("format.finite", name=what))
-    for what, names, places in (
-        ("image", np.array(images.names, dtype=object), images.places),
-        ("image", images.numbers, images.places),
-        ("point", points.numbers, points.places),
+            row = int(np.argmin(finite))
+            raise own[row if rows is None else rows[row]].error(phrase("format.finite", name=what))
+    for what, keys, own in (
+        ("image", np.array(names, dtype=object), places),
+        ("image", model.numbers, places),
+        ("point", model.points["number"], model.point_places),
     ):
-        _, first = np.unique(names, return_index=True)
-        if len(first) < len(names):
-            row = int(np.setdiff1d(np.arange(len(names)), first)[0])
-            raise places[row].error(phrase("format.repeated", what=what, name=str(names[row])))
+        _, first = np.unique(keys, return_index=True)
+        if len(first) < len(keys):
+            row = int(np.setdiff1d(np.arange(len(keys)), first)[0])
+            raise own[row].error(phrase("format.repeated", what=what, name=str(keys[row])))
 
 
 def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, Indices]:
@@ -147,7 +149,7 @@ def _composed(
     cameras = {camera.number: str(camera.number) for camera in model.cameras}
     numbers = {rig.number for rig in model.rigs}
     sensors, rigs = _mounted_sensors(model, cameras)
-    rows = {number: row for row, number in enumerate(model.images.numbers.tolist())}
+    rows = {each.number: row for row, each in enumerate(model.images)}
     frames, seen, unknown = [], set(), 0
     poses = _rigid([each.pose for each in model.frames], [each.place for each in model.frames])
     for frame, (turn, shift) in zip(model.frames, poses, strict=True):
@@ -159,7 +161,7 @@ def _composed(
             if image not in rows:
                 raise place.error(phrase("format.undefined", what="image", name=str(image)))
             row = rows[image]
-            if (frame.rig, sensor) not in sensors or model.images.cameras[row] != sensor:
+            if (frame.rig, sensor) not in sensors or model.images[row].camera != sensor:
                 raise place.error(phrase("colmap.sensor", frame=frame.number, image=image, camera=sensor))
             if row in seen or cameras[sensor] in photos:
                 raise place.error(phrase("colmap.frame", frame=frame.number, image=image, camera=sensor))
@@ -202,19 +204,19 @@ def _mounted_sensors(
 
 def _observed(model: Model, messages: list[Message]) -> tuple[Indices, Indices]:
     """Return rows of features that are images of points, and the rows of the points."""
-    images, points = model.images, model.points
-    features = np.flatnonzero(images.points != NO_POINT)
-    order = np.argsort(points.numbers, kind="stable")
-    numbers, wanted = points.numbers[order], images.points[features]
+    named, own = model.features["point"].copy(), model.points["number"].astype(np.int64)
+    features = np.flatnonzero(named != NO_POINT)
+    order = np.argsort(own, kind="stable")
+    numbers, wanted = own[order], named[features]
     at = np.searchsorted(numbers, wanted)
     known = np.append(numbers, NO_POINT)[at] == wanted
     rows = order[at[known]]
     missing = np.unique(wanted[~known]).tolist()
-    counts = np.bincount(rows, minlength=len(points.numbers))
+    counts = np.bincount(rows, minlength=len(own))
     for code, n in (
-        ("colmap.pointless", len(images.points) - len(features)),
+        ("colmap.pointless", len(named) - len(features)),
         ("colmap.unknown-points", np.count_nonzero(~known)),
-        ("colmap.tracks", np.count_nonzero(counts != points.tracks)),
+        ("colmap.tracks", np.count_nonzero(counts != model.points["track"].astype(np.int64))),
     ):
         messages += [Message.of(code, n=int(n), names=missing)] if n else []
     return features[known], rows

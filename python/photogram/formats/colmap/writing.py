@@ -90,41 +90,35 @@ def _written(project: Project) -> _Written:
     matrices = attitude_matrices(block)[rows]
     translations = -np.einsum("nij,nj->ni", Y_DOWN @ matrices.transpose(0, 2, 1), block.photo_positions[rows])
     quaternions = Attitudes(matrices).values("quaternion_to_vision")
-    camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in rows], dtype=np.int64)
-    poses = map(tuple, np.hstack([quaternions, translations]).tolist())
-    of_photo = dict(zip(photos, camera_numbers.tolist(), strict=True))
-    rigs, frames = _rigs(project, dict(zip(photos, poses, strict=True)), photos, of_photo, numbers)
+    poses = dict(zip(photos, map(tuple, np.hstack([quaternions, translations]).tolist()), strict=True))
+    of_rows = (numbers[cameras[photo_cameras[row]].name] for row in rows)
+    of_photo = dict(zip(photos, of_rows, strict=True))
+    rigs, frames = _rigs(project, poses, photos, of_photo, numbers)
 
-    ids = np.array(list(photos.values()), dtype=np.int64)
-    order = np.argsort(ids, kind="stable")
-    rank = np.full(len(block.photo_ids), -1, dtype=np.int64)
-    rank[rows[order]] = np.arange(len(rows))
-    image_rows = np.flatnonzero(rank[block.image_photos] >= 0)
-    image_rows = image_rows[np.argsort(rank[block.image_photos[image_rows]], kind="stable")]
+    image_rows = np.flatnonzero(np.isin(block.image_photos, rows))
+    numbers_of_photos = np.zeros(len(block.photo_ids), dtype=np.int64)
+    numbers_of_photos[rows] = list(photos.values())
+    owners = numbers_of_photos[block.image_photos[image_rows]]
+    image_rows = image_rows[np.argsort(owners, kind="stable")]
     point_numbers = np.full(len(block.point_ids), content.NO_POINT, dtype=np.int64)
     point_numbers[point_rows] = list(points.values())
-    images = content.Images(
-        ids[order],
-        camera_numbers[order],
-        quaternions[order],
-        translations[order],
-        [block.photo_ids[row] for row in rows[order]],
-        np.bincount(rank[block.image_photos[image_rows]], minlength=len(rows)),
-        to_corner(project)[image_rows],
-        point_numbers[block.image_points[image_rows]],
-    )
+    features = np.empty(len(image_rows), content.FEATURE)
+    features["xy"] = to_corner(project)[image_rows]
+    features["point"] = point_numbers[block.image_points[image_rows]]
+    names = sorted(photos, key=lambda name: photos[name])
+    parts = np.split(features, np.searchsorted(np.sort(owners), [photos[name] for name in names])[1:])
+    images = [
+        content.Image(photos[name], poses[name], of_photo[name], name, part)
+        for name, part in zip(names, parts, strict=True)
+    ]
     point_rows = point_rows[np.argsort(point_numbers[point_rows], kind="stable")]
     colours = details.get("colours", {})
-    point_table = content.Points(
-        point_numbers[point_rows],
-        positions[point_rows],
-        np.array(
-            [colours.get(block.point_ids[row], (0, 0, 0)) for row in point_rows], dtype=np.int64
-        ).reshape(-1, 3),
-        np.zeros(len(point_rows), dtype=np.int64),
-    )
+    table = np.zeros(len(point_rows), content.POINT)
+    table["number"], table["xyz"], table["error"] = point_numbers[point_rows], positions[point_rows], -1.0
+    rgb = [colours.get(block.point_ids[row], (0, 0, 0)) for row in point_rows.tolist()]
+    table["rgb"] = np.array(rgb, dtype=np.int64).reshape(-1, 3)
     records.sort(key=lambda camera: camera.number)
-    model = content.Model(project.path, records, images, point_table, rigs, frames)
+    model = content.Model(project.path, records, images, table, rigs, frames)
     return _Written(model, photos, points, numbers, image_rows)
 
 
@@ -226,11 +220,10 @@ def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> byt
 
 def _quality(model: _Written, result: Result) -> bytes:
     """Return residuals, redundancy numbers and test values by image."""
-    images = model.model.images
-    counts = np.asarray(images.counts)
+    counts = model.model.counts
     table = np.empty(len(model.rows), [("image", "<u4"), ("feature", "<u4"), ("values", "<f4", 6)])
-    table["image"] = np.repeat(images.numbers, counts)
-    table["feature"] = np.arange(len(model.rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    table["image"] = np.repeat(model.model.numbers, counts)
+    table["feature"] = np.concatenate([np.arange(count) for count in counts])
     parts = (result.residuals, result.redundancy, result.standardized)
     table["values"] = np.hstack([part[model.rows] for part in parts])
     return struct.pack("<Q", len(table)) + table.tobytes()
