@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,12 +18,12 @@ from photogram.formats.plain.tables import Tables, columns_of, columns_of_record
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.numbers import scaled
-from photogram.io.places import Place, at_place
+from photogram.io.places import Place, at_place, image_size
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import unknown_name
 from photogram.network.block import Block
-from photogram.network.cameras import Camera, Weights
-from photogram.network.moving_photos import Direction, LineSensor, Shutter
+from photogram.network.cameras import Camera
+from photogram.network.moving_photos import LineSensor, Shutter
 from photogram.network.trajectories import Readout
 from photogram.network.wider_models import focal_length_message, with_one_focal_length
 from photogram.words import phrase
@@ -34,81 +34,53 @@ if TYPE_CHECKING:
 
 LINE = "line"  # The model of a line sensor with the lens `brown`
 OF_LINES = ("x0", "y0", "s0")  # Columns of a line sensor that some models have as parameters
+_PITCH = ("pitch_x", "pitch_y")
 Exposure = Shutter | LineSensor | None
 
 
-def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
-    """Return the line sensor of each row of a camera table; None for frame cameras."""
-    unit = 1e-3 if tables.settings.image == "um" else 1.0
-    pitches = scaled(table.vectors(("pitch_x", "pitch_y")), unit)
-    places = scaled(table.vectors(("x0", "y0"), 0.0), unit)
-    middles = table.numbers("s0")
-    middles = np.where(np.isnan(middles), table.numbers("width") / 2, middles)
-    found: list[LineSensor | None] = []
-    for row, model in enumerate(table.texts("model")):
-        pitch = np.nan_to_num(pitches[row])
-        if np.isnan(pitches[row]).all():
-            if model.lower() == LINE:
-                raise table.cell_error(row, "pitch_x", "error.empty")
-            found.append(None)
-            continue
-        if not pitch.any():
-            raise table.cell_error(row, "pitch_x, pitch_y", "plain.pitch")
-        if math.isnan(middles[row]):
-            raise table.cell_error(row, "s0", "plain.s0")
-        x0, y0 = places[row].tolist()
-        found.append(LineSensor((float(pitch[0]), float(pitch[1])), float(middles[row]), x0, y0))
-    return found
+def _line_sensor(tables: Tables, table: ColumnTable, row: int, cells: Mapping[str, Any]) -> LineSensor | None:
+    """Return the line sensor of a row of a camera table; None for frame cameras."""
+    pitches = [cells.get(name, 0.0) for name in _PITCH]
+    if not cells.keys() & set(_PITCH):
+        if cells.get("model", "").lower() == LINE:
+            raise table.cell_error(row, "pitch_x", "error.empty")
+        return None
+    if not any(pitches):
+        raise table.cell_error(row, "pitch_x, pitch_y", "plain.pitch")
+    if not cells.keys() & {"s0", "width"}:
+        raise table.cell_error(row, "s0", "plain.s0")
+    numbers = np.array([*pitches, *(cells.get(name, 0.0) for name in OF_LINES[:2])])
+    *pitch, x0, y0 = scaled(numbers, 1e-3 if tables.settings.image == "um" else 1.0).tolist()
+    return LineSensor((pitch[0], pitch[1]), cells.get("s0", cells.get("width", 0) / 2), x0, y0)
 
 
-def shutters(
-    tables: Tables, table: ColumnTable, cameras: Sequence[Camera], sizes: Sequence[Size | None]
-) -> list[Shutter | None]:
-    """Return the rolling shutter of each row of a camera table; None without."""
-    directions = tables.words("cameras", "readout_direction")
-    edges = _edges(tables, table, cameras, sizes, directions)
-    values, deviations = table.numbers("readout"), table.numbers("sd_readout", 0.0, infinite=True)
-    found: list[Shutter | None] = []
-    for row, (word, name) in enumerate(
-        zip(table.texts("readout_direction"), table.texts("shutter"), strict=True)
-    ):
-        if math.isnan(values[row]):
-            if word or name or deviations[row]:
-                raise table.cell_error(row, "readout", "error.empty")
-            found.append(None)
-            continue
-        if np.isnan(edges[row]).any():
-            raise table.error(row, phrase("plain.picture-edges"))
-        title, value, sd = name or cameras[row].name, float(values[row]), float(deviations[row])
-        readout = tables.shared.one(table, row, "shutter", Readout, title, value=value, sd=sd)
-        found.append(made(table, row, Shutter, readout, tuple(edges[row].tolist()), directions[row]))
-    return found
-
-
-def _edges(
+def _shutter(
     tables: Tables,
     table: ColumnTable,
-    cameras: Sequence[Camera],
-    sizes: Sequence[Size | None],
-    directions: Sequence[Direction],
-) -> Floats:
-    """Return (rows, 2) readout limits in camera coordinates; NaN if unknown."""
-    settings = tables.settings
+    row: int,
+    cells: Mapping[str, Any],
+    camera: Camera,
+    size: Size | None,
+) -> Shutter | None:
+    """Return the rolling shutter of a row of a camera table; None without."""
+    if "readout" not in cells:
+        if cells.keys() & {"readout_direction", "shutter"} or cells.get("sd_readout"):
+            raise table.cell_error(row, "readout", "error.empty")
+        return None
+    settings, direction = tables.settings, cells.get("readout_direction", "down")
     pixels = settings.image == "px"
-    given = table.vectors(("readout_begin", "readout_end"))
-    given = in_unit(settings, given, pixels=pixels and settings.image_y == "down")
-    extents = table.vectors(("width", "height"))
-    if not pixels:
-        extents *= table.numbers("pixel_mm")[:, np.newaxis]
-    found = np.full((table.count, 2), np.nan)
-    for row, (camera, direction) in enumerate(zip(cameras, directions, strict=True)):
-        if np.isnan(given[row]).all():
-            found[row] = picture_edges(camera, direction, extents[row])
-            continue
-        there = np.column_stack([given[row], given[row]])
-        placed = made(table, row, from_tables, settings, camera, sizes[row], there)
-        found[row] = placed[:, _counted(direction)]
-    return found
+    given = np.array([[cells.get(f"readout_{end}", np.nan)] * 2 for end in ("begin", "end")])
+    if np.isnan(given).all():
+        extent = np.array([cells.get(name, np.nan) for name in ("width", "height")], dtype=float)
+        edges = picture_edges(camera, direction, extent * (1.0 if pixels else cells.get("pixel_mm", np.nan)))
+    else:
+        there = in_unit(settings, given, pixels=pixels and settings.image_y == "down")
+        edges = made(table, row, from_tables, settings, camera, size, there)[:, _counted(direction)]
+    if np.isnan(edges).any():
+        raise table.error(row, phrase("plain.picture-edges"))
+    title, sd = cells.get("shutter", camera.name), cells.get("sd_readout", 0.0)
+    readout = tables.shared.one(table, row, "shutter", Readout, title, value=cells["readout"], sd=sd)
+    return made(table, row, Shutter, readout, tuple(edges.tolist()), direction)
 
 
 def _counted(direction: str) -> int:
@@ -145,48 +117,28 @@ def of_cameras(block: Block, cameras: Sequence[Camera], which: Sequence[int]) ->
     return [found.get(row) for row in range(len(cameras))]
 
 
-def exposure_columns(
-    cameras: Sequence[Camera],
-    exposures: Sequence[Exposure],
-    sizes: Sequence[Size | None],
-    pixel_mm: Sequence[float | None],
-    image_y: str,
+def exposure_cells(
+    own: Exposure, camera: Camera, size: Size | None, pixel_mm: float | None, image_y: str
 ) -> dict[str, Any]:
-    """Return the columns of shutters and line sensors of a camera table."""
-    rows = list[dict[str, Any]]()
-    for camera, own, size, pixel in zip(cameras, exposures, sizes, pixel_mm, strict=True):
-        cells = dict[str, Any]()
-        if isinstance(own, LineSensor):
-            if not own.is_straight:
-                raise InputError(phrase("plain.bent-line", camera=camera.title))
-            cells = {name: float(getattr(own, name)) for name in OF_LINES}
-            cells |= zip(("pitch_x", "pitch_y"), map(float, own.pitch), strict=True)
-        elif own is not None and isinstance(readout := own.readout, Readout):
-            cells = {"readout": readout.value, "sd_readout": float(readout.deviations[0])}
-            cells |= {"readout_direction": own.direction}
-            if edges := _edges_written(own, camera, size, pixel, image_y):
-                cells |= zip(("readout_begin", "readout_end"), edges, strict=True)
-            cells["shutter"] = readout.name
-        rows.append(cells)
-    if all(
-        each.get("shutter", camera.name) == camera.name for each, camera in zip(rows, cameras, strict=True)
-    ):
-        rows = [{name: cell for name, cell in each.items() if name != "shutter"} for each in rows]
-    return columns_of_records(rows)
-
-
-def _edges_written(
-    shutter: Shutter, camera: Camera, size: Size | None, pixel_mm: float | None, image_y: str
-) -> tuple[float, float] | None:
-    """Return readout limits of a table; None if size and direction suffice."""
-    if size is not None:
-        unit = 1.0 if camera.unit == "px" else pixel_mm or math.nan
-        usual = picture_edges(camera, shutter.direction, np.array(size) * unit)
-        if tuple(usual.tolist()) == tuple(shutter.edges):
-            return None
-    own = np.array(shutter.edges, dtype=float)
-    there = to_tables(image_y, camera, size, np.column_stack([own, own]))[:, _counted(shutter.direction)]
-    return float(there[0]), float(there[1])
+    """Return the cells of the shutter or line sensor of a camera."""
+    if isinstance(own, LineSensor):
+        if not own.is_straight:
+            raise InputError(phrase("plain.bent-line", camera=camera.title))
+        cells = {name: float(getattr(own, name)) for name in OF_LINES}
+        return cells | dict(zip(_PITCH, map(float, own.pitch), strict=True))
+    if own is None or not isinstance(readout := own.readout, Readout):
+        return {}
+    found: dict[str, Any] = {"readout": readout.value, "sd_readout": float(readout.deviations[0])}
+    found |= {"readout_direction": own.direction}
+    unit = 1.0 if camera.unit == "px" else pixel_mm or math.nan
+    # Size and direction may suffice.
+    if size is None or picture_edges(camera, own.direction, np.array(size) * unit).tolist() != [*own.edges]:
+        edges = np.array(own.edges, dtype=float)
+        there = to_tables(image_y, camera, size, np.column_stack([edges, edges]))
+        found |= zip(
+            ("readout_begin", "readout_end"), there[:, _counted(own.direction)].tolist(), strict=True
+        )
+    return found if readout.name == camera.name else {**found, "shutter": readout.name}
 
 
 _MODELS = dict(_photocore.camera_models())
@@ -221,15 +173,17 @@ def read_cameras(tables: Tables) -> Cameras:
         raise InputError(phrase("error.missing", name="cameras.csv"), file=tables.settings.path)
     if not table.count:
         raise table.head.error(phrase("error.empty-file", content="cameras"))
-    found, weights = Cameras(lines=line_sensors(tables, table)), table.texts("weights")
-    certificates = read_certificates(tables)
+    found, certificates = Cameras(), read_certificates(tables)
     found.certificates.update(certificates)
-    in_mm = []
-    for row, cells in enumerate(zip(table.names_once("camera"), tables.records("cameras"), strict=True)):
-        own = _row(table, row, *cells, behind_a_lens=found.lines[row] is not None)
-        size = _size(table, row, cells[1])
+    in_mm, records = [], tables.records("cameras")
+    for row, cells in enumerate(records):
+        line = _line_sensor(tables, table, row, cells)
+        own = _row(table, row, cells, behind_a_lens=line is not None)
+        size = None
+        if {"width", "height"} <= cells.keys():
+            size = image_size(table.at(row), cells["width"], cells["height"])
         parts = 1000.0 if tables.settings.image == "um" else 1.0
-        if size is not None and found.lines[row] is None:
+        if size is not None and line is None:
             parts, converted = _from_mm(tables.settings.image, table, row, own, size[0], parts)
             in_mm += [own.name] * converted
         certificate = _of_camera(tables, table, row, own, certificates)
@@ -239,26 +193,24 @@ def read_cameras(tables: Tables) -> Cameras:
             camera = made(table, row, certified, tables, own.name, own.model, certificate)
         found.cameras.append(camera)
         found.sizes.append(size)
-        found.pixel_mm.append(own.pixel_mm)
-        found.for_each.append(own.each)
-        found.weights_given.append(bool(weights[row]))
+        found.pixel_mm.append(cells.get("pixel_mm"))
+        found.for_each.append(cells.get("for_each", "all"))
+        found.weights_given.append("weights" in cells)
+        found.lines.append(line)
+        found.shutters.append(_shutter(tables, table, row, cells, camera, size))
     covariances = read_covariances(tables)
     if both := [name for name in in_mm if covariances.names("camera", name)]:
         raise table.head.error(phrase("plain.mm-covariances", camera=both[0]))
     if in_mm:
         tables.remark("plain.lengths-in-mm", table.path, names=in_mm)
-    return replace(
-        found,
-        cameras=with_knots(tables, covariances.cameras(found.cameras)),
-        shutters=shutters(tables, table, found.cameras, found.sizes),
-    )
+    return replace(found, cameras=with_knots(tables, covariances.cameras(found.cameras)))
 
 
 def _from_mm(
     image: str, table: ColumnTable, row: int, own: _Row, width: int, parts: float
 ) -> tuple[float, bool]:
     """Return the divisor to camera units, and whether the row is in mm."""
-    pixel = own.pixel_mm if own.pixel_mm and own.pixel_mm > 0 else math.nan
+    pixel = own.cells.get("pixel_mm", math.nan)
     least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel * parts)
     small = [name for name in _DISTANCES if abs(own.values.get(name, math.inf)) < least]
     if not small:
@@ -281,7 +233,7 @@ def _of_camera(
     certificate = certificates.get(own.name)
     if certificate is None or certificate.c is None:
         return None
-    if own.values or own.deviations or own.calibration:
+    if own.values or own.deviations or "calibration" in own.cells:
         c = abs(own.values.get("c", certificate.c))
         if abs(c - certificate.c) > OTHER_LENS:
             message = phrase("plain.other-lens", camera=own.name, c=c, certificate=certificate.c)
@@ -297,19 +249,15 @@ class _Row(NamedTuple):
     """One row of the table; existing numbers by column name."""
 
     name: str
-    each: str
     model: str
-    weights: str
-    calibration: str
-    pixel_mm: float | None
     values: dict[str, float]
     deviations: dict[str, float]
+    cells: Mapping[str, Any]
 
 
-def _row(table: ColumnTable, row: int, name: str, cells: Mapping[str, Any], *, behind_a_lens: bool) -> _Row:
+def _row(table: ColumnTable, row: int, cells: Mapping[str, Any], *, behind_a_lens: bool) -> _Row:
     """Return a row; the columns of a line sensor `behind_a_lens` are not parameters of the lens."""
-    words = (("for_each", "all"), ("model", ""), ("weights", "corrected"))
-    each, model, weights = (cells.get(column, default).lower() for column, default in words)
+    model = cells.get("model", "").lower()
     values = {column: value for column, value in cells.items() if column in _ALL}
     sd = {column[3:]: value for column, value in cells.items() if column.startswith("sd_")}
     if behind_a_lens:
@@ -320,17 +268,7 @@ def _row(table: ColumnTable, row: int, name: str, cells: Mapping[str, Any], *, b
         if unknown := [column for column in OF_LINES if sd.get(column)]:
             raise table.cell_error(row, f"sd_{unknown[0]}", "plain.line-sd")
         values = {column: value for column, value in values.items() if column not in OF_LINES}
-    return _Row(name, each, model, weights, cells.get("calibration", ""), cells.get("pixel_mm"), values, sd)
-
-
-def _size(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Size | None:
-    if not {"width", "height"} <= cells.keys():
-        return None
-    for name in ("width", "height"):
-        if not (0 < cells[name] < 2**31 and cells[name] == int(cells[name])):
-            fields = {"low": 1, "high": 2**31 - 1, "value": cells[name]}
-            raise table.cell_error(row, name, "error.whole-range", **fields)
-    return int(cells["width"]), int(cells["height"])
+    return _Row(cells["camera"], model, values, sd, cells)
 
 
 def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Camera:
@@ -340,7 +278,7 @@ def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Ca
     beside = given.model or given.values or given.deviations
     if beside or read_covariances(tables).names("camera", given.name):
         raise table.error(row, phrase("plain.calibrated-camera", camera=given.name))
-    found = camera_from(table.path.parent / given.calibration, given.name)
+    found = camera_from(table.path.parent / given.cells["calibration"], given.name)
     if (found.unit == "px") != (tables.settings.image == "px"):
         fields = {"camera": given.name, "unit": found.unit}
         raise table.error(row, phrase("plain.calibration-unit", **fields))
@@ -350,7 +288,7 @@ def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Ca
 def _camera(
     tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None, parts: float
 ) -> Camera:
-    if given.calibration:
+    if "calibration" in given.cells:
         return _calibrated(tables, table, row, given)
     known = given.values
     model = given.model or ("brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole")
@@ -386,7 +324,7 @@ def _camera(
         },
         name=given.name,
         unit="px" if image == "px" else "mm",
-        weights=cast("Weights", given.weights),
+        weights=given.cells.get("weights", "corrected"),
     )
     if not given.deviations.get("f") or "fx" not in own:
         return camera
@@ -433,19 +371,19 @@ def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
     """Return the columns of the knots of cameras, row by row; empty without knots."""
     return columns_of_records(
         {"camera": each.name, "i": i, "j": j}
-        | columns_of(("dx", "dy"), both[0][j, i])
-        | columns_of(_SD, both[1][j, i])
+        | columns_of(("dx", "dy"), each.knots[j, i])
+        | columns_of(_SD, each.knot_sd[j, i])
         for each in cameras
-        if (both := _both(each)) is not None
-        for j, i in np.ndindex(both[0].shape[:2])
+        if each.knots is not None and each.knot_sd is not None
+        for j, i in np.ndindex(each.knots.shape[:2])
     )
 
 
 def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
     """Return cameras with the knots of the table; missing knots are 0 and fixed."""
     table = tables.rows("knots")
-    splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
-    values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
+    splined = {each.name: each.knots for each in cameras if each.knots is not None}
+    values, sd = ({name: np.zeros_like(knots) for name, knots in splined.items()} for _ in range(2))
     seen = set[tuple[str, int, int]]()
     for row, cells in enumerate(tables.records("knots", defaults=True)):
         name, i, j = cells["camera"], cells["i"], cells["j"]
@@ -465,10 +403,3 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
             each.replace(knots=values[each.name], knot_sd=sd[each.name]) if each.name in splined else each
             for each in cameras
         ]
-
-
-def _both(camera: Camera) -> tuple[Floats, Floats] | None:
-    """Return (ny, nx, 2) knots and standard deviations; None without."""
-    if camera.knots is None or camera.knot_sd is None:
-        return None
-    return camera.knots, camera.knot_sd

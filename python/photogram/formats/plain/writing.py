@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.images import by_camera, to_tables
 from photogram.formats.models import correlated_control, known_cameras, known_points
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
-from photogram.formats.plain.cameras import OF_LINES, Exposure, exposure_columns, knots_table, of_cameras
+from photogram.formats.plain.cameras import Exposure, exposure_cells, knots_table, of_cameras
 from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.films import WrittenFilms
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
@@ -21,7 +21,13 @@ from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings, asked_files, key_tables
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
-from photogram.formats.plain.tables import columns_of, correlations, places_written, signs_in_files
+from photogram.formats.plain.tables import (
+    columns_of,
+    columns_of_records,
+    correlations,
+    places_written,
+    signs_in_files,
+)
 from photogram.formats.plain.trajectories import lost_smoothness, smoothness_table, trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
@@ -67,11 +73,8 @@ def write(project: Project) -> Mapping[str, bytes]:
     names = ["column", "row"] if image_y == "down" or lines_alone or films.pixels else ["x", "y"]
     # Samples and lines, and readings of films, are unchanged.
     plain = lines | np.array([name in films.films for name in block.photo_ids])
-    pictures = _pictures(project, cameras)
     tables = {
-        "cameras": _with_exposures(
-            camera_table(project, cameras), exposure_columns(cameras, exposures, *pictures, image_y)
-        ),
+        "cameras": camera_table(project, cameras, exposures, image_y),
         "photos": _photos(project, [cameras[row].name for row in photo_cameras], rigs)
         | films.photo_columns(),
         "images": _images(project, names, cameras, photo_cameras, plain, image_y),
@@ -119,16 +122,6 @@ def _pictures(project: Project, cameras: Sequence[Camera]) -> tuple[list[Size | 
     return sizes, list(project.pixel_mm)
 
 
-def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a camera table with exposure columns."""
-    found = {**table, **more}
-    for name in OF_LINES:
-        if name in table and name in more:
-            pairs = zip(table[name], more[name], strict=True)
-            found[name] = [own if line is None else line for own, line in pairs]
-    return found
-
-
 def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
     block, frame, options, spheroid = project.block, project.frame, project.options, project.block.spheroid
     unit = block.linear_unit if block.linear_unit in LENGTHS else "m"
@@ -158,35 +151,27 @@ def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
     return text
 
 
-def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
-    """Return the columns of the cameras of a project."""
-    columns: dict[str, Any] = {
-        "camera": [each.name for each in cameras],
-        "model": [each.model for each in cameras],
-    }
-    sizes, pixels = _pictures(project, cameras)
-    if any(size is not None for size in sizes):
-        columns["width"] = [None if size is None else size[0] for size in sizes]
-        columns["height"] = [None if size is None else size[1] for size in sizes]
-    if any(pixel is not None for pixel in pixels):
-        columns["pixel_mm"] = pixels
-    constants = {"w", "h"}
-    if any(each.weights != "corrected" for each in cameras):
-        columns["weights"] = [each.weights for each in cameras]
+def camera_table(
+    project: Project, cameras: Sequence[Camera], exposures: Sequence[Exposure] = (), image_y: str = "up"
+) -> dict[str, Any]:
+    """Return the columns of the cameras of a project, with their shutters or line sensors."""
     # Columns ignore case: B1 of one model and b1 of another share a column.
-    values = [{name.lower(): value for name, value in each.parameters.items()} for each in cameras]
-    deviations = [
-        {name.lower(): sd for name, sd in zip(each.names, each.deviations.tolist(), strict=True)}
-        for each in cameras
-    ]
-    names = {name.lower(): name for each in reversed(cameras) for name in reversed(each.names)}
-    order = dict.fromkeys(name.lower() for each in cameras for name in each.names if name not in constants)
-    for word, sign in zip(order, signs_in_files([*order]).tolist(), strict=True):
-        columns[names[word]] = [None if word not in own else sign * own[word] for own in values]
-    for word in order:
-        if any(own.get(word) for own in deviations):
-            columns[f"sd_{names[word]}"] = [own.get(word, 0.0) for own in deviations]
-    return columns
+    spelled = {name.lower(): name for each in reversed(cameras) for name in reversed(each.names)}
+    pairs = [list(zip(each.names, each.deviations.tolist(), strict=True)) for each in cameras]
+    weighted = {name.lower() for own in pairs for name, sd in own if sd}
+    rows, more = list[dict[str, Any]](), list[dict[str, Any]]()
+    pictures = zip(*_pictures(project, cameras), exposures or [None] * len(cameras), strict=True)
+    for camera, deviations, (size, pixel_mm, exposure) in zip(cameras, pairs, pictures, strict=True):
+        cells: dict[str, Any] = {"camera": camera.name, "model": camera.model}
+        cells |= zip(("width", "height"), size or (None, None), strict=True)
+        cells |= {"pixel_mm": pixel_mm, "weights": camera.weights if camera.weights != "corrected" else None}
+        names = [name for name in camera.names if name not in ("w", "h")]
+        for name, sign in zip(names, signs_in_files(names).tolist(), strict=True):
+            cells[spelled[name.lower()]] = sign * camera.parameters[name]
+        own = {f"sd_{spelled[name.lower()]}": sd for name, sd in deviations if name.lower() in weighted}
+        more.append(own | exposure_cells(exposure, camera, size, pixel_mm, image_y))
+        rows.append(cells)
+    return columns_of_records(cells | own for cells, own in zip(rows, more, strict=True))
 
 
 def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
