@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +14,12 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.plain.covariances import Covariances
-from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID, TABLES, deviation_columns
+from photogram.formats.plain.schema import CURVES, DEVICE, GRID, TABLES, deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, made
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.films import (
-    PATTERNS,
     Film,
     Pattern,
     Readings,
@@ -53,12 +54,8 @@ class Machine:
 
     def held(self) -> Machine:
         """Return the scanner with fixed parameters."""
-        return Machine(
-            self.scanner.replace(sd=0.0),
-            tuple(each.replace(sd=0.0) for each in self.curves),
-            self.readings,
-            None,
-        )
+        curves = tuple(each.replace(sd=0.0) for each in self.curves)
+        return Machine(self.scanner.replace(sd=0.0), curves, self.readings, None)
 
 
 @dataclass(frozen=True)
@@ -76,23 +73,23 @@ class FilmKind:
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
     """Read the table of scanners."""
-    table = tables.rows("scanners")
-    names = table.names_once("scanner")
-    counts = table.given(_READINGS[1:])
-    # Readings count rows downwards by default.
-    down = table.flags("rows_down") if "rows_down" in table else np.ones(table.count, dtype=bool)
-    found = {}
-    for row, (name, given) in enumerate(zip(names, tables.records("scanners"), strict=True)):
+    table, found = tables.rows("scanners"), {}
+    for row, given in enumerate(tables.records("scanners")):
+        name, cells = given["scanner"], TABLES["scanners"].defaults | given
         if "calibration" in given:
-            _check_alone(table, row, given, covariances)
-            numbers = _calibrated(table, row, given["calibration"], tables.messages)
+            for column in (*_NUMBERS, "hx", "hy", *deviation_columns(_NUMBERS)):
+                if column in given:
+                    raise table.cell_error(row, column, "plain.calibrated-scanner", scanner=name)
+            if covariances.names("scanner", name):
+                raise table.error(row, phrase("plain.scanner-covariance", scanner=name))
+            numbers = _calibrated(table.path.parent / given["calibration"], tables.messages)
         else:
-            cells = TABLES["scanners"].defaults | given
             columns = _NUMBERS, deviation_columns(_NUMBERS), ("hx", "hy")
             numbers = _Numbers(*(np.array([cells[each] for each in names]) for names in columns))
-        pitch, *origin = counts[row].tolist()
-        zero = numbers.zero / pitch * [1.0, -1.0 if down[row] else 1.0] + origin
-        counted = pitch, tuple(zero.tolist()), bool(down[row]), tuple(numbers.half.tolist())
+        # Readings count rows downwards by default.
+        pitch, *origin, down = *(cells[each] for each in _READINGS[1:]), cells.get("rows_down", True)
+        zero = numbers.zero / pitch * [1.0, -1.0 if down else 1.0] + origin
+        counted = pitch, tuple(zero.tolist()), down, tuple(numbers.half.tolist())
         readings = made(table, row, Readings, *counted)
         found[name] = _machine(table, row, name, numbers, readings, covariances)
     return found
@@ -110,17 +107,7 @@ class _Numbers:
     covariance: Floats | None = None  # (21, 21); None without
 
 
-def _check_alone(table: ColumnTable, row: int, cells: Mapping[str, Any], covariances: Covariances) -> None:
-    """Reject other parameters in addition to a calibration file."""
-    name = cells["scanner"]
-    for column in (*_NUMBERS, "hx", "hy", *deviation_columns(_NUMBERS)):
-        if column in cells:
-            raise table.cell_error(row, column, "plain.calibrated-scanner", scanner=name)
-    if covariances.names("scanner", name):
-        raise table.error(row, phrase("plain.scanner-covariance", scanner=name))
-
-
-def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]) -> _Numbers:
+def _calibrated(path: Path, messages: list[Message]) -> _Numbers:
     """Return the contents of a comparator calibration file, or of its correction.
 
     Fixed components of a singular covariance matrix get a standard deviation of 0.001 um.
@@ -128,7 +115,6 @@ def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]
     from photogram.comparator.correction import Correction
     from photogram.comparator.polynomial import Frame
 
-    path = table.path.parent / file
     own = Correction.read(path)
     frame = Frame.metres() if own.polynomial is None else own.polynomial.frame
     scaled = np.zeros(18) if own.polynomial is None else own.polynomial.scaled_um.ravel()
@@ -215,21 +201,16 @@ def known_words(machine: Machine) -> list[str]:
 
 def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[str, FilmKind]:
     """Read the table of films; films without a row have defaults."""
-    table, defaults = tables.rows("films"), TABLES["films"].defaults
-    found = {name: _film_kind(name, {"model": default, **defaults}) for name in names}
-    table.names_once("film")
-    for row, cells in enumerate(tables.records("films")):
-        cells = {"model": default, "pattern": "none", **defaults, **cells}
-        for column, words in (("model", FILM_MODELS), ("pattern", (*PATTERNS, LOCAL))):
-            if cells[column] not in words:
-                kind = "film model" if column == "model" else "pattern"
-                raise table.unknown_error(row, column, kind, cells[column], words)
-        name, kind = cells["film"], cells["pattern"]
-        found[name] = made(table, row, _film_kind, name, cells)
-        if kind == LOCAL:
-            found[name] = replace(found[name], reseau=_reseau(table, row, cells))
-        elif kind != "none":
-            found[name] = replace(found[name], pattern=_pattern(table, row, cells))
+    table, defaults = tables.rows("films"), {"model": default, **TABLES["films"].defaults}
+    found = {name: _film_kind(name, defaults) for name in names}
+    for row, given in enumerate(tables.records("films")):
+        cells = defaults | given
+        found[cells["film"]] = kind = made(table, row, _film_kind, cells["film"], cells)
+        if cells["pattern"] == LOCAL:
+            numbers = *_pattern_numbers(table, row, cells, GRID, 2), cells.get("sd_smooth", math.inf)
+            found[cells["film"]] = replace(kind, reseau=partial(_reseau, table, row, numbers))
+        elif cells["pattern"] != "none":
+            found[cells["film"]] = replace(kind, pattern=_pattern(table, row, cells))
     return found
 
 
@@ -245,7 +226,8 @@ def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Pattern:
     """Return the pattern of a film."""
     kind, film = cells["pattern"], cells["film"]
     count = 10 if kind == "ebner" else 2
-    values, sd = _needed(table, row, cells, GRID if kind == "grid" else ("half_format_mm",), count)
+    names = GRID if kind == "grid" else ("half_format_mm",)
+    values, sd = _pattern_numbers(table, row, cells, names, count)
     if kind == "grid":
         nodes = int(values[4]) * int(values[5])
         own = [Weights(f"{film} node {k}", 0.0, sd) for k in range(1, nodes + 1)]
@@ -254,18 +236,15 @@ def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Pattern:
     return made(table, row, Pattern, kind, values, own)
 
 
-def _reseau(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Callable[..., Reseau]:
-    """Return a function that creates the reseau of a photo."""
-    values, sd = _needed(table, row, cells, GRID, 2)
-
-    def own(photo: str, shifts: Floats | None = None) -> Reseau:
-        free = made(table, row, Reseau, photo, values, sd, cells.get("sd_smooth", math.inf))
-        return free if shifts is None else free.with_shifts(shifts)
-
-    return own
+def _reseau(
+    table: ColumnTable, row: int, numbers: Sequence[Any], photo: str, shifts: Floats | None = None
+) -> Reseau:
+    """Return the reseau of a photo."""
+    free = made(table, row, Reseau, photo, *numbers)
+    return free if shifts is None else free.with_shifts(shifts)
 
 
-def _needed(
+def _pattern_numbers(
     table: ColumnTable, row: int, cells: Mapping[str, Any], columns: Sequence[str], count: int
 ) -> list[Floats]:
     """Return the numbers of a pattern and standard deviations of its weights."""

@@ -72,7 +72,6 @@ CURVES = tuple(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj")
 """Coefficients of its polynomials."""
 GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
 """Numbers of a pattern of shifts of nodes."""
-FILM_MODELS = ("affine", "conformal", "bilinear", "projective")
 BENDS = ("bend_x", "bend_y")  # Deflections of a board
 PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a board
 
@@ -119,7 +118,7 @@ class Column(NamedTuple):
     def words(self) -> tuple[str, ...]:
         """Allowed words, with the default first; empty for other kinds."""
         default = self.default.strip("`")
-        found = re.findall(r"`(\w+)`", self.content) if self.kind == "word" else []
+        found = re.findall(r"`([\w ]+)`", self.content) if self.kind == "word" else []
         return tuple(sorted(found, key=lambda word: word != default))
 
     @property
@@ -239,8 +238,8 @@ class Schema:
         """Numbers and words of empty cells by column, if they are declared."""
         found: dict[str, Any] = {}
         for column in self.all_columns:
-            word = column.words[0] if column.words and column.default.startswith("`") else math.nan
-            value = word if math.isnan(column.number) else column.number
+            word = column.default.strip("`")
+            value = word if word in column.words else column.number
             found |= dict.fromkeys(column.names if value == value else (), value)
         return found
 
