@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.tables import DEGREE, Tables, columns_of_records, made, signs_in_files, word_of
 from photogram.io.column_table import ColumnTable
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -29,69 +29,57 @@ _WITH_PHOTOS = {each.KIND for each in (LeverArm, Boresight, Sensor, GyroBias, Ro
 """Unknowns along, or about, the axes of photos or of bodies."""
 
 
-@dataclass
-class _Matrix:
-    """The covariances of one object: its rows, and numbers by pairs of components."""
-
-    rows: list[int] = field(default_factory=list)
-    values: dict[tuple[str, str], float] = field(default_factory=dict)
-
-    def over(self, components: Sequence[str], units: Mapping[str, float]) -> Floats:
-        """Return the matrix; missing covariances are 0."""
-        found = np.zeros((len(components),) * 2)
-        for (first, second), value in self.values.items():
-            i, j = components.index(first), components.index(second)
-            found[i, j] = found[j, i] = units[first] * units[second] * value
-        return found
-
-
 @dataclass(frozen=True)
 class Covariances:
-    """The table, by type and name of the object."""
+    """The table: rows, pairs of components and numbers by type and name of the object."""
 
     tables: Tables
     table: ColumnTable
-    matrices: Mapping[tuple[str, str], _Matrix]
+    parts: Mapping[tuple[str, str], list[tuple[int, str, str, float]]]
+
+    def names(self, kind: str, name: str) -> set[str]:
+        """Return the component names in the matrix of an object."""
+        return {word for _, *pair, _ in self.parts.get((kind, name), ()) for word in pair}
+
+    def _matrix(self, kind: str, name: str, units: Mapping[str, float], what: str) -> Floats:
+        """Return the matrix over the components that have units; missing covariances are 0."""
+        places, found = {word: k for k, word in enumerate(units)}, np.zeros((len(units),) * 2)
+        for row, first, second, value in self.parts[kind, name]:
+            for word in (first, second):
+                if word not in units:
+                    raise self.table.error(row, unknown_name(what, word, units))
+            i, j = places[first], places[second]
+            found[i, j] = found[j, i] = units[first] * units[second] * value
+        return found
 
     def cameras(self, cameras: Sequence[Camera]) -> list[Camera]:
         """Return cameras with their covariances."""
-        own = {name: each for (kind, name), each in self.matrices.items() if kind == CAMERA}
-        if not own:
-            return list(cameras)
         known = {each.name for each in cameras}
-        for name, matrix in own.items():
-            if name not in known:
-                raise self.table.unknown_error(matrix.rows[0], "name", "camera", name, known)
-        return [self._camera(each, own[each.name]) if each.name in own else each for each in cameras]
+        for (kind, name), own in self.parts.items():
+            if kind == CAMERA and name not in known:
+                raise self.table.unknown_error(own[0][0], "name", "camera", name, known)
+        return [self._camera(each) if (CAMERA, each.name) in self.parts else each for each in cameras]
 
-    def _camera(self, camera: Camera, matrix: _Matrix) -> Camera:
-        table = self.table
-        by_word = {name.lower(): name for name in camera.names}
-        spelled = _Matrix(matrix.rows)
-        for row, ((first, second), value) in zip(matrix.rows, matrix.values.items(), strict=True):
-            for word in (first, second):
-                if word not in by_word:
-                    raise table.error(
-                        row, unknown_name(f"parameter of the camera {camera.name}", word, by_word)
-                    )
-            spelled.values[by_word[first], by_word[second]] = value
-        names = [name for name in camera.names if any(name in pair for pair in spelled.values)]
+    def _camera(self, camera: Camera) -> Camera:
         scale = 1e-3 if self.tables.settings.image == "um" else 1.0
-        signs = signs_in_files(names).tolist()
-        units = {name: sign * scale ** camera.powers[name] for name, sign in zip(names, signs, strict=True)}
-        found = spelled.over(names, units)
+        signs = signs_in_files(camera.names).tolist()
+        units = {
+            name.lower(): sign * scale ** camera.powers[name]
+            for name, sign in zip(camera.names, signs, strict=True)
+        }
+        whole = self._matrix(CAMERA, camera.name, units, f"parameter of the camera {camera.name}")
+        words = self.names(CAMERA, camera.name)
+        there = [row for row, name in enumerate(camera.names) if name.lower() in words]
+        names = [camera.names[row] for row in there]
         # Parameters without standard deviation are fixed, except those in the matrix.
         sd = {
             name: own
             for name, own in zip(camera.names, camera.deviations.tolist(), strict=True)
             if own or name not in names
         }
-        return made(table, matrix.rows[0], lambda: camera.replace(sd=sd, covariance=(names, found)))
-
-    def names(self, kind: str, name: str) -> set[str]:
-        """Return the component names in the matrix of an object."""
-        own = self.matrices.get((kind, name), _Matrix())
-        return {word for pair in own.values for word in pair}
+        given = names, whole[np.ix_(there, there)]
+        first = self.parts[CAMERA, camera.name][0][0]
+        return made(self.table, first, lambda: camera.replace(sd=sd, covariance=given))
 
     def over(
         self, kind: str, name: str, components: Sequence[str], *, singular: bool = False
@@ -100,57 +88,49 @@ class Covariances:
 
         If `singular` is True, the matrix may be singular.
         """
-        own = self.matrices.get((kind, name))
+        own = self.parts.get((kind, name))
         if own is None:
             return None
-        words = self.names(kind, name)
-        if strange := sorted(words - set(components)):
-            message = unknown_name(f"component of {kind} {name}", strange[0], components)
-            raise self.table.error(own.rows[0], message)
-        if missing := [word for word in components if (word, word) not in own.values]:
+        found = self._matrix(kind, name, dict.fromkeys(components, 1.0), f"component of {kind} {name}")
+        variances = {first for _, first, second, _ in own if first == second}
+        if missing := [word for word in components if word not in variances]:
             message = phrase("plain.no-covariance", kind=kind, name=name, component=missing[0])
-            raise self.table.error(own.rows[0], message)
-        found = own.over(components, dict.fromkeys(components, 1.0))
+            raise self.table.error(own[0][0], message)
         if not is_covariance(found, singular=singular):
-            raise self.table.error(own.rows[0], phrase("error.covariance-singular"))
+            raise self.table.error(own[0][0], phrase("error.covariance-singular"))
         return found
 
     def priors(self, unknowns: Iterable[Unknown]) -> list[Observation]:
         """Return the joint priors of unknowns as observations."""
         known = {(each.KIND, each.name): each for each in unknowns}
         found: list[Observation] = []
-        for (kind, name), matrix in self.matrices.items():
+        for (kind, name), own in self.parts.items():
             if kind in (CAMERA, *OF_FILMS):
                 continue
-            table = self.table
             if (kind, name) not in known:
-                raise table.error(matrix.rows[0], unknown_name(kind, name, [title for _, title in known]))
-            unknown = known[kind, name]
-            for row, pair in zip(matrix.rows, matrix.values, strict=True):
-                for word in pair:
-                    if word not in unknown.components:
-                        raise table.error(row, unknown_name(f"component of {kind}", word, unknown.components))
-            units = _units(unknown, self.tables.radians, np.diag(self.tables.flip).tolist())
-            covariance = matrix.over(unknown.components, units)
-            found.append(made(table, matrix.rows[0], Prior, unknown, covariance=covariance))
+                raise self.table.error(own[0][0], unknown_name(kind, name, [title for _, title in known]))
+            units = _units(known[kind, name], self.tables.radians, np.diag(self.tables.flip).tolist())
+            covariance = self._matrix(kind, name, units, f"component of {kind}")
+            found.append(made(self.table, own[0][0], Prior, known[kind, name], covariance=covariance))
         return found
 
 
 def read_covariances(tables: Tables) -> Covariances:
     """Read the table of covariances; empty if it does not exist."""
-    table, matrices = tables.rows("covariances"), dict[tuple[str, str], _Matrix]()
-    values = table.given(("covariance",))[:, 0]
-    kinds = [text.lower().replace("_", " ") for text in table.texts("kind")]
-    columns = (table.texts("name"), table.texts("first"), table.texts("second"))
-    for row, (kind, name, *pair) in enumerate(zip(kinds, *columns, strict=True)):
+    table, parts = tables.rows("covariances"), dict[tuple[str, str], list[tuple[int, str, str, float]]]()
+    seen = set[tuple[str, ...]]()
+    for row, cells in enumerate(tables.records("covariances")):
+        kind, name = cells["kind"].lower().replace("_", " "), cells["name"]
         # Parameters of cameras have the names of their columns, components of others are words.
-        first, second = (word.lower() if kind == CAMERA else word.lower().replace("_", " ") for word in pair)
-        matrix = matrices.setdefault((kind, name), _Matrix())
-        if (first, second) in matrix.values or (second, first) in matrix.values:
+        first, second = (
+            cells[word].lower() if kind == CAMERA else cells[word].lower().replace("_", " ")
+            for word in ("first", "second")
+        )
+        if (kind, name, first, second) in seen:
             raise table.error(row, phrase("plain.covariance-twice", first=first, second=second))
-        matrix.rows.append(row)
-        matrix.values[first, second] = float(values[row])
-    return Covariances(tables, table, matrices)
+        seen |= {(kind, name, first, second), (kind, name, second, first)}
+        parts.setdefault((kind, name), []).append((row, first, second, cells["covariance"]))
+    return Covariances(tables, table, parts)
 
 
 def covariance_tables(
@@ -163,23 +143,29 @@ def covariance_tables(
 
     `more` contains type, name, components and covariance matrix.
     """
-    rows: list[tuple[str, str, str, str, float]] = []
+    joined: list[tuple[str, str, Sequence[str], Floats]] = []
     for each in cameras:
         if each.covariance is not None:
             names, matrix = each.covariance
             signs = signs_in_files(names)
-            rows += _pairs(CAMERA, each.name, names, np.asarray(matrix) * signs * signs[:, np.newaxis])
-    for prior in (each for each in block.observations if isinstance(each, Prior)):
+            joined.append((CAMERA, each.name, names, np.asarray(matrix) * signs * signs[:, np.newaxis]))
+    for prior in block.observations.of_type(Prior):
         unknown = prior.unknown
         if isinstance(unknown, Knot):
             continue  # In the table of knots
         units = np.array(list(_units(unknown, DEGREE).values()))
+        title = rigs.title(unknown) if isinstance(unknown, Sensor) else unknown.name
+        title = word_of(unknown) if isinstance(unknown, Shift | Drift | GyroBias) else title
         matrix = prior.precision * units * units[:, np.newaxis]
-        rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
-    for kind, name, components, matrix in more:
-        rows += _pairs(kind, name, components, matrix)
-    names = ("kind", "name", "first", "second", "covariance")
-    return {"covariances": columns_of_records(dict(zip(names, row, strict=True)) for row in rows)}
+        joined.append((unknown.KIND, title, unknown.components, matrix))
+    rows = (
+        {"kind": kind, "name": name, "first": components[i], "second": components[j]}
+        | {"covariance": float(matrix[i, j])}
+        for kind, name, components, matrix in (*joined, *more)
+        for i, j in zip(*np.tril_indices(len(components)), strict=True)
+        if i == j or matrix[i, j]
+    )
+    return {"covariances": columns_of_records(rows)}
 
 
 def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) -> dict[str, float]:
@@ -190,20 +176,3 @@ def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) 
     pairs = zip(unknown.components, unknown.units(""), strict=True)
     axes = dict(zip("xyz", signs, strict=True)) if unknown.KIND in _WITH_PHOTOS else {}
     return {name: (angle if unit == "rad" else 1.0) * axes.get(name[-1], 1.0) for name, unit in pairs}
-
-
-def _name(unknown: Unknown, rigs: Rigs) -> str:
-    if isinstance(unknown, Sensor):
-        return rigs.title(unknown)
-    return word_of(unknown) if isinstance(unknown, Shift | Drift | GyroBias) else unknown.name
-
-
-def _pairs(
-    kind: str, name: str, components: Sequence[str], matrix: Floats
-) -> list[tuple[str, str, str, str, float]]:
-    return [
-        (kind, name, components[i], components[j], float(matrix[i, j]))
-        for i in range(len(components))
-        for j in range(i + 1)
-        if i == j or matrix[i, j]
-    ]
