@@ -157,91 +157,74 @@ def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: 
     return found
 
 
-@dataclass(frozen=True)
-class Fiducials:
-    """Marks of cameras by camera name and mark name."""
+@dataclass
+class Marks:
+    """The marks of a camera by name, and their standard deviations (mm) or joint covariance matrix."""
 
-    tables: Tables
-    # (2,) mm; standard deviations of individually known marks
-    places: dict[str, dict[str, Floats]] = field(default_factory=dict)
-    sd: dict[str, dict[str, Floats]] = field(default_factory=dict)
-    # (2n, 2n) of all marks of a camera, from certificates
-    covariances: dict[str, Floats] = field(default_factory=dict)
+    camera: str
+    marks: dict[str, Mark] = field(default_factory=dict)
+    sd: dict[str, Floats] = field(default_factory=dict)
+    covariance: Floats | None = None  # (2n, 2n) of all marks
 
-    def known(
-        self,
-        marks: Mapping[str, Mapping[str, Mark]],
-        read: Collection[tuple[str, str]],
-        covariances: Covariances,
-    ) -> list[Observation]:
-        """Return prior observations of marks, joint or per mark."""
-        found: list[Observation] = []
-        for camera, own in marks.items():
-            words = [f"{name}.{axis}".lower().replace("_", " ") for name in own for axis in "xy"]
-            covariance = self.covariances.get(camera)
-            if (given := covariances.over("fiducials", camera, words, singular=True)) is not None:
-                xy = np.array([mark.position[:2] for mark in own.values()])
-                file = self.tables.settings.tables["covariances"]
-                covariance = definite(self.tables, camera, xy, given, file)
-            if covariance is not None:
-                found.append(KnownTogether("certificate", list(own.values()), covariance=covariance))
-                continue
-            found += [
-                KnownTogether("certificate", [mark], sd=self.sd[camera][name])
-                for name, mark in own.items()
-                if (camera, name) in read
-            ]
-        return found
+    def add(self, name: str, xy: Floats) -> None:
+        """Add a mark at a position (2,), mm."""
+        self.marks[name] = Mark(f"{self.camera} {name}", xy, np.inf)
 
-    def take(self, certificates: Mapping[str, Certificate]) -> None:
-        """Add the marks of certificates."""
-        for camera, own in certificates.items():
-            if camera in self.places:
-                file = self.tables.settings.tables["fiducials"]
-                raise InputError(phrase("plain.marks-twice", camera=camera), file=file)
-            marks = own.fiducials()
-            self.places[camera] = dict(zip(marks.names, marks.xy, strict=True))
-            if (marks.covariance - np.diag(np.diag(marks.covariance))).any():
-                found = definite(self.tables, camera, marks.xy, marks.covariance, own.file)
-                self.covariances[camera] = found
-            else:
-                sd = np.sqrt(np.diag(marks.covariance)).reshape(-1, 2)
-                self.sd[camera] = dict(zip(marks.names, sd, strict=True))
+    @property
+    def words(self) -> list[str]:
+        """Coordinates of the marks in the table of covariances."""
+        return [f"{name}.{axis}" for name in self.marks for axis in "xy"]
+
+    def known(self, tables: Tables, read: Collection[str], covariances: Covariances) -> list[Observation]:
+        """Return prior observations: of all marks together, or of each mark in `read`."""
+        words, covariance = [word.lower().replace("_", " ") for word in self.words], self.covariance
+        if (given := covariances.over("fiducials", self.camera, words, singular=True)) is not None:
+            xy = np.array([mark.position[:2] for mark in self.marks.values()])
+            covariance = definite(tables, self.camera, xy, given, tables.settings.tables["covariances"])
+        if covariance is not None:
+            return [KnownTogether("certificate", list(self.marks.values()), covariance=covariance)]
+        return [
+            KnownTogether("certificate", [mark], sd=self.sd[name])
+            for name, mark in self.marks.items()
+            if name in read
+        ]
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of the table of marks."""
+        for name, mark in self.marks.items():
+            sd = self.sd.get(name, np.full(2, np.nan))
+            place = columns_of(("x", "y"), mark.position[:2])
+            yield {"camera": self.camera, "fiducial": name, **place, **columns_of(("sd_x", "sd_y"), sd)}
 
 
 def read_fiducials(
     tables: Tables, cameras: Collection[str], certificates: Mapping[str, Certificate]
-) -> Fiducials:
+) -> dict[str, Marks]:
     """Read the marks of cameras from the table and from certificates."""
-    found, table = Fiducials(tables), tables.rows("fiducials")
+    found, table = dict[str, Marks](), tables.rows("fiducials")
     xy = table.given(("x", "y"))
     sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)
     use, texts = table.flags("use"), [table.texts(name) for name in ("camera", "fiducial")]
     for row, (camera, name) in enumerate(zip(*texts, strict=True)):
         if not use[row] or camera not in cameras:
             continue
-        if name in found.places.setdefault(camera, {}):
+        own = found.setdefault(camera, Marks(camera))
+        if name in own.marks:
             raise table.error(row, phrase("error.repeated", kind=f"fiducial of {camera}", name=name))
-        found.places[camera][name] = xy[row]
-        found.sd.setdefault(camera, {})[name] = sd[row]
-    found.take(certificates)
+        own.add(name, xy[row])
+        own.sd[name] = sd[row]
+    for camera, certificate in certificates.items():
+        if camera in found:
+            file = tables.settings.tables["fiducials"]
+            raise InputError(phrase("plain.marks-twice", camera=camera), file=file)
+        marks, found[camera] = certificate.fiducials(), (own := Marks(camera))
+        for name, place in zip(marks.names, marks.xy, strict=True):
+            own.add(name, place)
+        if (marks.covariance - np.diag(np.diag(marks.covariance))).any():
+            own.covariance = definite(tables, camera, marks.xy, marks.covariance, certificate.file)
+        else:
+            own.sd |= zip(marks.names, np.sqrt(np.diag(marks.covariance)).reshape(-1, 2), strict=True)
     return found
-
-
-@dataclass
-class Marks:
-    """The marks of a camera by name, and their joint prior or standard deviations."""
-
-    marks: dict[str, Mark] = field(default_factory=dict)
-    sd: dict[str, Floats] = field(default_factory=dict)
-    covariance: Floats | None = None
-
-    def cells(self, camera: str) -> Iterator[dict[str, Any]]:
-        """Yield the rows of the table of marks."""
-        for name, mark in self.marks.items():
-            sd = self.sd.get(name, np.full(2, np.nan))
-            place = columns_of(("x", "y"), mark.position[:2])
-            yield {"camera": camera, "fiducial": name, **place, **columns_of(("sd_x", "sd_y"), sd)}
 
 
 def marks_of(
@@ -264,7 +247,7 @@ def marks_of(
         if len(of) != 1 or len(marks) < len(known.joined):
             raise InputError(phrase("plain.known-marks", name=known.name))
         (camera,) = of
-        own, full = found.setdefault(camera, Marks()), len(marks) > 1 or known.precision[0, 1] != 0
+        own, full = found.setdefault(camera, Marks(camera)), len(marks) > 1 or known.precision[0, 1] != 0
         if own.covariance is not None or (full and own.marks):
             raise InputError(phrase("plain.one-certificate", name=known.name))
         names = [mark.name.removeprefix(f"{camera} ") for mark in marks]
@@ -277,7 +260,7 @@ def marks_of(
             read.pop(id(mark), None)
     # The only prior of other marks is their own standard deviation.
     for key, mark in read.items():
-        own = found.setdefault(cameras[key], Marks())
+        own = found.setdefault(cameras[key], Marks(cameras[key]))
         sd = mark.deviations
         if own.covariance is not None or not (np.isfinite(sd).all() and (sd > 0).all()):
             raise InputError(phrase("plain.no-certificate", mark=mark.name, camera=cameras[key]))

@@ -48,7 +48,6 @@ from photogram.network.films import (
     FilmBend,
     FilmPlacement,
     FilmSize,
-    Mark,
     Readings,
     Reseau,
     Scan,
@@ -106,7 +105,10 @@ class _Reader:
         self.comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
         self.fiducials = read_fiducials(tables, set(photos.taken), certificates)
-        self.places = self.fiducials.places
+        self.places = {
+            camera: {name: mark.position[:2] for name, mark in own.marks.items()}
+            for camera, own in self.fiducials.items()
+        }
         names = self.table.texts("scanner")
         self.photos = [
             ScannedPhoto(name, row, camera, film, self._machine(row, names[row], machines))
@@ -127,10 +129,6 @@ class _Reader:
 
     def read(self, found: Scanned) -> None:
         """Add the scans and observations of all photos to the result."""
-        marks = {
-            camera: {name: Mark(f"{camera} {name}", place, np.inf) for name, place in own.items()}
-            for camera, own in self.places.items()
-        }
         starts = self._starts()
         self._tell_beyond([mirrored for mirrored, _ in starts])
         for photo, (mirrored, start) in zip(self.photos, starts, strict=True):
@@ -138,18 +136,20 @@ class _Reader:
             found.scans.append(Scan(photo.name, film))
             found.observations.extend(self._known(photo, film))
             if isinstance(film.pattern, Reseau):
-                own = film.pattern
-                found.observations.append(KnownTogether("reseau", own.weights, covariance=own.covariance))
+                found.observations.append(
+                    KnownTogether("reseau", film.pattern.weights, covariance=film.pattern.covariance)
+                )
             found.observations.extend(
-                Fiducial(photo.name, marks[photo.camera][name], film, reading, sd=sd)
+                Fiducial(photo.name, self.fiducials[photo.camera].marks[name], film, reading, sd=sd)
                 for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
             )
             model = self.kinds[photo.film].model
             if len(photo.marks) < LEAST[model] and self.tables.settings.interior != "before":
                 fields = {"photo": photo.name, "n": len(photo.marks), "least": LEAST[model], "model": model}
                 self.tables.remark("plain.few-fiducials", **fields)
-        read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
-        found.observations.extend(self.fiducials.known(marks, read, self.covariances))
+        for camera, own in self.fiducials.items():
+            read = {name for photo in self.photos if photo.camera == camera for name in photo.marks}
+            found.observations.extend(own.known(self.tables, read, self.covariances))
         machines = {id(each.machine): each.machine for each in self.photos}
         found.observations.extend(each.known for each in machines.values() if each.known is not None)
 
@@ -349,7 +349,7 @@ class WrittenFilms:
     def tables(self) -> dict[str, dict[str, Any]]:
         """Return the tables of films by name."""
         rows = {
-            "fiducials": (row for camera, own in self.certificates.items() for row in own.cells(camera)),
+            "fiducials": (row for own in self.certificates.values() for row in own.rows()),
             "fiducial_images": map(self._reading, self.readings),
             "films": self._film_rows().values(),
             "scanners": map(scanner_cells, self.machines.values()),
@@ -382,8 +382,7 @@ class WrittenFilms:
                 found.append(("scanner", name, known_words(own), own.known.precision))
         for camera, marks in self.certificates.items():
             if marks.covariance is not None:
-                words = tuple(f"{name}.{axis}" for name in marks.marks for axis in "xy")
-                found.append(("fiducials", camera, words, marks.covariance))
+                found.append(("fiducials", camera, marks.words, marks.covariance))
         return found
 
     def _film_rows(self) -> dict[str, dict[str, Any]]:
