@@ -24,7 +24,7 @@ from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.run import partition, read_node
 from photogram.distributed.shelf import shelf
 from photogram.formats import ReadOptions
-from photogram.formats.in_parts import planned_on_disk
+from photogram.formats.in_parts import on_disk
 
 
 @pytest.fixture(scope="module")
@@ -149,10 +149,15 @@ def test_more_parts_than_photos_are_refused(block, tmp_path):
 
 def test_a_run_from_disk_has_the_same_limits(block, tmp_path):
     path = project_of(block, tmp_path / "project")
+
+    def plan(parts):
+        with on_disk(path, ReadOptions(), tmp_path / "run", Division(parts=parts)) as run:
+            run.plan()
+
     with pytest.raises(InputError, check=lambda error: error.code == "parts.too-many"):
-        planned_on_disk(path, ReadOptions(), tmp_path / "run", Division(parts=100_000))
+        plan(100_000)
     with alone(tmp_path / "run"), pytest.raises(InputError, check=lambda error: error.code == "parts.busy"):
-        planned_on_disk(path, ReadOptions(), tmp_path / "run", Division(parts=2))
+        plan(2)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/net/tcp"), reason="no /proc/net")

@@ -56,18 +56,20 @@ def adjusted_on_disk(
 
     reading, folder = ReadOptions(), Path(division.folder or target / "run")
     change = partial(replace, **choices)
+    threads = None if is_plan else threads
+    opened = in_parts.on_disk(path, reading, folder, division, change=change, threads=threads)
     if is_plan:
-        print_plan(in_parts.planned_on_disk(path, reading, folder, division, change=change))
+        with opened as run:
+            print_plan(run.plan())
         return True
-    with adjustment_status(job) as progress:
-        found = in_parts.adjusted_on_disk(
-            path, reading, folder, division, change=change, threads=threads, progress=progress
-        )
+    with adjustment_status(job) as progress, opened as run:
+        outcome = run.adjust(progress)
+        document = in_parts.document(run, outcome)
     place = Text(str(phrase("command.node-results", folder=folder / "results")))
-    document = found.document().with_sections(Section("files", "Files", [place]))
+    document = document.with_sections(Section("files", "Files", [place]))
     job.finish(
         {target / "report.txt": text(document).encode()},
         summary=lambda: print_text(document),
-        code=0 if found.outcome.status == "converged" else NOT_CONVERGED,
+        code=0 if outcome.status == "converged" else NOT_CONVERGED,
     )
     return True

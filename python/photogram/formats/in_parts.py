@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.adjustment.adjustment import Progress, core_options
+from photogram.adjustment.adjustment import core_options
 from photogram.adjustment.first_features import started
 from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.arrays import repeated_pairs
@@ -38,8 +38,7 @@ from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone, read_arrays, write_arrays
 from photogram.distributed.parts import AtHome, Names, Part, assembled_part
-from photogram.distributed.plan import PartsPlan
-from photogram.distributed.run import Manifest, divided, places_of, result_folder, with_flights
+from photogram.distributed.run import Manifest, divided, places_of, with_flights
 from photogram.errors import InputError
 from photogram.formats.builder import ASSUMED_SD
 from photogram.formats.plain import SETTINGS
@@ -53,14 +52,12 @@ from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import BATCH
 from photogram.io.places import Place
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.films import Scan
 from photogram.network.observations import Fiducial, KnownFilm, KnownTogether, Prior
 from photogram.network.observations.photos import with_epochs
 from photogram.results.network_tables import iteration_table
-from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Table
 from photogram.words import phrase
@@ -315,53 +312,32 @@ def _selected(parts: Iterable[ColumnTable], wanted: Callable[[ColumnTable], Bool
     return reduce(ColumnTable.joined, found) if found else None
 
 
-@dataclass(frozen=True)
-class OnDisk(Documented):
-    """The result of the adjustment of a project on disk."""
-
-    outcome: Outcome  # History, sums and variance
-    manifest: Manifest  # The tree, and the size of each node
-    # One result folder per node, for :func:`photogram.read_result`; photos of higher nodes are repeated in
-    # several, with equal values and covariances
-    folders: list[Path]
-
-    def document(self) -> Document:
-        """Return the document: sizes, sums of squares, iterations."""
-        outcome, variance = self.outcome, self.outcome.variance_of_unit_weight
-        observations, weighted, unknowns = outcome.counts
-        manifest = self.manifest
-        photos, points, images = map(sum, (manifest.photos, manifest.points, manifest.images))
-        groups = dict(
-            zip(("camera", "ground", "plates", "observations"), outcome.sums_of_squares, strict=True)
-        )
-        groups["total"] = sum(outcome.sums_of_squares)
-        iterations = Table("iterations", "Iterations", iteration_table(outcome.iterations))
-        return Document(
-            "Adjustment in parts",
-            "",
-            highlights=[
-                Fact("Status", outcome.status, note=f"{len(outcome.iterations)} iterations"),
-                *(
-                    []
-                    if variance is None
-                    else [Fact.of("sigma0", variance**0.5, figures=6, note="a priori 1")]
-                ),
-                Fact.of("Photos", photos, note=f"in {len(self.folders)} nodes"),
-                Fact.of("Points", points),
-                Fact.of("Image points", images),
-                Fact.of("Observations", observations, note=f"and {weighted} weighted unknowns"),
-                Fact.of("Unknowns", unknowns),
-                Fact.of("Degrees of freedom", outcome.degrees_of_freedom, decimals=0),
-                *(
-                    Fact.of(f"Weighted sum of squares, {name}", value, figures=6)
-                    for name, value in groups.items()
-                ),
-            ],
-            sections=[Section.of(iterations)],
-        )
+def document(run: Run, outcome: Outcome) -> Document:
+    """Return the document of an adjustment: sizes, sums of squares, iterations."""
+    observations, weighted, unknowns = outcome.counts
+    photos, points, images = (
+        sum(each) for each in (run.manifest.photos, run.manifest.points, run.manifest.images)
+    )
+    groups = dict(zip(("camera", "ground", "plates", "observations"), outcome.sums_of_squares, strict=True))
+    groups["total"] = sum(outcome.sums_of_squares)
+    facts = [
+        Fact("Status", outcome.status, note=f"{len(outcome.iterations)} iterations"),
+        Fact.of("Photos", photos, note=f"in {len(run.manifest.tree)} nodes"),
+        Fact.of("Points", points),
+        Fact.of("Image points", images),
+        Fact.of("Observations", observations, note=f"and {weighted} weighted unknowns"),
+        Fact.of("Unknowns", unknowns),
+        Fact.of("Degrees of freedom", outcome.degrees_of_freedom, decimals=0),
+    ]
+    facts += [Fact.of(f"Weighted sum of squares, {name}", value, figures=6) for name, value in groups.items()]
+    if (variance := outcome.variance_of_unit_weight) is not None:
+        facts.insert(1, Fact.of("sigma0", variance**0.5, figures=6, note="a priori 1"))
+    iterations = Table("iterations", "Iterations", iteration_table(outcome.iterations))
+    return Document("Adjustment in parts", "", highlights=facts, sections=[Section.of(iterations)])
 
 
-def adjusted_on_disk(
+@contextmanager
+def on_disk(
     path: Path,
     reading: ReadOptions,
     folder: Path,
@@ -369,40 +345,11 @@ def adjusted_on_disk(
     *,
     change: Callable[[AdjustOptions], AdjustOptions] = lambda options: options,
     threads: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
-) -> OnDisk:
-    """Adjust a project in parts in a folder; its images are read in batches.
+) -> Iterator[Run]:
+    """Open the adjustment of a project in parts in a folder; its images are read in batches.
 
     `change` returns the options for the options of the project.
     """
-    with _run(path, reading, folder, division, change, threads) as run:
-        outcome = run.adjust(progress)
-        found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
-        return OnDisk(outcome, run.manifest, found)
-
-
-def planned_on_disk(
-    path: Path,
-    reading: ReadOptions,
-    folder: Path,
-    division: Division,
-    *,
-    change: Callable[[AdjustOptions], AdjustOptions] = lambda options: options,
-) -> PartsPlan:
-    """Plan an adjustment and write its parts to the folder."""
-    with _run(path, reading, folder, division, change, None) as run:
-        return run.plan()
-
-
-@contextmanager
-def _run(
-    path: Path,
-    reading: ReadOptions,
-    folder: Path,
-    division: Division,
-    change: Callable[[AdjustOptions], AdjustOptions],
-    threads: int | None,
-) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(alone(folder))
         streamed = Streamed(path, reading, folder)
