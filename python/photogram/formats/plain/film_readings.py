@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import conformal, is_mirrored, mirror_message, side_residuals, true_places
 from photogram.film.marks import DECIDED, which_mark
-from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.photos import Images, Photos
+from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
-from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
@@ -65,71 +62,89 @@ class Expected:
         return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
-@dataclass(frozen=True)
-class Seen:
-    """Image observations, and points with at least approximate coordinates."""
+@dataclass
+class ScannedPhoto:
+    """A photo on film: its row in the table of photos, its images, and readings of its marks."""
 
-    images: Images
-    points: Floats  # (n, 3) coordinates; NaN where unknown
-    photos: Photos
-    cameras: Cameras
+    name: str
+    row: int
+    camera: str
+    film: str
+    machine: Machine
+    fiducials: Mapping[str, Floats]  # (2,) positions of the marks of its camera, by name
+    given_side: bool | None  # Whether the table marks the photo as mirrored; None: unknown
+    images: Floats  # (m, 2) readings of its images
+    image_sd: Floats  # (m,) the larger standard deviation of each reading
+    points: Indices  # (m,) points of its images
+    coordinates: Floats  # (m, 3) of these points, at least approximate; NaN where unknown
+    pose: tuple[Floats, Floats, float]  # Centre, axes (columns) and principal distance; NaN if unknown
+    marks: list[str] = field(default_factory=list)
+    readings: list[Floats] = field(default_factory=list)
+    sd: list[Floats] = field(default_factory=list)
 
-    def readings(self, photo: str) -> Floats:
-        """Return (m, 2) readings of a photo."""
-        found: Floats = self.images.xy[self._rows(photo)]
-        return found
+    @property
+    def true(self) -> Floats:
+        """(n, 2) true scanner positions of its marks."""
+        return self._true_places(np.array(self.readings))
 
-    def deviations(self, photo: str) -> Floats:
-        """Return (m,) the larger standard deviation of each reading; 1 if unknown."""
-        rows, sd = self._rows(photo), self.images.sd
-        found: Floats = np.ones(len(rows)) if sd is None else sd[rows].max(axis=1)
-        return found
+    @property
+    def true_images(self) -> Floats:
+        """(m, 2) true scanner positions of its images."""
+        return self._true_places(self.images)
 
-    def expected(self, photo: str, placed: Callable[[str], Floats | None]) -> Iterator[Expected]:
+    def _true_places(self, readings: Floats) -> Floats:
+        own = self.machine
+        return true_places(readings.reshape(-1, 2), own.readings, own.scanner, own.curves)
+
+    @property
+    def places(self) -> Floats:
+        """(n, 2) positions of its marks in the camera frame."""
+        return np.array([self.fiducials[name] for name in self.marks]).reshape(-1, 2)
+
+    @property
+    def in_camera(self) -> Floats | None:
+        """(m,) complex image positions in the camera frame, if marks or side define the placement."""
+        if len(self.marks) < 2 or not all(self.marks):
+            return None
+        side = is_mirrored(self.places, self.true) if self.given_side is None else self.given_side
+        return None if side is None else Lying(self.places, side).back(self.true, self.true_images)
+
+    def way_by_images(self, ways: Sequence[Lying], photos: Sequence[ScannedPhoto]) -> int | None:
+        """Return the placement that fits images of known points or tie points; None if not unique."""
+        images, true = self.true_images, self.true
+        for expected in self._expected(photos):
+            if len(expected.rows) < 2:
+                continue
+            apart = [expected.apart(way.back(true, images[expected.rows])) for way in ways]
+            order = np.argsort(apart)
+            best = apart[order[0]]
+            near = best <= NEAR * float(np.ptp(ways[0].places, axis=0).max())
+            if near and (len(ways) == 1 or apart[order[1]] > BETTER * best):
+                return int(order[0])
+        return None
+
+    def _expected(self, photos: Sequence[ScannedPhoto]) -> Iterator[Expected]:
         """Yield expected image positions: from pose, and from tie points of a photo whose film is placed."""
-        own = self.images.points[self._rows(photo)]
-        centre, axes, c = self._pose(photo)
-        places = _projected((self.points[own] - centre) @ axes, c)
+        centre, axes, c = self.pose
+        places = _projected((self.coordinates - centre) @ axes, c)
         known = np.flatnonzero(np.isfinite(places))
         yield Expected(known, places[known])
-        found = ((other, q) for other in self._neighbours(photo, own) if (q := placed(other)) is not None)
-        other, film = next(found, (None, None))
-        if other is None or film is None:
+        ties = [(len(np.intersect1d(self.points, each.points)), each) for each in photos if each is not self]
+        for count, other in sorted(ties, key=lambda tie: -tie[0]):
+            if count < TIES or (film := other.in_camera) is None:
+                continue
+            common = np.intersect1d(self.points, other.points)
+            rows, there = (
+                np.array([np.flatnonzero(own == point)[0] for point in common])
+                for own in (self.points, other.points)
+            )
+            q = film[there]
+            _, turned, distance = other.pose
+            rays = np.column_stack([q.real, q.imag, np.full(len(q), distance)])
+            places = _projected(rays @ turned.T @ axes, c)
+            known_turn = np.isfinite(places).all()
+            yield Expected(rows, places, "shift") if known_turn else Expected(rows, q, "rotation")
             return
-        theirs = self.images.points[self._rows(other)]
-        rows, there = (
-            np.array([np.flatnonzero(each == point)[0] for point in np.intersect1d(own, theirs)])
-            for each in (own, theirs)
-        )
-        q = film[there]
-        _, turned, distance = self._pose(other)
-        rays = np.column_stack([q.real, q.imag, np.full(len(q), distance)])
-        places = _projected(rays @ turned.T @ axes, c)
-        if np.isfinite(places).all():
-            yield Expected(rows, places, "shift")
-        else:
-            yield Expected(rows, q, "rotation")
-
-    def _neighbours(self, photo: str, points: np.ndarray) -> list[str]:
-        """Return other photos with enough of some points, in descending order of number."""
-        images = np.unique(
-            np.column_stack([self.images.photos, self.images.points])[np.isin(self.images.points, points)],
-            axis=0,
-        )
-        counts = np.bincount(images[:, 0], minlength=len(self.photos.names))
-        order = np.argsort(-counts, kind="stable")
-        names = [self.photos.names[row] for row in order.tolist() if counts[row] >= TIES]
-        return [name for name in names if name != photo]
-
-    def _rows(self, photo: str) -> np.ndarray:
-        return np.flatnonzero(self.images.photos == self.photos.names.index(photo))
-
-    def _pose(self, photo: str) -> tuple[Floats, Floats, float]:
-        """Return centre, axes (columns) and principal distance; NaN if unknown."""
-        row = self.photos.names.index(photo)
-        c = -abs(self.cameras.cameras[self.photos.cameras[row]].parameters.get("c", np.nan))
-        centres, matrices = np.asarray(self.photos.centres), np.asarray(self.photos.matrices)
-        return centres[row], matrices[row], c
 
 
 def _projected(rays: Floats, c: float) -> Floats:
@@ -138,169 +153,78 @@ def _projected(rays: Floats, c: float) -> Floats:
         return np.asarray(c * (rays[:, 0] + 1j * rays[:, 1]) / rays[:, 2])
 
 
-def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, expected: Expected) -> int | None:
-    """Return the placement that fits expected positions; None if not unique.
+def read_marks(tables: Tables, photos: Photos, scanned: Sequence[ScannedPhoto]) -> None:
+    """Add the readings of marks to scanned photos, with names by position if the table has none."""
+    table = tables.rows("fiducial_images")
+    names = ("column", "row") if "column" in table else ("x", "y")
+    xy = table.given(names)
+    own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
+    sd = tables.deviations(table, "fiducial_images", own)
+    table.check_given(sd, own, "fiducial_images")
+    known = [*photos.names, *photos.unused]
+    of = indices_of(table, "photo", {name: row for row, name in enumerate(known)}, "photo").tolist()
+    by_name = {each.name: each for each in scanned}
+    use, marks = table.flags("use"), table.texts("fiducial")
+    for row, place in enumerate(of):
+        name, mark = known[place], marks[row]
+        if not use[row] or name in photos.unused:
+            continue
+        if name not in by_name:
+            raise table.error(row, phrase("plain.photo-without-film", photo=name))
+        photo = by_name[name]
+        if mark and mark not in photo.fiducials:
+            raise table.unknown_error(row, "fiducial", f"fiducial of {photo.camera}", mark, photo.fiducials)
+        if mark and mark in photo.marks:
+            raise table.error(row, phrase("error.repeated", kind=f"fiducial of {name}", name=mark))
+        photo.marks.append(mark)
+        photo.readings.append(xy[row])
+        photo.sd.append(sd[row])
+    waiting = [photo for photo in scanned if not all(photo.marks)]
+    for photo in waiting:
+        if any(photo.marks):
+            raise table.head.error(phrase("plain.some-fiducials", photo=photo.name))
+    while waiting:
+        # Films that depend on the tie points of others are placed last.
+        errors = [(photo, _name_marks(tables, photo, scanned)) for photo in waiting]
+        left = [photo for photo, error in errors if error is not None]
+        if len(left) == len(waiting) and errors[0][1] is not None:
+            raise errors[0][1]
+        waiting = left
 
-    `true` are (n, 2) true positions of the marks on the scanner, `images` (m, 2) of all images of the photo.
-    """
-    if len(expected.rows) < 2:
-        return None
-    apart = [expected.apart(way.back(true, images[expected.rows])) for way in ways]
-    order = np.argsort(apart)
-    best = apart[order[0]]
-    if best > NEAR * float(np.ptp(ways[0].places, axis=0).max()):
-        return None
-    return int(order[0]) if len(ways) == 1 or apart[order[1]] > BETTER * best else None
+
+def _name_marks(tables: Tables, photo: ScannedPhoto, photos: Sequence[ScannedPhoto]) -> InputError | None:
+    """Identify the marks of a photo; return an error if ambiguous."""
+    head, names = tables.rows("fiducial_images").head, list(photo.fiducials)
+    places = np.array(list(photo.fiducials.values())).reshape(-1, 2)
+    with at_place(head, f"photo {photo.name}"):
+        found = which_mark(places, photo.true)
+    ways = [each for each in found.alike if photo.given_side in (None, each.mirrored)]
+    if len(ways) != 1:
+        lying = [Lying(places[way.marks], way.mirrored) for way in ways]
+        chosen = photo.way_by_images(lying, photos)
+        if chosen is None:
+            return head.error(phrase("plain.film-pose", photo=photo.name, reason=str(found)))
+        ways = [ways[chosen]]
+    photo.marks[:] = [names[k] for k in ways[0].marks.tolist()]
+    tables.remark("plain.film-lies", head.file, photo=photo.name, way=str(ways[0]))
+    return None
 
 
-@dataclass
-class ScannedPhoto:
-    """A photo on film: its row in the table of photos, and readings of its marks."""
-
-    name: str
-    row: int
-    camera: str
-    film: str
-    machine: Machine
-    marks: list[str] = field(default_factory=list)
-    readings: list[Floats] = field(default_factory=list)
-    sd: list[Floats] = field(default_factory=list)
-
-    @property
-    def true(self) -> Floats:
-        """(n, 2) true scanner positions of its marks."""
-        return self.true_places(np.array(self.readings))
-
-    def true_places(self, readings: Floats) -> Floats:
-        """Return (m, 2) true scanner positions of readings."""
-        own = self.machine
-        return true_places(readings.reshape(-1, 2), own.readings, own.scanner, own.curves)
-
-
-@dataclass(frozen=True)
-class MarkReadings:
-    """The readings of the marks of scanned photos."""
-
-    tables: Tables
-    seen: Seen  # The image observations of all photos
-    photos: Sequence[ScannedPhoto]  # Scanned photos, which receive their readings
-    # (2,) of marks in camera frames, by camera name and mark name
-    places: Mapping[str, Mapping[str, Floats]]
-
-    def read(self, photos: Photos) -> None:
-        """Read the readings of marks."""
-        table = self.tables.rows("fiducial_images")
-        names = ("column", "row") if "column" in table else ("x", "y")
-        xy = table.given(names)
-        own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
-        sd = self.tables.deviations(table, "fiducial_images", own)
-        table.check_given(sd, own, "fiducial_images")
-        known = {name: row for row, name in enumerate([*photos.names, *photos.unused])}
-        listed_photos = list(known)
-        of = indices_of(table, "photo", known, "photo").tolist()
-        by_name = {each.name: each for each in self.photos}
-        use, marks = table.flags("use"), table.texts("fiducial")
-        for row, place in enumerate(of):
-            name = listed_photos[place]
-            if not use[row] or name in photos.unused:
-                continue
-            if name not in by_name:
-                raise table.error(row, phrase("plain.photo-without-film", photo=name))
-            photo = by_name[name]
-            if marks[row] and marks[row] not in self.places.get(photo.camera, {}):
-                fiducials = self.places.get(photo.camera, {})
-                raise table.unknown_error(
-                    row, "fiducial", f"fiducial of {photo.camera}", marks[row], fiducials
-                )
-            if marks[row] and marks[row] in photo.marks:
-                raise table.error(row, phrase("error.repeated", kind=f"fiducial of {name}", name=marks[row]))
-            photo.marks.append(marks[row])
-            photo.readings.append(xy[row])
-            photo.sd.append(sd[row])
-        self._name_marks(table)
-
-    def _name_marks(self, table: ColumnTable) -> None:
-        """Identify marks of unnamed readings, dependent photos last."""
-        waiting = [photo for photo in self.photos if not all(photo.marks)]
-        for photo in waiting:
-            if any(photo.marks):
-                raise table.head.error(phrase("plain.some-fiducials", photo=photo.name))
-        while waiting:
-            errors = [(photo, self._named(table, photo)) for photo in waiting]
-            left = [photo for photo, error in errors if error is not None]
-            if len(left) == len(waiting) and errors[0][1] is not None:
-                raise errors[0][1]
-            waiting = left
-
-    def _named(self, table: ColumnTable, photo: ScannedPhoto) -> InputError | None:
-        """Identify the marks of a photo; return an error if ambiguous."""
-        places = self.places.get(photo.camera, {})
-        with at_place(table.head, f"photo {photo.name}"):
-            found = which_mark(np.array(list(places.values())).reshape(-1, 2), photo.true)
-        given = self.given_side(photo)
-        ways = [each for each in found.alike if given in (None, each.mirrored)]
-        if len(ways) != 1:
-            lying = [Lying(np.array([*places.values()])[way.marks], way.mirrored) for way in ways]
-            chosen = self._by_images(photo, lying)
-            if chosen is None:
-                return table.head.error(phrase("plain.film-pose", photo=photo.name, reason=str(found)))
-            ways = [ways[chosen]]
-        photo.marks[:] = [list(places)[k] for k in ways[0].marks.tolist()]
-        self.tables.remark("plain.film-lies", table.path, photo=photo.name, way=str(ways[0]))
-        return None
-
-    def _by_images(self, photo: ScannedPhoto, ways: Sequence[Lying]) -> int | None:
-        """Return the placement index of a film from known points or tie points."""
-        images, true = photo.true_places(self.seen.readings(photo.name)), photo.true
-        found = (
-            way_by_images(ways, true, images, each)
-            for each in self.seen.expected(photo.name, self._places_of_images)
-        )
-        return next((each for each in found if each is not None), None)
-
-    def _places_of_images(self, name: str) -> Floats | None:
-        """Return (m,) complex image positions in the camera frame, if marks or side define the placement."""
-        photo = next((each for each in self.photos if each.name == name), None)
-        if photo is None or len(photo.marks) < 2 or not all(photo.marks):
-            return None
-        q, true = self.places_of(photo), photo.true
-        side = self.given_side(photo)
-        side = is_mirrored(q, true) if side is None else side
-        if side is None:
-            return None
-        return Lying(q, side).back(true, photo.true_places(self.seen.readings(photo.name)))
-
-    def places_of(self, photo: ScannedPhoto) -> Floats:
-        """Return (n, 2) positions of the marks of a photo in the camera frame."""
-        return np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
-
-    @cached_property
-    def _sides(self) -> list[str]:
-        return self.seen.photos.table.texts("mirrored")
-
-    def given_side(self, photo: ScannedPhoto) -> bool | None:
-        """Return whether the table marks a photo as mirrored; None: unknown."""
-        word = self._sides[photo.row].lower()
-        if word and word not in TRUE | FALSE:
-            raise self.seen.photos.table.cell_error(photo.row, "mirrored", "error.flag", value=word)
-        return None if not word else word in TRUE
-
-    def side(self, photo: ScannedPhoto) -> bool:
-        """Return whether a photo is mirrored: given, by marks, or by images."""
-        given = self.given_side(photo)
-        q = self.places_of(photo)
-        true = photo.true if len(q) else q
-        found = is_mirrored(q, true)
-        if given is not None and found is not None and found != given:
-            sides = mirror_message(given, side_residuals(q, true))
-            message = phrase("error.at", what=f"photo {photo.name}", message=sides)
-            raise ContradictionError.of(self.seen.photos.table.error(photo.row, message))
-        if found is None and given is None and len(q) > 1:
-            chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])
-            found = None if chosen is None else bool(chosen)
-        if given is None and found is None:
-            self.tables.remark("plain.side-unknown", photo=photo.name)
-        return bool(found if given is None else given)
+def side_of(tables: Tables, photo: ScannedPhoto, photos: Sequence[ScannedPhoto]) -> bool:
+    """Return whether a photo is mirrored: given, by marks, or by images."""
+    given, q = photo.given_side, photo.places
+    true = photo.true if len(q) else q
+    found = is_mirrored(q, true)
+    if given is not None and found is not None and found != given:
+        sides = mirror_message(given, side_residuals(q, true))
+        message = phrase("error.at", what=f"photo {photo.name}", message=sides)
+        raise ContradictionError.of(tables.rows("photos").error(photo.row, message))
+    if found is None and given is None and len(q) > 1:
+        chosen = photo.way_by_images([Lying(q, False), Lying(q, True)], photos)
+        found = None if chosen is None else bool(chosen)
+    if given is None and found is None:
+        tables.remark("plain.side-unknown", photo=photo.name)
+    return bool(found if given is None else given)
 
 
 SHRUNK = 0.01  # Largest change of film size, relative
@@ -310,11 +234,11 @@ SHORTEST = 4  # Smallest number of angles of a distortion table with a curve
 FEWEST = 4  # Smallest number of marks that detects names rotated by a quarter
 
 
-def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> Phrase | None:
-    """Return an error of the scanner pitch; `places` are (n, 2) camera marks."""
-    if len(places) < 2:
+def scale_message(photo: ScannedPhoto, *, mirrored: bool) -> Phrase | None:
+    """Return an error of the scanner pitch."""
+    if len(photo.marks) < 2:
         return None
-    *_, m = conformal(places, photo.true, mirrored=mirrored)
+    *_, m = conformal(photo.places, photo.true, mirrored=mirrored)
     if abs(m) <= SHRUNK or m <= -1.0:
         return None
     pitch = photo.machine.readings.pitch
@@ -343,9 +267,7 @@ def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats)
     return phrase("plain.beyond-distortion", farthest=float(farthest[0]), **fields)
 
 
-def mark_remarks(
-    photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Floats]], found: Sequence[bool | None]
-) -> list[Phrase]:
+def mark_remarks(photos: Sequence[ScannedPhoto], found: Sequence[bool | None]) -> list[Phrase]:
     """Return remarks on marks that are probably mistakes of the input."""
     said: list[Phrase] = []
     mirrored = [photo.name for photo, side in zip(photos, found, strict=True) if side]
@@ -354,7 +276,7 @@ def mark_remarks(
     elif mirrored:
         said.append(phrase("plain.mirrored-films", names=mirrored))
     said += _resampled(photos)
-    return said + list(_round(photos, places))
+    return said + list(_round(photos))
 
 
 def _resampled(photos: Sequence[ScannedPhoto]) -> list[Phrase]:
@@ -370,16 +292,16 @@ def _resampled(photos: Sequence[ScannedPhoto]) -> list[Phrase]:
     return [phrase("plain.resampled")]
 
 
-def _round(photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Floats]]) -> Iterator[Phrase]:
+def _round(photos: Sequence[ScannedPhoto]) -> Iterator[Phrase]:
     """Yield remarks on marks that fit better with names rotated by a quarter."""
     sums: dict[str, Floats] = {}
     counts: dict[str, int] = {}
     for photo in photos:
         if len(photo.marks) < FEWEST:
             continue
-        names = list(places[photo.camera])
+        names = list(photo.fiducials)
         try:
-            found = which_mark(np.array([*places[photo.camera].values()]), photo.true)
+            found = which_mark(np.array([*photo.fiducials.values()]), photo.true)
         except InputError:
             continue
         own = [names.index(mark) for mark in photo.marks]

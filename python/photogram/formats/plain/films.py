@@ -20,14 +20,14 @@ from photogram.formats.plain.certificates import marks_of, read_fiducials
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.film_readings import (
     Lying,
-    MarkReadings,
     ScannedPhoto,
-    Seen,
     beyond_message,
     mark_remarks,
+    read_marks,
     scale_message,
+    side_of,
 )
-from photogram.formats.plain.photos import Photos
+from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.scanners import (
     Machine,
     film_cells,
@@ -40,6 +40,7 @@ from photogram.formats.plain.scanners import (
 from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
 from photogram.formats.project import Project
+from photogram.io.column_table import FALSE, TRUE
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.cameras import Camera
@@ -74,9 +75,13 @@ class Scanned:
     inside: dict[str, tuple[list[Scan], list[Observation]]] = field(default_factory=dict)
 
 
-def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
-    """Read which photos are scanned films or plates, and their films and marks."""
-    photos = seen.photos
+def read_scanned(
+    tables: Tables, images: Images, points: Floats, photos: Photos, cameras: Cameras, covariances: Covariances
+) -> Scanned:
+    """Read which photos are scanned films or plates, and their films and marks.
+
+    `points` are the (n, 3) coordinates of all points of the images; NaN where unknown.
+    """
     texts = photos.table.texts("film")
     films = [texts[row] for row in photos.rows.tolist()]
     scanned = np.array([bool(name) for name in films], dtype=bool)
@@ -88,7 +93,9 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
     if scanned.any():
         if tables.settings.image == "um":
             raise InputError(phrase("plain.film-unit"), file=tables.settings.path)
-        reader = _Reader(tables, seen, covariances, films)
+        reader = _Reader(tables, photos, cameras, covariances, films)
+        reader.photos = reader.scanned_photos(images, points, films)
+        read_marks(tables, photos, reader.photos)
         reader.read(found)
         if tables.settings.interior == "before":
             inside = {INSIDE: (found.scans, found.observations)}
@@ -97,35 +104,60 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
 
 
 class _Reader:
-    def __init__(self, tables: Tables, seen: Seen, covariances: Covariances, films: Sequence[str]) -> None:
-        photos, certificates = seen.photos, seen.cameras.certificates
-        self.seen = seen
+    def __init__(
+        self,
+        tables: Tables,
+        photos: Photos,
+        cameras: Cameras,
+        covariances: Covariances,
+        films: Sequence[str],
+    ) -> None:
         self.tables, self.table, self.covariances = tables, photos.table, covariances
-        machines = read_scanners(tables, covariances)
-        self.comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
+        self.all_photos, self.cameras = photos, cameras
+        self.machines = read_scanners(tables, covariances)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
-        self.fiducials = read_fiducials(tables, set(photos.taken), certificates)
-        self.places = {
+        self.fiducials = read_fiducials(tables, set(photos.taken), cameras.certificates)
+        self.photos: list[ScannedPhoto] = []
+
+    def scanned_photos(self, images: Images, points: Floats, films: Sequence[str]) -> list[ScannedPhoto]:
+        """Return the photos on film with their images."""
+        photos, table = self.all_photos, self.table
+        comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
+        scanners, sides = table.texts("scanner"), table.texts("mirrored")
+        sd = np.ones(len(images.xy)) if images.sd is None else images.sd.max(axis=1)
+        places = {
             camera: {name: mark.position[:2] for name, mark in own.marks.items()}
             for camera, own in self.fiducials.items()
         }
-        names = self.table.texts("scanner")
-        self.photos = [
-            ScannedPhoto(name, row, camera, film, self._machine(row, names[row], machines))
-            for name, row, camera, film in zip(
-                photos.names, photos.rows.tolist(), photos.taken, films, strict=True
+        found = []
+        for at, (row, film) in enumerate(zip(photos.rows.tolist(), films, strict=True)):
+            if not film:
+                continue
+            name, side = scanners[row], sides[row].lower()
+            if name not in self.machines and (name or len(self.machines) > 1):
+                raise table.unknown_error(row, "scanner", "scanner", name, self.machines)
+            machine = self.machines[name] if name else next(iter(self.machines.values()), comparator)
+            if side and side not in TRUE | FALSE:
+                raise table.cell_error(row, "mirrored", "error.flag", value=side)
+            own = np.flatnonzero(images.photos == at)
+            c = -abs(self.cameras.cameras[photos.cameras[at]].parameters.get("c", np.nan))
+            found.append(
+                ScannedPhoto(
+                    photos.names[at],
+                    row,
+                    photos.taken[at],
+                    film,
+                    machine,
+                    places.get(photos.taken[at], {}),
+                    side in TRUE if side else None,
+                    images.xy[own],
+                    sd[own],
+                    images.points[own],
+                    points[images.points[own]],
+                    (photos.centres[at], photos.matrices[at], c),
+                )
             )
-            if film
-        ]
-        self.marks = MarkReadings(tables, seen, self.photos, self.places)
-        self.marks.read(photos)
-
-    def _machine(self, row: int, name: str, machines: Mapping[str, Machine]) -> Machine:
-        if not name and len(machines) <= 1:
-            return next(iter(machines.values()), self.comparator)
-        if name not in machines:
-            raise self.table.unknown_error(row, "scanner", "scanner", name, machines)
-        return machines[name]
+        return found
 
     def read(self, found: Scanned) -> None:
         """Add the scans and observations of all photos to the result."""
@@ -155,15 +187,13 @@ class _Reader:
 
     def _tell_beyond(self, sides: Sequence[bool]) -> None:
         """Report images beyond the distortion table of the certificate of their camera."""
-        cameras = {each.name: each for each in self.seen.cameras.cameras}
-        for camera, own in self.seen.cameras.certificates.items():
+        cameras = {each.name: each for each in self.cameras.cameras}
+        for camera, own in self.cameras.certificates.items():
             places, sd = [np.zeros(0, dtype=complex)], [np.zeros(0)]
             for photo, mirrored in zip(self.photos, sides, strict=True):
                 if photo.camera == camera and len(photo.marks) > 1:
-                    way = Lying(self.marks.places_of(photo), mirrored)
-                    images = photo.true_places(self.seen.readings(photo.name))
-                    places.append(way.back(photo.true, images))
-                    sd.append(photo.machine.readings.pitch * self.seen.deviations(photo.name))
+                    places.append(Lying(photo.places, mirrored).back(photo.true, photo.true_images))
+                    sd.append(photo.machine.readings.pitch * photo.image_sd)
             message = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
             if message:
                 self.tables.messages.append(Message(message, own.file))
@@ -173,24 +203,21 @@ class _Reader:
         given = self.table.vectors(_START)
         found: list[tuple[bool, Floats | None]] = []
         for photo in self.photos:
-            row = photo.row
-            mirrored = self.marks.side(photo)
-            if message := scale_message(photo, self.marks.places_of(photo), mirrored=mirrored):
-                raise ContradictionError.of(self.table.error(row, message))
-            start: Floats | None = None if np.isnan(given[row]).any() else given[row]
+            mirrored = side_of(self.tables, photo, self.photos)
+            if message := scale_message(photo, mirrored=mirrored):
+                raise ContradictionError.of(self.table.error(photo.row, message))
+            start: Floats | None = None if np.isnan(given[photo.row]).any() else given[photo.row]
             if start is None and len(photo.marks) > 1:
-                q = self.marks.places_of(photo)
-                start = np.array(conformal(q, photo.true, mirrored=mirrored)[:3])
+                start = np.array(conformal(photo.places, photo.true, mirrored=mirrored)[:3])
             found.append((mirrored, start))
         # The camera frame of a stellar calibration is the one of the measured plate.
-        stars = {each.name for each in self.seen.cameras.cameras if each.image_y == "down"}
+        stars = {each.name for each in self.cameras.cameras if each.image_y == "down"}
         told = [
-            None if photo.camera in stars or self.marks.given_side(photo) is not None else side
+            None if photo.camera in stars or photo.given_side is not None else side
             for photo, (side, _) in zip(self.photos, found, strict=True)
         ]
-        self.tables.messages.extend(
-            Message(each, self.table.path) for each in mark_remarks(self.photos, self.places, told)
-        )
+        remarks = mark_remarks(self.photos, told)
+        self.tables.messages.extend(Message(each, self.table.path) for each in remarks)
         return [
             (mirrored, self._neighbour(k, found) if start is None else start)
             for k, (mirrored, start) in enumerate(found)
@@ -242,7 +269,7 @@ class _Reader:
                 self.table,
                 photo.row,
                 interior_orientation,
-                self.marks.places_of(photo),
+                photo.places,
                 np.array(photo.readings).reshape(-1, 2),
                 model,
                 sd=np.array(photo.sd),

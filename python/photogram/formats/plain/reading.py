@@ -17,7 +17,6 @@ from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
-from photogram.formats.plain.film_readings import Seen
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.moving_photos import placed, read_timed
 from photogram.formats.plain.observations import Known, read_observations
@@ -97,7 +96,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     images = read_images(tables, photos)
     points = _points(tables, transform, images, given)
     known = np.where(np.isfinite(points.positions), points.positions, points.starts)
-    scanned = read_scanned(tables, Seen(images, known, photos, cameras), read_covariances(tables))
+    scanned = read_scanned(tables, images, known, photos, cameras, read_covariances(tables))
     cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     source = ImageSource(tables, photos, cameras, np.asarray(photo_cameras), scanned.photos)
