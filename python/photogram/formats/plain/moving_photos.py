@@ -29,8 +29,7 @@ from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, Spheroid
 from photogram.network.motion import about
 from photogram.network.moving_photos import Lines, Timed
-from photogram.network.trajectories import Clock, Trajectory
-from photogram.network.unknowns import Sensor
+from photogram.network.trajectories import Trajectory
 from photogram.words import phrase
 
 _MOTION = (*VELOCITY, *RATE)
@@ -53,19 +52,26 @@ def read_timed(
     if _COLUMNS.isdisjoint(table.columns) and not any((lines, *cameras.shutters, *cameras.lines)):
         return []
     on = named_of(table, "trajectory", trajectories, "trajectory")
+    on_rigs, as_sensors = named_of(table, "rig", rigs, "rig"), table.texts("sensor")
     motions = _motions(tables, table)
     clocks, rates = (
         read_unknowns(tables, table, TABLES["photos"].unknown(field), table.texts("photo"))
         for field in ("clock", "rate")
     )
-    on_rigs, as_sensors = table.texts("rig"), table.texts("sensor")
     found: list[Timed] = []
     for place, row in enumerate(photos.rows.tolist()):
         name, camera, time = photos.names[place], photos.cameras[place], float(photos.times[place])
-        sensor, clock = _on_rig(table, row, on_rigs[row], as_sensors[row], photos.taken[place], rigs)
+        rig, sensor, clock = on_rigs[row], None, clocks[row]
+        if rig is None and as_sensors[row]:
+            if len(rigs) != 1:
+                raise table.cell_error(row, "rig", "error.empty")
+            (rig,) = rigs.values()
+        if rig is not None:
+            own = sensor_of(table, row, rig, as_sensors[row] or photos.taken[place])
+            sensor, clock = rig.sensors.get(own), clock or rig.clocks.get(own)
         said = {
             "trajectory": on[row],
-            "offset": clocks[row] or clock,
+            "offset": clock,
             "rate": rates[row],
             "sensor": sensor,
             **motions[row],
@@ -78,27 +84,20 @@ def read_timed(
             continue
         if not math.isnan(time):
             given["time"] = time
-        _check(table, row, given)
+        flown, scanned = "trajectory" in given, "lines" in given
         sd = photos.attitude_sd[place]
-        if "trajectory" not in given and np.isfinite(sd).any() and sd.any():
-            raise table.error(row, phrase("plain.moving-attitude"))
+        contradictions = {
+            "plain.motion-columns": flown and "velocity" in given,
+            "plain.line-times-of-frame": scanned and "line_sensor" not in given,
+            "plain.no-line-times": not scanned and "line_sensor" in given,
+            "plain.line-scanner-time": scanned and not flown and "time" not in given,
+            "plain.line-rate": "rate" in given and not scanned,
+            "plain.moving-attitude": not flown and np.isfinite(sd).any() and sd.any(),
+        }
+        for code in (code for code, wrong in contradictions.items() if wrong):
+            raise table.error(row, phrase(code))
         found.append(made(table, row, Timed, name, **given))
     return found
-
-
-def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
-    """Reject inconsistent combinations of motion columns."""
-    flown = "trajectory" in given
-    if flown and "velocity" in given:
-        raise table.error(row, phrase("plain.motion-columns"))
-    if "lines" in given and "line_sensor" not in given:
-        raise table.error(row, phrase("plain.line-times-of-frame"))
-    if "line_sensor" in given and "lines" not in given:
-        raise table.error(row, phrase("plain.no-line-times"))
-    if "lines" in given and not flown and "time" not in given:
-        raise table.error(row, phrase("plain.line-scanner-time"))
-    if "rate" in given and "lines" not in given:
-        raise table.error(row, phrase("plain.line-rate"))
 
 
 def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
@@ -111,21 +110,6 @@ def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
     return [
         {} if none else dict(zip(_FIELDS, own, strict=True)) for none, own in zip(silent, rows, strict=True)
     ]
-
-
-def _on_rig(
-    table: ColumnTable, row: int, name: str, own: str, camera: str, rigs: Mapping[str, Rig]
-) -> tuple[Sensor | None, Clock | None]:
-    """Return pose and clock of a camera on its carrier; None: trajectory."""
-    if not name and not own:
-        return None, None
-    if not name and len(rigs) != 1:
-        raise table.cell_error(row, "rig", "error.empty")
-    if name and name not in rigs:
-        raise table.unknown_error(row, "rig", "rig", name, rigs)
-    rig = rigs[name] if name else next(iter(rigs.values()))
-    sensor = sensor_of(table, row, rig, own or camera)
-    return rig.sensors.get(sensor), rig.clocks.get(sensor)
 
 
 def _line_times(tables: Tables) -> dict[str, Lines]:

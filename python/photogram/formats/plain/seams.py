@@ -6,14 +6,14 @@ photo, `NAME half 2`, which is mounted on the first. Other modules do not proces
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from photogram.formats.plain.tables import Tables
 from photogram.io.column_table import ColumnTable
-from photogram.io.delimited import BATCH
-from photogram.lazy_dataclasses import dataclass, field, fields, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.moving_photos import Timed
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
@@ -49,24 +49,15 @@ def with_seams(tables: Tables) -> tuple[Tables, Seams]:
             raise table.error(row, phrase("plain.seam-without-film", photo=names[row]))
         axis = int(np.isnan(places[row, 0]))
         found[names[row]] = Seam(f"{names[row]} half 2", _LINES[axis], float(places[row, axis]))
-    own = {each.name: getattr(tables, each.name) for each in fields(tables)}
-    own["parsed"] = {name: each for name, each in tables.parsed.items() if name != "photos"}
-    return _Divided(**own, seams=found), found
+    parsed = {name: own for name, own in tables.parsed.items() if name != "photos"}
+    return replace(tables, parsed=parsed, change=partial(_divided, found)), found
 
 
-@dataclass(frozen=True)
-class _Divided(Tables):
-    """Tables in which readings beyond a seam belong to the second half."""
-
-    seams: Seams = field(default_factory=dict)
-
-    def batches(self, name: str, size: int | None = BATCH) -> Iterator[ColumnTable]:
-        """Yield a table in batches, divided."""
-        for table in super().batches(name, size):
-            if name in ("images", "fiducial_images"):
-                yield _parted(table, self.seams)
-            else:
-                yield _with_halves(table, self.seams) if name == "photos" else table
+def _divided(seams: Seams, name: str, table: ColumnTable) -> ColumnTable:
+    """Return a table in which readings beyond a seam belong to the second half."""
+    if name in ("images", "fiducial_images"):
+        return _parted(table, seams)
+    return _with_halves(table, seams) if name == "photos" else table
 
 
 def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
@@ -87,15 +78,15 @@ def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
     """Return the table of photos with a row without pose for each second half."""
     texts = table.texts("photo")
     more = [row for row, name in enumerate(texts) if name in seams]
-    found = table.some([*range(table.count), *more])
+    halves, count = [seams[texts[row]].half for row in more], table.count
+    found = table.some([*range(count), *more]).with_texts("photo", [*texts, *halves])
     cells = dict(found.cells)
     for name in (each for each in table.columns if each.startswith("sd_")):
-        if isinstance(own := table.cells[name], np.ndarray):
-            cells[name] = np.append(own, np.full(len(more), np.nan))
+        if isinstance(own := found.cells[name], np.ndarray):
+            cells[name] = np.where(np.arange(found.count) < count, own, np.nan)
         else:
             cells[name] = [*table.texts(name), *[""] * len(more)]
-    halves = [seams[texts[row]].half for row in more]
-    return replace(found, cells=cells).with_texts("photo", [*texts, *halves])
+    return replace(found, cells=cells)
 
 
 def mounted_halves(

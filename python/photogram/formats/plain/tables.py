@@ -132,6 +132,7 @@ class Tables:
     names: Collection[str] = ()  # Observed points, if they are known before the tables are read
     shared: Shared = field(default_factory=Shared)  # Shared parameters in rows of all tables
     parsed: dict[str, ColumnTable | None] = field(default_factory=dict)
+    change: Callable[[str, ColumnTable], ColumnTable] = lambda _, table: table  # Of each batch of a table
 
     def read(self, name: str) -> ColumnTable | None:
         """Return a table if it exists, parsed once except images."""
@@ -162,12 +163,12 @@ class Tables:
         for table in tables:
             required = schema.needed(table.columns)
             if schema.has_system:
-                yield settled(table, given, known, units, required, self.names, name, self.messages)
-                continue
-            table.require(*required)
-            converted = in_units(table, units, name, self.messages)
-            check_unread(converted, PLAIN, known, name, self.messages)
-            yield converted
+                found = settled(table, given, known, units, required, self.names, name, self.messages)
+            else:
+                table.require(*required)
+                found = in_units(table, units, name, self.messages)
+                check_unread(found, PLAIN, known, name, self.messages)
+            yield self.change(name, found)
 
     def _photos_of_images(self) -> ColumnTable | None:
         """Return a table of photos from the images, for a project without one."""
