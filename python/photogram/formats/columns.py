@@ -300,18 +300,21 @@ def _with_points(table: ColumnTable, names: Collection[str], messages: list[Mess
 
 def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -> ColumnTable:
     """Return a table with control, check and off in its column `use`."""
-    headings = dict(table.headings)
-    words = {
-        column: [_role(cell, columns) for cell in table.texts(column)]
-        for column in _role_columns(table, columns)
-    }
-    for column in list(words):
+    headings, words = dict(table.headings), dict[str, list[str | None]]()
+    read = [column for column in headings if column not in columns.ignored]
+    named = [column for column in read if column == ROLE or column_of(headings[column]) in (ROLE, *_FLAGS)]
+    texts = [
+        column for column in read if column not in ("", "point") and isinstance(table.cells[column], list)
+    ]
+    for column in named or texts:
+        roles = [_role(cell, columns) for cell in table.texts(column)]
         own, meaning = headings[column], column_of(headings[column])
         sure = column == ROLE and (ROLE in columns.headings or not _PLAIN_ROLES.isdisjoint(words_of(own)))
-        if meaning in _FLAGS and not any(words[column]):
+        if meaning in _FLAGS and not any(roles):
             words[column] = [_flag(table, column, row, meaning) for row in range(table.count)]
-        elif not sure and not any(words[column]):
-            del words[column]  # Types of something else
+        # Other types describe something else; columns without a heading of roles contain "check".
+        elif (sure or any(roles)) and (named or "check" in roles):
+            words[column] = roles
     if len(words) > 1:
         several = [headings[column] for column in words]
         raise table.head.error(phrase("columns.several-roles", names=several))
@@ -324,23 +327,6 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
         roles = phrase("columns.roles-read", heading=headings[column], counts=counts)
         messages.append(Message(roles, table.path))
     return table.renamed({column: ROLE}).with_texts(ROLE, uses)
-
-
-def _role_columns(table: ColumnTable, columns: Columns) -> list[str]:
-    """Return columns of roles, by heading, otherwise by their words."""
-    found = [
-        column
-        for column, own in table.headings
-        if column not in columns.ignored and (column == ROLE or column_of(own) in (ROLE, *_FLAGS))
-    ]
-    if found:
-        return found
-    return [
-        column
-        for column in table.columns
-        if column not in ("", "point", *columns.ignored) and isinstance(table.cells[column], list)
-        if "check" in {_role(cell, columns) for cell in table.texts(column)}
-    ]
 
 
 def _role(cell: str, columns: Columns) -> str | None:
