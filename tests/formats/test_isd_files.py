@@ -200,7 +200,7 @@ FAULTS = [
         "error.at /name_model: error.unknown.close sensor model",
     ),
     (without("image_lines"), "error.at: error.document: error.missing image_lines"),
-    (setting(0, "image_samples"), "error.at /image_samples: error.whole-range 0 1 2147483648"),
+    (setting(0, "image_samples"), "error.at /image_samples: error.whole-range 0 1 2147483647"),
     (
         setting("x", "focal_length_model", "focal_length"),
         "error.at /focal_length_model/focal_length: error.number x",

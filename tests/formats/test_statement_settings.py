@@ -166,7 +166,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             "survey_common_sd = 0.004",
             "survey_common_sd = nan",
-            "error.key check survey_common_sd: error.number nan",
+            "error.key check survey_common_sd: error.finite nan",
         ),
         (
             "survey_common_sd = 0.004",
@@ -255,7 +255,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             "[0.00001, 5e-6, inf]",
             "[0.00001, 5e-6]",
-            "error.key statement length_limit: error.count 2: toml.or 3",
+            "error.key statement length_limit: error.count 3 2",
         ),
         (
             "[0.00001, 5e-6, inf]",
@@ -267,7 +267,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
             "[1, -5e-6, 1]",
             "error.key statement length_limit: error.at limit: request.limit",
         ),
-        ("expansion = 11.5e-6", "expansion = inf", "error.key statement expansion: error.number inf"),
+        ("expansion = 11.5e-6", "expansion = inf", "error.key statement expansion: error.finite inf"),
     ],
 )
 def test_what_cannot_be_asked_is_an_error_of_its_line(project, old, new, said):
@@ -312,12 +312,12 @@ def test_errors_of_names_that_stand_in_several_sections_name_the_right_line(proj
         (
             'asprs.points = "{asked}"',
             1,
-            "error.at asprs: plain.sentence-key: error.value {'points': '{asked}'}",
+            "error.at [asprs]: plain.sentence-key: error.value {'points': '{asked}'}",
         ),
         (
             '[asprs]\npoints = "{asked}"',
             1,
-            "error.at asprs: plain.sentence-key: error.value {'points': '{asked}'}",
+            "error.at [asprs]: plain.sentence-key: error.value {'points': '{asked}'}",
         ),
         ('"asprs.points" = "{asked}\n', 1, "error.parse TOML Illegal character '\\n' (at line 1, column 26)"),
     ],

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -30,7 +30,7 @@ from photogram.film.marks import DataStrip, by_side, turned, turned_name
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns
 from photogram.io.places import at_place
-from photogram.io.toml import KeyPlace, Table, TomlFile, day_of, read_document
+from photogram.io.toml import TomlTree, day_of, read_document
 from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
@@ -52,23 +52,25 @@ def read_toml(path: Path) -> dict[str, Any]:
 
     InputError: if the file cannot be read or contains unknown or invalid entries.
     """
-    table = read_document(path, {"certificate": _KEYS}).table("certificate")
-    table.choice("unit", ("mm",), "mm")
-    strip = table.choice("data_strip", get_args(DataStrip), "left")
-    frame = _Frame(cast(DataStrip, strip), path)
+    table = read_document(path, {"certificate": _KEYS})["certificate"]
+    table.get("unit", "mm").choice(("mm",))
+    strip = table.get("data_strip", "left").choice(get_args(DataStrip))
+    frame = _Frame(cast(DataStrip, strip), table.source.lines)
     found: dict[str, Any] = {
-        "name": table.word("camera", path.stem),
-        "camera_type": table.text("type", ""),
+        "name": table.get("camera", path.stem).word(),
+        "camera_type": table.get("type", "").text(),
         "day": _day(table),
-        "c": abs(table.number("c", low=-LARGEST, high=LARGEST)) if "c" in table else None,
+        "c": abs(table["c"].number(-LARGEST, LARGEST)) if "c" in table else None,
         "sd_c": _positive(table, "sd_c"),
-        "reference": table.choice("principal_point", REFERENCES, "fiducial-centre"),
+        "reference": table.get("principal_point", "fiducial-centre").choice(REFERENCES),
         "autocollimation": frame.place(table, "autocollimation"),
         "symmetry": frame.place(table, "symmetry"),
         "sd_principal_point": _positive(table, "sd_principal_point"),
         "places": frame.places(table.table("fiducials")),
         "sd_places": _positive(table, "sd_fiducials"),
-        "distances": frame.distances(table.table("distances"), table.positive("sd_distances", SD_DISTANCE)),
+        "distances": frame.distances(
+            table.table("distances"), table.get("sd_distances", SD_DISTANCE).positive()
+        ),
         "design": frame.places(table.table("design")),
         "sd_design": _positive(table, "sd_design"),
         "lines": frame.lines(table),
@@ -76,7 +78,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         "file": path,
     }
     if found["c"] == 0:
-        raise table.error("c", phrase("error.positive", value=0.0))
+        raise table["c"].error(phrase("error.positive", value=0.0))
     found |= _radial(table, found["c"], frame)
     found["tangential"] = _tangential(table, found["c"], found.get("radial"), frame)
     return found
@@ -86,27 +88,27 @@ REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")  # Possible orig
 
 
 class _Frame:
-    def __init__(self, data_strip: DataStrip, path: Path) -> None:
+    def __init__(self, data_strip: DataStrip, lines: Sequence[str]) -> None:
         self.data_strip, self.typed = data_strip, dict[str, str]()
-        text = "\n".join(TomlFile(path).lines)
-        self._typed: Mapping[str, Any] = tomllib.loads(text, parse_float=str)["certificate"]
+        content = tomllib.loads("\n".join(lines), parse_float=str)
+        self._typed: Mapping[str, Any] = content["certificate"]
 
     def mark(self, name: str) -> str:
         return turned_name(by_side(name), self.data_strip)
 
-    def place(self, table: Table, key: str) -> tuple[float, float] | None:
+    def place(self, table: TomlTree, key: str) -> tuple[float, float] | None:
         if key not in table:
             return None
         x, y = turned(_numbers(table, key, 2), self.data_strip).tolist()
         return x, y
 
-    def places(self, table: Table) -> dict[str, tuple[float, float]]:
+    def places(self, table: TomlTree) -> dict[str, tuple[float, float]]:
         found: dict[str, tuple[float, float]] = {}
         section = table.name.rpartition(".")[2]
-        for key in table.values:
+        for key in table.value:
             name, place = self.mark(key), self.place(table, key)
             if name in found:
-                raise table.error(key, phrase("error.repeated", kind="mark", name=name))
+                raise table[key].error(phrase("error.repeated", kind="mark", name=name))
             assert place is not None
             found[name] = place
             if section == "fiducials":
@@ -120,41 +122,38 @@ class _Frame:
             x, y = (y[1:] if y.startswith("-") else f"-{y.removeprefix('+')}"), x
         self.typed |= {f"{name}.x": x, f"{name}.y": y}
 
-    def distances(self, table: Table, sd: float) -> tuple[MarkDistance, ...]:
+    def distances(self, table: TomlTree, sd: float) -> tuple[MarkDistance, ...]:
         found: dict[frozenset[str], MarkDistance] = {}
-        for key in table.values:
+        for key in table.value:
             parts = [self.mark(part) for part in key.split("-")]
             if len(parts) != 2 or not all(parts) or parts[0] == parts[1]:
-                raise table.error(key, phrase("films.pair-of-marks", value=key))
-            distance = MarkDistance(parts[0], parts[1], table.positive(key), sd)
+                raise table[key].error(phrase("films.pair-of-marks", value=key))
+            distance = MarkDistance(parts[0], parts[1], table[key].positive(), sd)
             if distance.length > LARGEST:
-                raise table.error(key, phrase("error.most", high=LARGEST, value=distance.length))
+                raise table[key].error(phrase("error.most", high=LARGEST, value=distance.length))
             if frozenset(parts) in found:
-                raise table.error(key, phrase("error.repeated", kind="distance", name=distance.name))
+                raise table[key].error(phrase("error.repeated", kind="distance", name=distance.name))
             found[frozenset(parts)] = distance
             self.typed[distance.name] = _text(self._typed["distances"][key])
         return tuple(found.values())
 
-    def lines(self, table: Table) -> tuple[RightAngle | Crossing, ...]:
+    def lines(self, table: TomlTree) -> tuple[RightAngle | Crossing, ...]:
         found: list[RightAngle | Crossing] = []
-        for number, row in enumerate(table.items("lines", []), 1):
-            if not isinstance(row, dict):
-                raise table.error("lines", phrase("error.table", value=str(row)))
-            line = Table(row, f"certificate.lines {number}", table.source)
+        for line in table.get("lines", []):
             line.only(("marks", "angle", "sd_angle_arcmin", "place", "sd_place"))
-            names = [self.mark(each) for each in line.words("marks")]
+            names = [self.mark(each) for each in line["marks"].words()]
             if len(names) != 4 or len(set(names)) < 4:
-                raise line.error("marks", phrase("films.four-marks", names=names))
+                raise line["marks"].error(phrase("films.four-marks", names=names))
             marks = (names[0], names[1], names[2], names[3])
             if "sd_angle_arcmin" in line:
-                sd = math.radians(line.positive("sd_angle_arcmin") / 60)
-                angle = math.radians(line.number("angle", 90.0, low=1, high=179))
+                sd = math.radians(line["sd_angle_arcmin"].positive() / 60)
+                angle = math.radians(line.get("angle", 90.0).number(1, 179))
                 found.append(RightAngle(marks, sd, angle))
             if "sd_place" in line:
                 place = self.place(line, "place") or (0.0, 0.0)
-                found.append(Crossing(marks, line.positive("sd_place"), place))
-            if not {"sd_angle_arcmin", "sd_place"} & line.values.keys():
-                raise line.error("marks", phrase("films.line-without-sd"))
+                found.append(Crossing(marks, line["sd_place"].positive(), place))
+            if not {"sd_angle_arcmin", "sd_place"} & line.value.keys():
+                raise line["marks"].error(phrase("films.line-without-sd"))
         return tuple(found)
 
 
@@ -162,50 +161,47 @@ def _text(value: Any) -> str:
     return str(value).replace("_", "")
 
 
-def _positive(table: Table, key: str) -> float | None:
-    return table.positive(key) if key in table else None
+def _positive(table: TomlTree, key: str) -> float | None:
+    return table[key].positive() if key in table else None
 
 
-def _day(table: Table) -> date | None:
-    value = table.values.get("date")
+def _day(table: TomlTree) -> date | None:
+    value = table.value.get("date")
     if value is None:
         return None
     try:
         return day_of(value)
     except ValueError:
-        raise table.error("date", phrase("error.day", value=str(value))) from None
+        raise table["date"].error(phrase("error.day", value=str(value))) from None
 
 
-def _numbers(table: Table, key: str, count: int | None = None) -> Floats:
-    found = np.array(table.numbers(key, len(table.items(key)) if count is None else count))
-    if not np.isfinite(found).all():
-        raise table.error(key, phrase("error.finite", value=math.inf))
-    return found
+def _numbers(table: TomlTree, key: str, *counts: int) -> Floats:
+    return np.array(table[key].numbers(*counts))
 
 
-def _sign(table: Table, key: str) -> int:
-    value = table.values.get(key)
+def _sign(table: TomlTree, key: str) -> int:
+    value = table.at(key).value
     if value not in (1, -1) or isinstance(value, bool):
-        raise table.error(key, phrase("films.sign", value=str(value)))
+        raise table.at(key).error(phrase("films.sign", value=str(value)))
     return int(value)
 
 
-def _angles(own: Table, c: float | None) -> Floats:
+def _angles(own: TomlTree, c: float | None) -> Floats:
     """Return angles from the axis (rad) given in degrees or as radii in mm."""
     if ("angle" in own) == ("radius" in own):
-        raise own.error("angle", phrase("error.exclusive", first="angle", second="radius"))
+        raise own.at("angle").error(phrase("error.exclusive", first="angle", second="radius"))
     key = "angle" if "angle" in own else "radius"
     values = _numbers(own, key)
     if key == "radius":
         if c is None:
-            raise own.error("radius", phrase("error.requires", name="radius", other="c"))
+            raise own["radius"].error(phrase("error.requires", name="radius", other="c"))
         values = np.degrees(np.arctan2(values, c))
     if (wrong := values[~((values > 0) & (values < 90))]).size:
-        raise own.error(key, phrase("films.angles", value=float(wrong[0])))
+        raise own[key].error(phrase("films.angles", value=float(wrong[0])))
     return np.radians(values)
 
 
-def _radial(table: Table, c: float | None, frame: _Frame) -> dict[str, Any]:
+def _radial(table: TomlTree, c: float | None, frame: _Frame) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if "radial_coefficients" in table:
         found["radial_coefficients"] = tuple(_numbers(table, "radial_coefficients").tolist())
@@ -214,18 +210,17 @@ def _radial(table: Table, c: float | None, frame: _Frame) -> dict[str, Any]:
     own = table.table("radial")
     own.only(("angle", "radius", "distortion", "sign", "sd_um", "correlation", *SEMI_DIAGONALS))
     if c is None:
-        raise own.error("distortion", phrase("error.requires", name="distortion", other="c"))
+        raise own.at("distortion").error(phrase("error.requires", name="distortion", other="c"))
     angle = _angles(own, c)
-    correlation = own.number("correlation", 0.0, low=0.0, high=0.999)
+    correlation = own.get("correlation", 0.0).number(0.0, 0.999)
     outwards = UM * _sign(own, "sign") if "sign" in own else UM
     if "distortion" in own:
         values = outwards * _numbers(own, "distortion", len(angle))
-        return found | {
-            "radial": RadialTable(angle, values, UM * own.positive("sd_um", SD_DISTORTION_UM), correlation)
-        }
+        sd = UM * own.get("sd_um", SD_DISTORTION_UM).positive()
+        return found | {"radial": RadialTable(angle, values, sd, correlation)}
     singly = {frame.mark(name): outwards * _numbers(own, name, len(angle)) for name in SEMI_DIAGONALS}
-    with at_place(KeyPlace(own, "ll")):
-        four = of_semi_diagonals(angle, singly, UM * own.positive("sd_um") if "sd_um" in own else None)
+    with at_place(own.at("ll")):
+        four = of_semi_diagonals(angle, singly, UM * own["sd_um"].positive() if "sd_um" in own else None)
     radial = RadialTable(angle, four.mean, four.sd, correlation)
     return found | {"radial": radial, "remarks": tuple(_remarks_on(four))}
 
@@ -239,22 +234,22 @@ def _remarks_on(four: SemiDiagonals) -> Iterator[Phrase]:
 
 
 def _tangential(
-    table: Table, c: float | None, radial: RadialTable | None, frame: _Frame
+    table: TomlTree, c: float | None, radial: RadialTable | None, frame: _Frame
 ) -> Tangential | None:
     if "tangential" not in table:
         return None
     sign = _sign(table, "tangential_sign")
     own = table.table("tangential")
     own.only(("J1", "phi0", "angle", "radius", "displacement", "sd_um"))
-    phi0 = math.radians(own.number("phi0")) + (math.pi / 2 if frame.data_strip == "top" else 0.0)
-    sd = UM * own.positive("sd_um", SD_TANGENTIAL_UM)
+    phi0 = math.radians(own["phi0"].number()) + (math.pi / 2 if frame.data_strip == "top" else 0.0)
+    sd = UM * own.get("sd_um", SD_TANGENTIAL_UM).positive()
     if "J1" in own:
         if radial is None or c is None:
-            raise own.error("J1", phrase("error.requires", name="J1", other="the table radial"))
+            raise own["J1"].error(phrase("error.requires", name="J1", other="the table radial"))
         edge = c * math.tan(float(radial.angle.max()))
-        return Tangential(own.number("J1"), phi0, sign, sd / edge**2)
+        return Tangential(own["J1"].number(), phi0, sign, sd / edge**2)
     if c is None:
-        raise own.error("displacement", phrase("error.requires", name="displacement", other="c"))
+        raise own.at("displacement").error(phrase("error.requires", name="displacement", other="c"))
     angle = _angles(own, c)
     values = UM * _numbers(own, "displacement", len(angle))
     j1, sd_j1 = of_profile(c * np.tan(angle), values, sd)

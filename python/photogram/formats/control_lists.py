@@ -123,7 +123,7 @@ def _of_json(path: Path, project: Project) -> ControlList:
             if "projection" not in image or size is None:
                 messages.append(Message(phrase("control-list.omitted", point=name, photo=shot), path))
                 continue
-            x, y = image["projection"].numbers(2).tolist()
+            x, y = image["projection"].numbers(2)
             scale = max(size)
             images.append((shot, name, repr(size[0] / 2 + scale * x), repr(size[1] / 2 + scale * y)))
     head = Place(path)

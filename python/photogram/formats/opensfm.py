@@ -24,9 +24,10 @@ from photogram.formats.models import (
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_lines
-from photogram.io.json import Tree, read_json, to_json, unknown
+from photogram.io.json import read_json, to_json
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place, at_place, one_word, positive
+from photogram.io.tree import Tree, unknown
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
@@ -146,7 +147,7 @@ def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
 
 def _gps(shots: dict[str, Tree], options: ReadOptions, messages: list[Message]) -> Observations[Position]:
     given = {name: each["gps_position"].numbers(3) for name, each in shots.items() if "gps_position" in each}
-    if not given or not any(position.any() for position in given.values()):
+    if not given or not any(map(any, given.values())):
         return Observations()
     heights = np.array([position[2] for position in given.values()])
     level = len(given) > 1 and float(np.ptp(heights)) < 1e-6

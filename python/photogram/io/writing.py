@@ -31,6 +31,7 @@ Files = Mapping[Path, Content]
 NEW = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 MOST_PENDING = 32  # Largest number of files that wait for the disk
 _Identity = tuple[int, int]
+_Buffer = io.BufferedRandom | io.BufferedWriter
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ class _Staged:
 
     target: Target
     path: str
-    file: io.BufferedWriter | None = None
+    file: io.BufferedRandom | None = None
     is_moved: bool = False  # Or is being moved
     flushing: Thread | None = None  # Flushes the file to disk
     error: OSError | None = None  # Of this thread
@@ -176,18 +177,18 @@ class _Staged:
         """Second name of the file that is replaced."""
         return f"{self.path}.old"
 
-    def open(self) -> io.BufferedWriter:
+    def open(self) -> io.BufferedRandom:
         status = self.target.status
         mode = stat.S_IMODE(status.st_mode) & 0o777 if status else 0o666
         descriptor = os.open(self.path, NEW, mode)
-        self.file = io.BufferedRandom(_File(descriptor, self.target.given, "w+b"))
+        file = self.file = io.BufferedRandom(_File(descriptor, self.target.given, "w+b"))
         if status and sys.platform != "win32":
             made = os.fstat(descriptor)
             if (made.st_uid, made.st_gid) != (status.st_uid, status.st_gid):
                 with suppress(OSError):
                     os.fchown(descriptor, status.st_uid, status.st_gid)
             os.fchmod(descriptor, mode)
-        return self.file
+        return file
 
     def begin_flush(self) -> None:
         """Start to flush a file to disk; meanwhile other results are computed and written."""
@@ -280,7 +281,7 @@ class OutputSet:
                     staged.complete()
             self.abandon()
 
-    def open(self, path: Path) -> io.BufferedWriter:
+    def open(self, path: Path) -> _Buffer:
         """Open a file for writing in pieces; the set closes it."""
         target = self._target(path)
         if target.regular:
@@ -306,7 +307,7 @@ class OutputSet:
             raise PermissionError(errno.EACCES, "is write-protected", str(path))
         return target
 
-    def _stage(self, target: Target) -> io.BufferedWriter:
+    def _stage(self, target: Target) -> io.BufferedRandom:
         with naming(target.given):
             directory = os.path.dirname(target.place)
             self._make(directory)
@@ -360,7 +361,7 @@ def write_whole(files: Files) -> None:
             outputs.write(path, content)
 
 
-def _put(file: io.BufferedWriter, content: Content) -> None:
+def _put(file: _Buffer, content: Content) -> None:
     if callable(content):
         content(file)
     else:

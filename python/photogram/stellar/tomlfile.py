@@ -9,7 +9,7 @@ from pathlib import Path
 
 from photogram.io.angles import ARCSEC
 from photogram.io.places import at_place
-from photogram.io.toml import KeyPlace, Table, read_document
+from photogram.io.toml import TomlTree, read_document
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 
 _STATION = {
@@ -27,47 +27,50 @@ _STATION = {
 
 
 def named_files(
-    path: Path, tables: Mapping[str, Sequence[str] | None], keys: Sequence[tuple[str, str]]
+    path: Path,
+    tables: Mapping[str, Sequence[str] | None],
+    keys: Sequence[tuple[str, str]],
+    several: str = "",
 ) -> list[Path]:
     """Return a file and the files named in its tables, which results must not replace."""
-    document = read_document(path, tables)
-    named = [(document.optional(table), key) for table, key in keys]
-    return [path, *(table.path(key) for table, key in named if key in table)]
+    document = read_document(path, tables, several=several)
+    named = [(document.table(table), key) for table, key in keys]
+    return [path, *(table[key].named_file() for table, key in named if key in table)]
 
 
-def effects(table: Table) -> Effects:
+def effects(table: TomlTree) -> Effects:
     """Return the effects on apparent positions, except for disabled ones."""
-    return Effects(**{one.name: table.switch(one.name, True) for one in fields(Effects)})
+    return Effects(**{one.name: table.get(one.name, True).switch() for one in fields(Effects)})
 
 
-def site(table: Table) -> Site:
+def site(table: TomlTree) -> Site:
     """Return the station of a table."""
     table.only(_STATION)
-    latitude = table.number("latitude_deg", low=-90, high=90)
-    temperature = table.number("temperature_K", 273.15)
+    latitude = table["latitude_deg"].number(-90, 90)
+    temperature = table.get("temperature_K", 273.15).number()
     if table.says("pressure_hPa", "pressure_mmHg"):
-        pressure = table.number("pressure_hPa") / HECTOPASCAL
+        pressure = table["pressure_hPa"].number() / HECTOPASCAL
     else:
-        pressure = table.number("pressure_mmHg", 760.0)
+        pressure = table.get("pressure_mmHg", 760.0).number()
     if table.says("longitude_east_deg", "longitude_west_deg"):
-        west = -table.number("longitude_east_deg", low=-360, high=360)
+        west = -table["longitude_east_deg"].number(-360, 360)
     else:
-        west = table.number("longitude_west_deg", 0.0, low=-360, high=360)
-    with at_place(KeyPlace(table)):
+        west = table.get("longitude_west_deg", 0.0).number(-360, 360)
+    with at_place(table):
         air = Air(temperature, pressure)
     return Site(
         latitude=math.radians(latitude),
         longitude_west=math.radians(west),
-        elevation=table.number("elevation_m", 0.0, low=-500, high=100_000),
+        elevation=table.get("elevation_m", 0.0).number(-500, 100_000),
         air=air,
-        aberration=table.number("aberration_arcsec", low=0, high=1) * ARCSEC
+        aberration=table["aberration_arcsec"].number(0, 1) * ARCSEC
         if "aberration_arcsec" in table
         else ABERRATION,
-        number=table.word("number", ""),
-        name=table.word("name", ""),
+        number=table.get("number", "").word(),
+        name=table.get("name", "").word(),
     )
 
 
-def pole_arcsec(table: Table, key: str) -> float:
+def pole_arcsec(table: TomlTree, key: str) -> float:
     """Return a coordinate of the pole; zero if it is missing."""
-    return table.number(key, 0.0, low=-2, high=2)
+    return table.get(key, 0.0).number(-2, 2)

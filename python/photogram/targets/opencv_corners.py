@@ -12,8 +12,9 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_beginning, read_bytes
-from photogram.io.json import Tree, read_json
+from photogram.io.json import read_json
 from photogram.io.numbers import number_or_text
+from photogram.io.tree import Tree
 from photogram.io.yaml_text import read_yaml_text
 from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured

@@ -26,9 +26,10 @@ from photogram.formats.csm.reading import (
     transformed,
 )
 from photogram.io.files import reading
-from photogram.io.json import Tree, read_json
+from photogram.io.json import read_json
 from photogram.io.places import at_place, one_word, positive
 from photogram.io.pvl import Group, Quantity, Value, parsed
+from photogram.io.tree import Tree
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation, increasing
@@ -263,7 +264,7 @@ def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
 
 def _radii(keywords: Tree) -> tuple[float, float]:
     name = f"BODY{keywords['BODY_CODE'].whole()}_RADII"
-    a, other, b = KM * keywords[name].numbers(3)
+    a, other, b = KM * np.array(keywords[name].numbers(3))
     if a != other or not 0 < b <= a:
         raise keywords[name].error(phrase("csm.radii", a=a, b=b))
     return float(a), float(b)

@@ -20,8 +20,8 @@ from photogram.formats.csm.isd import (
     Turns,
     of_quaternions,
 )
-from photogram.io.json import Tree, unknown
 from photogram.io.places import at_place, positive
+from photogram.io.tree import Tree, unknown
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens, LensModel
 from photogram.network.moving_photos import Lines
@@ -170,7 +170,7 @@ def constant_rotation(table: Tree, key: str) -> Floats:
     if key not in table:
         return np.eye(3)
     with at_place(table[key]):
-        return np.asarray(rotations(key, table[key].numbers(9).reshape(1, 3, 3), 1)[0])
+        return np.asarray(rotations(key, np.reshape(table[key].numbers(9), (1, 3, 3)), 1)[0])
 
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:

@@ -23,7 +23,7 @@ from photogram.formats.plain.schema import TABLES, WITH_SD
 from photogram.formats.project import Frame
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import at_place
-from photogram.io.toml import Document, KeyPlace, Table, TomlFile, day_of, quoted_text, read_document
+from photogram.io.toml import TomlTree, day_of, quoted_text, read_document, read_toml
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
 from photogram.results.features import KINDS, Definition
@@ -58,23 +58,23 @@ class Key(NamedTuple):
         comment = "; ".join(filter(None, [" | ".join(words), self.content]))
         return f"{f'{self.name} = {example}':<31} # {comment}" if comment else f"{self.name} = {example}"
 
-    def value(self, table: Table, unit: str) -> Any:
+    def value(self, table: TomlTree, unit: str) -> Any:
         """Return the value in a table; lengths without a unit are in `unit`."""
-        name, value = self.name, table.values[self.name]
+        name, value = self.name, table.value[self.name]
         match self.kind:
             case "word":
-                return table.choice(name, self.words.split())
+                return table[name].choice(self.words.split())
             case "number" | "positive" | "switch" | "texts":
-                return getattr(table, self.kind)(name)
+                return getattr(table[name], self.kind)()
             case "count":
-                return table.count(name, low=1)
+                return table[name].whole(1)
             case "sd":
-                return tuple(table.numbers(name, (1, 3)))
+                return tuple(table[name].numbers(1, 3, infinite=True))
             case "place" | "axes" | "limit":
                 count, valid, code = _NUMBERS[self.kind]
-                numbers = tuple(table.numbers(name, count))
+                numbers = tuple(table[name].numbers(count, infinite=True))
                 if not valid(*numbers):
-                    raise table.value_error(name, code)
+                    raise table[name].value_error(code)
                 return numbers
             case "moment":
                 return _moment(table, name, value)
@@ -82,7 +82,7 @@ class Key(NamedTuple):
                 try:
                     return day_of(value)
                 except ValueError:
-                    raise table.value_error(name, "error.day") from None
+                    raise table[name].value_error("error.day") from None
             case "date" if type(value) is date:
                 return value.isoformat()
             case "length" | "area":
@@ -92,18 +92,18 @@ class Key(NamedTuple):
                 return length_of(length, unit, area=self.kind == "area")
             case "reasons":
                 reasons = table.table(name)
-                for point in reasons.values:
-                    if not reasons.text(point).strip():
-                        raise reasons.error(point, phrase("plain.reason"))
+                for point in reasons.value:
+                    if not reasons[point].text().strip():
+                        raise reasons[point].error(phrase("plain.reason"))
                 return value
             case "folder":
-                return _existing(table, name, value, "folder") if table.text(name) else None
+                return _existing(table, name, value, "folder") if table[name].text() else None
             case "files":
-                names = [value] if isinstance(value, str) else table.texts(name) if value else []
+                names = [value] if isinstance(value, str) else table[name].texts() if value else []
                 return tuple(_existing(table, name, each) for each in dict.fromkeys(names))
             case "sentences":
-                return read_sentences(_existing(table, name, table.text(name)))
-        return table.text(name)
+                return read_sentences(_existing(table, name, table[name].text()))
+        return table[name].text()
 
     def written(self, value: Any, unit: str) -> Any:
         """Return a value in the form for :meth:`value`."""
@@ -113,23 +113,23 @@ class Key(NamedTuple):
         return SENTENCES if self.kind == "sentences" else f"{float(value)!r}{ending[self.kind]}"
 
 
-def _moment(table: Table, name: str, value: Any) -> float | str:
+def _moment(table: TomlTree, name: str, value: Any) -> float | str:
     """Return a number of seconds, or a date as text."""
     if isinstance(value, int | float):
-        return table.number(name)
+        return table[name].number()
     try:
         # TOML has a date type.
         return value.isoformat() if isinstance(value, date) else datetime.fromisoformat(value).isoformat()
     except (TypeError, ValueError):
-        raise table.value_error(name, "plain.time-origin") from None
+        raise table[name].value_error("plain.time-origin") from None
 
 
-def _existing(table: Table, key: str, name: str, kind: str = "file") -> Path:
+def _existing(table: TomlTree, key: str, name: str, kind: str = "file") -> Path:
     """Return the path of an existing file or folder."""
     path = table.file.parent / name
     # The functions of os.path also accept names that are too long for the system.
     if not (os.path.isdir if kind == "folder" else os.path.isfile)(path):
-        raise table.error(key, phrase("error.absent", kind=kind, name=name))
+        raise table[key].error(phrase("error.absent", kind=kind, name=name))
     return path
 
 
@@ -143,7 +143,7 @@ KEYS = tuple(_declared())
 """Keys in the order of reading and writing."""
 
 
-def read_keys(file: Document) -> dict[str, dict[str, Any]]:
+def read_keys(file: TomlTree) -> dict[str, dict[str, Any]]:
     """Return the values of the keys in a file by the first part of their fields, and by field."""
     found: dict[str, dict[str, Any]] = {
         "": {},
@@ -153,11 +153,11 @@ def read_keys(file: Document) -> dict[str, dict[str, Any]]:
         "statement": {},
     }
     for key in KEYS:
-        table = file.optional(key.section)
+        table = file.table(key.section)
         if key.name not in table or key.kind == "version":
             continue
         of, _, field = key.field.rpartition(".")
-        with at_place(KeyPlace(table, key.name)):
+        with at_place(table[key.name]):
             value = key.value(table, found[""].get("length", "m"))
             if of == "statement":
                 field, value = _asked(field, value)
@@ -202,17 +202,15 @@ def read_sentences(path: Path) -> dict[str, str]:
     """Return sentences of a TOML file by key."""
     from photogram.results.statement.texts import Texts
 
-    file = TomlFile(path)
-    for key, sentence in file.content.items():
-        if not isinstance(sentence, str):
-            code = "plain.sentence-key" if isinstance(sentence, dict) else "error.text"
-            message = phrase(code, value=value_field(sentence))
-            raise file.error(key, phrase("error.at", what=key, message=message))
+    file = read_toml(path)
+    for key, member in file.items():
+        if not isinstance(member.value, str):
+            raise member.value_error("plain.sentence-key" if isinstance(member.value, dict) else "error.text")
         try:
-            Texts(own={key: sentence})
+            Texts(own={key: member.value})
         except InputError as error:
-            raise file.error(key, message_of(error)) from None
-    return dict(file.content)
+            raise file.source.error(key, message_of(error)) from None
+    return dict(file.value)
 
 
 VERSION = 1
@@ -286,9 +284,9 @@ def read_settings(path: Path, reading: ReadOptions | None = None) -> Settings:
     """Read a file of settings, and find its tables, named or in its folder."""
     reading = reading or ReadOptions()
     file = read_document(path, _SECTIONS, reading.settings)
-    project = file.optional("project")
-    if project.value("format", "") is not VERSION:
-        raise project.value_error("format", "plain.version", version=VERSION)
+    project = file.table("project")
+    if project.at("format").value is not VERSION:
+        raise project.at("format").value_error("plain.version", version=VERSION)
     values = read_keys(file)
     options, photo_files = values["options"], values["photo_files"]
     photo_files |= {"photos_crs": photo_files.get("photos_crs") or None}
@@ -301,43 +299,43 @@ def read_settings(path: Path, reading: ReadOptions | None = None) -> Settings:
         frame=Frame(**values["frame"]),
         options=AdjustOptions(**options),
         **values[""],
-        sd=_deviations(file.optional("sd")) | dict(reading.sd),
-        tables=_tables(file.optional("tables")),
-        crs={name: file.table(name).text("crs") for name in WITH_CRS if "crs" in file.optional(name)},
-        columns={name: _columns(file.table(name)) for name in WITH_CRS if name in file}
+        sd=_deviations(file.table("sd")) | dict(reading.sd),
+        tables=_tables(file.table("tables")),
+        crs={name: file[name]["crs"].text() for name in WITH_CRS if "crs" in file.table(name)},
+        columns={name: _columns(file[name]) for name in WITH_CRS if name in file}
         | ({"control": reading.control_columns} if reading.columns or reading.roles else {}),
-        features=_features(file.optional("features")),
+        features=_features(file.table("features")),
         photo_files=ReadOptions(**photo_files) if photo_files.get("photos_dir") else None,
         statement=values["statement"],
     )
 
 
-def _columns(table: Table) -> Columns:
+def _columns(table: TomlTree) -> Columns:
     """Return the columns and roles of a table of points."""
-    with at_place(KeyPlace(table, "columns")):
-        columns = columns_given(table.text("columns", ""), None)
-    with at_place(KeyPlace(table, "roles")):
-        return replace(columns, roles=columns_given(None, table.text("roles", "")).roles)
+    with at_place(table.at("columns")):
+        columns = columns_given(table.get("columns", "").text(), None)
+    with at_place(table.at("roles")):
+        return replace(columns, roles=columns_given(None, table.get("roles", "").text()).roles)
 
 
-def _features(table: Table) -> dict[str, Definition]:
+def _features(table: TomlTree) -> dict[str, Definition]:
     """Return the type and the points of each feature."""
     features: dict[str, Definition] = {}
-    for name, value in table.values.items():
+    for name, value in table.value.items():
         if not isinstance(value, dict) or len(value) != 1:
-            raise table.value_error(name, "plain.feature")
+            raise table[name].value_error("plain.feature")
         (kind,) = value
         if kind not in KINDS:
-            raise table.error(name, unknown_name("kind of features", kind, KINDS))
-        features[name] = kind, table.table(name).texts(kind)
+            raise table[name].error(unknown_name("kind of features", kind, KINDS))
+        features[name] = kind, table[name][kind].texts()
     return features
 
 
-def _deviations(table: Table) -> dict[str, tuple[float, ...]]:
-    found = {name: tuple(table.numbers(name, WITH_SD[name])) for name in table.values}
+def _deviations(table: TomlTree) -> dict[str, tuple[float, ...]]:
+    found = {name: tuple(table[name].numbers(*WITH_SD[name], infinite=True)) for name in table.value}
     for name, values in found.items():
         if min(values) < 0:
-            raise table.value_error(name, "error.not-negative")
+            raise table[name].value_error("error.not-negative")
     return found
 
 
@@ -359,14 +357,14 @@ def unread_tables(settings: Settings) -> list[Message]:
     return [Message(phrase("plain.unread-tables", names=names), settings.path)]
 
 
-def _tables(table: Table) -> dict[str, Path]:
+def _tables(table: TomlTree) -> dict[str, Path]:
     folder = table.file.parent
     found: dict[str, Path] = {}
     for name in TABLES:
         if name in table:
-            found[name] = folder / table.text(name)
+            found[name] = folder / table[name].text()
             if not os.path.isfile(found[name]):  # Also if the name is too long for the system
-                raise table.error(name, phrase("error.absent", kind="file", name=str(found[name])))
+                raise table[name].error(phrase("error.absent", kind="file", name=str(found[name])))
             continue
         present = [path for ending in ENDINGS if (path := folder / f"{name}{ending}").is_file()]
         if len(present) > 1:
