@@ -86,10 +86,10 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
             found: NDArray[np.float64] = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
         raise _no_array(name, "numbers", value) from None
-    if is_masked(value):
+    if (mask := _mask(value)) is not None:
         if not missing:
             raise argument_error(name, "masked")
-        found = np.where(np.ma.getmaskarray(np.ma.asarray(value)), math.nan, found)
+        found = np.where(mask, math.nan, found)
     return found
 
 
@@ -110,7 +110,7 @@ def _of_kind(name: str, value: ArrayLike, kinds: str, of: str) -> NDArray[Any]:
     array = _array(name, value, of)
     if array.size and array.dtype.kind not in kinds:
         raise _no_array(name, of, value)
-    if is_masked(value):
+    if _mask(value) is not None:
         raise argument_error(name, "masked")
     return array
 
@@ -146,17 +146,10 @@ def _is_real(value: object) -> bool:
     return value is None or (isinstance(value, Real) and not isinstance(value, bool))
 
 
-def is_masked(value: object) -> bool:
-    """Return whether a value is an array with masked elements.
-
-    numpy.ma is slow to import. It is loaded if the value is a masked array.
-    """
-    masked = sys.modules.get("numpy.ma")
-    return (
-        masked is not None
-        and isinstance(value, masked.MaskedArray)
-        and bool(masked.getmaskarray(value).any())
-    )
+def _mask(value: object) -> NDArray[np.bool_] | None:
+    """Return the mask of an array with masked elements; numpy.ma, which is slow to import, is not needed."""
+    mask = getattr(value, "mask", None)
+    return mask if isinstance(mask, np.ndarray | np.bool_) and np.any(mask) else None
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:

@@ -12,7 +12,8 @@ from photogram.arguments.types import Floats, Indices
 from photogram.distributed.cut import Homes, alone_of, photos_of, vertices_of
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.errors import InputError
-from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
+from photogram.io.column_table import NameColumn
+from photogram.io.parquet import Column, parquet_content, read_sheet
 from photogram.io.seals import check_seal, recorded, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.lazy_dataclasses import dataclass, field
@@ -206,7 +207,7 @@ def write_part(folder: Path, part: Part) -> str:
         columns = []
         if table != "images":
             names = getattr(block, f"{table[:-1]}_ids")
-            columns.append(Column(table[:-1], Repeated(names, np.arange(len(names))), "", "its name"))
+            columns.append(Column(table[:-1], NameColumn(names, np.arange(len(names))), "", "its name"))
         columns.append(Column("row", getattr(part, table), "", f"which of the {table} of the whole"))
         if table == "photos":
             columns.append(Column("owner", part.owners, "", "the node it belongs to"))

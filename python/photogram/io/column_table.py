@@ -26,8 +26,8 @@ TRUE, FALSE = (
 )
 
 
-@dataclass(frozen=True)
-class Names:
+@dataclass(frozen=True, eq=False)
+class NameColumn:
     """A column of names: different names in order, and the name of each row.
 
     `distinct` is True if no name is empty, and all differ by more than blanks and case.
@@ -37,13 +37,16 @@ class Names:
     rows: Indices
     distinct: bool = False
 
-    def some(self, rows: Sequence[int]) -> Names:
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def some(self, rows: Sequence[int]) -> NameColumn:
         """Return the names of selected rows, in this order."""
         kept, codes = np.unique(self.rows[rows], return_inverse=True)
-        return Names([self.names[code] for code in kept.tolist()], codes.reshape(-1), self.distinct)
+        return NameColumn([self.names[code] for code in kept.tolist()], codes.reshape(-1), self.distinct)
 
 
-Cells = Sequence[str] | Names | Floats
+Cells = Sequence[str] | NameColumn | Floats
 
 
 class TableRow(NamedTuple):
@@ -103,7 +106,7 @@ class ColumnTable:
     delimiter: str = ","
     # Number format of columns of texts that have it in common
     marks: Mapping[str, Marks] = field(default_factory=dict)
-    # Names of the columns in the file, in small letters; empty for unnamed ones
+    # NameColumn of the columns in the file, in small letters; empty for unnamed ones
     own: tuple[str, ...] = ()
 
     def __contains__(self, column: str) -> bool:
@@ -164,7 +167,7 @@ class ColumnTable:
         """Return the table with selected rows, in this order."""
         cells: dict[str, Cells] = {}
         for column, own in self.cells.items():
-            if isinstance(own, Names):
+            if isinstance(own, NameColumn):
                 cells[column] = own.some(rows)
             else:
                 cells[column] = own[rows] if isinstance(own, np.ndarray) else [own[row] for row in rows]
@@ -192,10 +195,10 @@ class ColumnTable:
         if missing := [column for column in columns if column not in self.columns]:
             raise self.head.error(missing_columns(missing, self.columns))
 
-    def names(self, column: str) -> Names:
+    def names(self, column: str) -> NameColumn:
         """Return a column of names, without outer blanks."""
         cells = self._texts(column)
-        found = cells if isinstance(cells, Names) else factorised(cells)
+        found = cells if isinstance(cells, NameColumn) else factorised(cells)
         if found.distinct or _all_apart(found.names):
             return found
         for name in found.names:
@@ -225,11 +228,11 @@ class ColumnTable:
         if column not in self.columns:
             return [default] * self.count
         found = self._texts(column)
-        if isinstance(found, Names):
+        if isinstance(found, NameColumn):
             return [found.names[row] or default for row in found.rows]
         return [cell or default for cell in found]
 
-    def _texts(self, column: str) -> Sequence[str] | Names:
+    def _texts(self, column: str) -> Sequence[str] | NameColumn:
         """Return the texts of a column; reject numbers."""
         cells = self.cells[column]
         if not isinstance(cells, np.ndarray):
@@ -340,16 +343,16 @@ def _all_apart(names: Sequence[str]) -> bool:
     return len(different) == len(names) == len(words) and "nan" not in different
 
 
-def merged(codes: Indices, texts: list[str]) -> Names:
+def merged(codes: Indices, texts: list[str]) -> NameColumn:
     """Return names in which equal ones, ignoring outer blanks, are merged."""
     if len(set(texts)) == len(texts):
-        return Names(texts, codes)
+        return NameColumn(texts, codes)
     found = factorised(texts)
-    return Names(found.names, found.rows[codes])
+    return NameColumn(found.names, found.rows[codes])
 
 
-def factorised(cells: Sequence[str]) -> Names:
+def factorised(cells: Sequence[str]) -> NameColumn:
     """Return the different names in the order of their first rows."""
     places: dict[str, int] = {}
     rows = np.fromiter((places.setdefault(cell, len(places)) for cell in cells), np.int64, len(cells))
-    return Names(list(places), rows)
+    return NameColumn(list(places), rows)

@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io.column_table import COMMENT, Cells, ColumnTable, Names, merged
-from photogram.io.files import read_beginning, read_lines, read_text, reading
+from photogram.io.column_table import COMMENT, Cells, ColumnTable, NameColumn, merged
+from photogram.io.files import decoded, read_beginning, read_lines, read_text, reading
 from photogram.io.numbers import marks_of
 from photogram.io.places import Place
 from photogram.words import Phrase, phrase
@@ -358,35 +357,21 @@ def _regular(
 def _of_reader(path: Path, header: _Header, reader: _photocore.TableReader, first: int) -> ColumnTable:
     """Return the table of a reader, from its first record."""
     head, own, columns, delimiter = header
-    contents = dict(zip(columns, reader.columns(), strict=True))
-    cells = _decoded(contents, "utf-8") or _decoded(contents, "cp1252")
-    if cells is None:
-        raise _IrregularError
-    values = next(iter(cells.values()))
-    count = len(values.rows if isinstance(values, Names) else values)
-    if not count:
-        raise _IrregularError
-    return ColumnTable(path, head, columns, count, cells, range(first, first + count), delimiter, own=own)
-
-
-def _decoded(
-    contents: Mapping[str, Floats | tuple[bytes, Indices, bool]], encoding: str
-) -> dict[str, Cells] | None:
-    """Return columns with decoded names; None for another encoding."""
     cells: dict[str, Cells] = {}
-    for column, content in contents.items():
+    for column, content in zip(columns, reader.columns(), strict=True):
         if isinstance(content, np.ndarray):
             cells[column] = content
             continue
         text, rows, distinct = content
-        try:
-            names = text.decode(encoding).split("\n")[:-1]
-        except UnicodeDecodeError:
-            return None
+        names = decoded(text).split("\n")[:-1]
+        is_plain = text.isascii()
         cells[column] = (
-            Names(names, rows, distinct) if text.isascii() else merged(rows, list(map(str.strip, names)))
+            NameColumn(names, rows, distinct) if is_plain else merged(rows, list(map(str.strip, names)))
         )
-    return cells
+    count = len(cells[columns[0]])
+    if not count:
+        raise _IrregularError
+    return ColumnTable(path, head, columns, count, cells, range(first, first + count), delimiter, own=own)
 
 
 def _parquet(
@@ -408,12 +393,10 @@ def _parts_of_parquet(path: Path, size: int | None) -> Iterator[Any]:
     import pyarrow
     from pyarrow import parquet
 
-    if size is None:
-        yield parquet.read_table(path)
-        return
     with parquet.ParquetFile(path) as file:
-        if not file.metadata.num_rows:
+        if size is None or not file.metadata.num_rows:
             yield file.read()
+            return
         for batch in file.iter_batches(max(size // ROW, 1)):
             yield pyarrow.Table.from_batches([batch])
 
@@ -432,7 +415,7 @@ def _of_arrow(
     for name, column in zip(columns, table.columns, strict=True):
         is_number = types.is_floating(column.type) or types.is_integer(column.type)
         is_text = types.is_string(column.type) or types.is_large_string(column.type)
-        # Names may consist of digits.
+        # NameColumn may consist of digits.
         digits = types.is_integer(column.type) and name not in numbers
         if is_text or digits or types.is_dictionary(column.type):
             texts, codes = coded(column)

@@ -34,7 +34,7 @@ def read_bytes(path: Path) -> bytes:
 def read_beginning(path: Path, size: int = HEAD) -> str:
     """Read the start of a text file, for format detection, as :func:`read_text` does."""
     with reading(path), path.open("rb") as file:
-        text = _decoded(file.read(size), whole=False)
+        text = decoded(file.read(size), whole=False)
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -46,11 +46,11 @@ def read_text(path: Path) -> str:
     if path.suffix.lower() == ".xlsx":
         return sheet_text(path)
     data = read_bytes(path)
-    text = _decoded(data)
+    text = decoded(data)
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
-def _decoded(data: bytes, *, whole: bool = True) -> str:
+def decoded(data: bytes, *, whole: bool = True) -> str:
     """Decode the bytes of a file, or of its start."""
     for encoding in (_wide(data) or "utf-8-sig", "cp1252"):
         try:

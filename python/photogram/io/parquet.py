@@ -13,6 +13,7 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.errors import InputError
+from photogram.io.column_table import NameColumn
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import missing_columns
 from photogram.words import phrase
@@ -22,17 +23,6 @@ if TYPE_CHECKING:
 
 ROWS = 2**17  # Rows per row group
 LEVEL = 1  # Compression level of zstd: higher levels hardly reduce measured numbers
-
-
-@dataclass(frozen=True, eq=False)
-class Repeated:
-    """A column of repeated names: row i is `names[rows[i]]`."""
-
-    names: Sequence[str]
-    rows: Indices
-
-    def __len__(self) -> int:
-        return len(self.rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +58,10 @@ class Sheet:
             raise InputError(missing_columns([name], list(self.columns)), file=self.path)
         return self.columns[name]
 
-    def names(self, name: str) -> Repeated:
+    def names(self, name: str) -> NameColumn:
         """Return a column of names."""
         values = self.column(name)
-        if not isinstance(values, Repeated):
+        if not isinstance(values, NameColumn):
             raise InputError(phrase("cells.column-kind", column=name, kind="names"), file=self.path)
         return values
 
@@ -91,7 +81,7 @@ def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Call
     from pyarrow import PythonFile, parquet, types  # Import is slow
 
     table = _table(columns, about)
-    repeated = [each.name for each in columns if isinstance(each.values, Repeated)]
+    repeated = [each.name for each in columns if isinstance(each.values, NameColumn)]
     few = [name for name in repeated if types.is_dictionary(table.schema.field(name).type)]
 
     def write(file: BinaryIO) -> None:
@@ -165,7 +155,7 @@ def _table(columns: Sequence[Column], about: Mapping[str, str]) -> pyarrow.Table
 def _array(values: Any) -> pyarrow.Array:
     import pyarrow
 
-    if isinstance(values, Repeated):
+    if isinstance(values, NameColumn):
         names = pyarrow.array(values.names, pyarrow.string())
         rows = pyarrow.array(values.rows.astype(np.int32))
         # A large dictionary would be repeated in every group of rows.
@@ -186,7 +176,7 @@ def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
     whole = column.combine_chunks()
     kind = column.type
     if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
-        return Repeated(*coded(column))
+        return NameColumn(*coded(column))
     if whole.null_count:
         raise InputError(phrase("error.column", column=name, message=phrase("error.empty")), file=path)
     if pyarrow.types.is_fixed_size_list(kind):

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.io.parquet import Column, Repeated
+from photogram.io.column_table import NameColumn
+from photogram.io.parquet import Column
 from photogram.io.writing import Content
 from photogram.messages import Message, Undetermined
 from photogram.network import (
@@ -67,7 +68,7 @@ def block_files(result: Result) -> dict[str, Content]:
         "photos": [_named("photo", block.photo_ids, photos)],
         "points": [
             _named("point", block.point_ids, points),
-            Column("kind", Repeated(kinds, of_points), "", "control (held), check (known) or pass"),
+            Column("kind", NameColumn(kinds, of_points), "", "control (held), check (known) or pass"),
         ],
         "images": [
             _named("photo", block.photo_ids, block.image_photos),
@@ -134,7 +135,7 @@ def parts_of_block(*, geographic: bool, unit: str, image_unit: str) -> dict[str,
 
 
 def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
-    return Column(kind, Repeated(names, rows), "", f"name of the {kind}")
+    return Column(kind, NameColumn(names, rows), "", f"name of the {kind}")
 
 
 MODULES = (

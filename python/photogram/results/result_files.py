@@ -18,8 +18,9 @@ import orjson
 
 from photogram import _photocore
 from photogram.errors import InputError
+from photogram.io.column_table import NameColumn
 from photogram.io.files import read_bytes
-from photogram.io.parquet import Column, Repeated, Sheet, packed, parquet_content, read_sheet, unpacked
+from photogram.io.parquet import Column, Sheet, packed, parquet_content, read_sheet, unpacked
 from photogram.io.seals import SEAL, check_seal, check_sealed, recorded, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.io.writing import Content
@@ -183,7 +184,7 @@ def sheet(table: Quantities) -> list[Column]:
             values: Any = np.asarray(each.values)
             if values.dtype.kind not in "iu":  # Numbers of photos and points are not repeated texts
                 few, rows = np.unique(values.astype(str), return_inverse=True)
-                values = Repeated(few.tolist(), rows)
+                values = NameColumn(few.tolist(), rows)
             found.append(Column(name, values, "", each.about))
         elif each.single:
             unit = "1" if each.kind == "number" else "as the column unit says"
@@ -298,7 +299,7 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
     return document
 
 
-def rows_of(names: Repeated, known: Sequence[str], path: Path) -> np.ndarray:
+def rows_of(names: NameColumn, known: Sequence[str], path: Path) -> np.ndarray:
     """Return the index of the known name in each row of a column; refuse others."""
     places = {name: row for row, name in enumerate(known)}
     try:
