@@ -4,7 +4,6 @@ import inspect
 import re
 from importlib.resources import files
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -132,6 +131,6 @@ def test_progress_is_told_in_words():
     from photogram.cli.job import shown
 
     lines = []
-    tell = shown(SimpleNamespace(update=lines.append), "weighted sum of squares", 1.0)
+    tell = shown(lines.append, "weighted sum of squares", 1.0)
     tell(Progress("form", 61, 100, None))
     assert lines == ["normal equations 61 %"]

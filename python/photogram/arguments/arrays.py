@@ -149,7 +149,7 @@ def _is_real(value: object) -> bool:
 def _mask(value: object) -> NDArray[np.bool_] | None:
     """Return the mask of an array with masked elements; numpy.ma, which is slow to import, is not needed."""
     mask = getattr(value, "mask", None)
-    return mask if isinstance(mask, np.ndarray | np.bool_) and np.any(mask) else None
+    return np.asarray(mask) if isinstance(mask, np.ndarray | np.bool_) and np.any(mask) else None
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:

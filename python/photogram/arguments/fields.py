@@ -179,12 +179,11 @@ def _is_own_class(kind: Any) -> bool:
 
 def _sequence(kind: Any, name: str, value: Any) -> Any:
     from photogram.arguments.arrays import elements
-    from photogram.arguments.objects import kind_error
+    from photogram.arguments.objects import instances
 
     found = elements(name, value)
-    for row, each in enumerate(found if _is_own_class(kind) else ()):
-        if not isinstance(each, kind):
-            raise kind_error(f"{name}[{row}]", kind.__name__, each)
+    if _is_own_class(kind):
+        instances(name, found, kind)
     return value if isinstance(value, Sequence) else found
 
 

@@ -234,7 +234,7 @@ def _stream(
     from photogram.absolute_orientation import transform_file
 
     text = f"transforming {escape(points.name)}"
-    with job.status(text) as status:
+    with job.status(text) as update:
         return transform_file(
             similarity,
             points,
@@ -243,5 +243,5 @@ def _stream(
             point_sd=point_sd,
             document=document,
             outputs=outputs,
-            progress=None if status is None else lambda done: status.update(f"{text}: {done} points"),
+            progress=None if update is None else lambda done: update(f"{text}: {done} points"),
         )

@@ -89,8 +89,7 @@ def adjust(
 
         print_plan(plan_in_parts(block, parts or division, project.options))
         return
-    for remark in started.messages if started is not None and not job.quiet else ():
-        print_remark(str(remark))
+    job.remark(*(started.messages if started is not None else ()))
 
     def adjusted(start: Block | FirstValues) -> Result:
         return adjusted_block(job, project, start, ordering=ordering, threads=threads, division=parts)

@@ -11,7 +11,7 @@ import typer
 
 from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.fields import option
-from photogram.cli.console import NOT_USABLE, print_remark
+from photogram.cli.console import NOT_USABLE
 from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import Job, adjustment_status, estimation_status, with_job
 from photogram.cli.options import Changes, Input, InputFile, OfSnooping, Threads, Without, misuse
@@ -79,16 +79,15 @@ def calibrate(
     job.reads_inside(path)
     if snoop:
         job.alone("--snoop", ("--loss", "--outliers"))
-    with job.status("reading corners, finding first values") as status:
-        calibration = _read(path, seen, None if status is None else status.update)
-    for message in calibration.messages if not job.quiet else ():
-        print_remark(str(message))
+    with job.status("reading corners, finding first values") as progress:
+        calibration = _read(path, seen, progress)
+    job.remark(*calibration.messages)
     options: dict[str, Any] = {"loss": choices.get("loss"), "outliers": outliers, "threads": threads}
-    with adjustment_status(job) as progress:
+    with adjustment_status(job) as adjusting:
         if snoop:
-            found = calibration.snoop(snooping, threads=threads, progress=progress)
+            found = calibration.snoop(snooping, threads=threads, progress=adjusting)
         else:
-            found = calibration.adjust(**options, progress=progress)
+            found = calibration.adjust(**options, progress=adjusting)
     ratio = choices.get("max_bias_ratio")
     found = replace(found, result=found.result.with_max_bias_ratio(ratio))
     second = None if compare_with is None else lambda: _read(compare_with, seen).adjust(**options)
@@ -136,7 +135,7 @@ def _plan(
         raise misuse("--plan", "requires", options="--size, and --field or --focal")
     knots = {} if seen.knots is None else {"knots": seen.knots}
     camera = nominal_camera(size, seen.model, field=planned.view_field, focal=planned.focal, **knots)
-    with job.status("planning views") as status:
+    with job.status("planning views") as progress:
         plan = plan_views(
             camera,
             _board(seen),
@@ -146,7 +145,7 @@ def _plan(
             views=planned.plan_views or 0,
             need=need or 0.0,
             away=planned.away,
-            progress=None if status is None else status.update,
+            progress=progress,
         )
 
     document, maps = plan.document(), plan.calibrated.worth
@@ -213,8 +212,8 @@ def _appraised(
     from photogram.targets.findings import judged
     from photogram.targets.uncertainty import difference
 
-    with job.status("uncertainty") as status:
-        worth = appraise(found, options, None if status is None else status.update)
+    with job.status("uncertainty") as progress:
+        worth = appraise(found, options, progress)
     if compared is not None:
         second = compared()
         count = min(len(found.cameras), len(second.cameras))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.console import print_document, print_remark
+from photogram.cli.console import print_document
 from photogram.cli.documents import PageAndJson
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Changes, OutputFile, Reads
@@ -128,8 +128,7 @@ def _pdf(job: Job, calibration: Calibration, run_date: str) -> dict[str, bytes]:
         page = replace(calibration.document(), head=[Fact("Date of the run", run_date)])
         return {"report.pdf": page_pdf(page)}
     except ModuleNotFoundError:
-        if not job.quiet:
-            print_remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
+        job.remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
         return {}
 
 
@@ -162,9 +161,7 @@ def correct(
     made, remarks = correct_table(
         Correction.read(correction), read_table(measurements), invert=invert, extrapolate=extrapolate
     )
-    if not job.quiet:
-        for remark in remarks:
-            print_remark(remark)
+    job.remark(*remarks)
     if corrected is None:
         typer.echo(made.decode(), nl=False)
     job.finish({corrected: made} if corrected else {})

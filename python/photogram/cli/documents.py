@@ -7,13 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from photogram.cli.console import (
-    SUMMARY,
-    print_document,
-    print_remark,
-    print_text,
-    print_withheld,
-)
+from photogram.cli.console import SUMMARY, print_document, print_text, print_withheld
 from photogram.cli.job import Job
 from photogram.cli.options import Only, OutputFile, OutputFolder, Without, misuse
 from photogram.lazy_dataclasses import dataclass
@@ -105,8 +99,7 @@ class Documents:
         except ModuleNotFoundError as error:
             if self.html is not None or error.name != "contourpy":
                 raise
-            if not job.quiet:
-                print_remark(phrase("command.no-file", name=HTML, extra="report"))
+            job.remark(phrase("command.no-file", name=HTML, extra="report"))
             return {}
         return {self.place.with_stem(self.place.stem + mark): content}
 
@@ -123,7 +116,7 @@ class Documents:
         return {} if self.json is None else {self.json.with_stem(self.json.stem + mark): result.to_json()}
 
     def of_network(
-        self, result: AdjustedNetwork, sizes: Sequence[tuple[float, float] | None], *, quiet: bool
+        self, job: Job, result: AdjustedNetwork, sizes: Sequence[tuple[float, float] | None]
     ) -> dict[Path, Content]:
         """Return the files of `--parquet`, `--xlsx`, `--map` and `--ply`, if the user wants them."""
         from photogram import Result
@@ -140,8 +133,7 @@ class Documents:
 
             charts, remarks = map_files(result, self.map, self.crs, sizes=sizes)
             files |= charts
-            for remark in () if quiet else remarks:
-                print_remark(remark)
+            job.remark(*remarks)
         if self.ply is not None:
             from photogram.formats.crs_results import placed
             from photogram.formats.maps import point_cloud
@@ -208,7 +200,7 @@ class Documents:
                 lambda: {**({} if network is None else network.plot.available()), **plots()}
             ),
             lambda: self.as_json(result),
-            lambda: {} if network is None else self.of_network(network, sizes, quiet=job.quiet),
+            lambda: {} if network is None else self.of_network(job, network, sizes),
             summary=summarize,
             code=result.verdict.exit if code is None else code,
         )

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from photogram.cli.console import errors, failures, print_written
+from photogram.cli.console import errors, failures, print_remark, print_written
 from photogram.cli.options import (
     Reads,
     Writes,
@@ -35,8 +35,6 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from rich.status import Status
 
     from photogram import Progress
     from photogram.io.seals import InputFile
@@ -205,14 +203,22 @@ class Job:
         table = Table("", "Input files", files, f"and {others} more" if others else "")
         return reproducibility(phases, run, [table, Facts(about("run.options"), options)])
 
+    def remark(self, *remarks: object) -> None:
+        """Print remarks on standard error, unless the job is quiet."""
+        for each in () if self.quiet else remarks:
+            print_remark(each)
+
     @contextmanager
-    def status(self, text: str) -> Iterator[Status | None]:
-        """Show a status line on standard error, if this is a terminal, unless the job is quiet."""
+    def status(self, text: str) -> Iterator[Callable[[str], None] | None]:
+        """Show a status line on standard error, if this is a terminal, unless the job is quiet.
+
+        Yields the function that changes its text; None without a line.
+        """
         if self.quiet or not errors.is_terminal:
             yield None
             return
         with errors.status(text, spinner="line") as status:
-            yield status
+            yield status.update
 
     def outputs(self) -> OutputSet:
         """Return a set of files for results that are written in several pieces."""
@@ -270,11 +276,11 @@ def adjustment_status(
     job: Job, text: str = "adjusting", name: str = "weighted sum of squares", factor: float = 1.0
 ) -> Iterator[Callable[[Progress], None] | None]:
     """Show phase and last iteration of an adjustment."""
-    with job.status(text) as status:
-        yield None if status is None else shown(status, name, factor)
+    with job.status(text) as update:
+        yield None if update is None else shown(update, name, factor)
 
 
-def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None]:
+def shown(update: Callable[[str], None], name: str, factor: float) -> Callable[[Progress], None]:
     """Return a function that shows phase and last iteration."""
     last = ""
 
@@ -285,7 +291,7 @@ def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None
             last = f"iteration {progress.iteration.number}: {name} {size:.6g}; "
         elif progress.total:
             phase = _PHASES.get(progress.phase, progress.phase)
-            status.update(f"{last}{phase} {100 * progress.done // progress.total} %")
+            update(f"{last}{phase} {100 * progress.done // progress.total} %")
 
     return show
 
@@ -293,11 +299,11 @@ def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None
 @contextmanager
 def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
     """Show the number of completed adjustments of a variance component estimation."""
-    with job.status("variance components") as status:
+    with job.status("variance components") as update:
 
         def show(number: int, _: object) -> None:
-            if status is not None:
-                status.update(f"variance components, adjustment {number + 1}")
+            if update is not None:
+                update(f"variance components, adjustment {number + 1}")
 
         yield show
 

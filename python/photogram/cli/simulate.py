@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import output, print_remark
+from photogram.cli.console import output
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Changes, Without, Writes, misuse
 from photogram.lazy_dataclasses import asdict, dataclass, replace
@@ -157,8 +157,7 @@ def _giant_files(
         if not weighted[1] and network.attitude_error:
             block = block.replace(photo_attitude_sd=network.attitude_error)
     project = Project.from_block(block, common)
-    for message in project.messages if not job.quiet else ():
-        print_remark(message)
+    job.remark(*project.messages)
     return dict(project_files(project, out, overwrite=overwrite))
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photogram.arguments.fields import option
-from photogram.cli.console import print_remark
 from photogram.cli.job import Job
 from photogram.cli.options import InputFile, Without, misuse
 from photogram.formats.read_options import ReadOptions
@@ -139,6 +138,6 @@ def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, byte
     files[folder / "statement.html"] = found.to_html()
     if find_spec("typst"):
         files[folder / "statement.pdf"] = found.to_pdf()
-    elif not job.quiet:
-        print_remark(phrase("command.no-file", name="statement.pdf", extra="pdf"))
+    else:
+        job.remark(phrase("command.no-file", name="statement.pdf", extra="pdf"))
     return files

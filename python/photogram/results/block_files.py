@@ -68,7 +68,7 @@ def block_files(result: Result) -> dict[str, Content]:
         "photos": [_named("photo", block.photo_ids, photos)],
         "points": [
             _named("point", block.point_ids, points),
-            Column("kind", NameColumn(kinds, of_points), "", "control (held), check (known) or pass"),
+            Column("kind", NameColumn(list(kinds), of_points), "", "control (held), check (known) or pass"),
         ],
         "images": [
             _named("photo", block.photo_ids, block.image_photos),
