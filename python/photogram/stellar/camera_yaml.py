@@ -119,8 +119,5 @@ def _member(content: Tree, *keys: str) -> Tree:
 def _is_fisheye(content: Tree) -> bool:
     """Return whether the file specifies a fisheye model."""
     if "distortion_model" in content:
-        model = content["distortion_model"]
-        if model.value not in _ROS:
-            raise model.error(phrase("error.choice", value=str(model.value), names=list(_ROS)))
-        return bool(model.value == "equidistant")
+        return content["distortion_model"].choice(_ROS) == "equidistant"
     return content.get("fisheye_model", 0).value not in (0, False)

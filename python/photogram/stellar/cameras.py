@@ -20,7 +20,7 @@ from photogram.network.cameras import Camera
 from photogram.stellar.parameters import GROUPS, INDEX, INTERIOR, UNITS
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.problem import Problem
-from photogram.stellar.sky_cameras import BrownCamera, SkyCamera, of_kind, read_camera, weight_of
+from photogram.stellar.sky_cameras import BrownCamera, SkyCamera, read_camera, weight_of
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -83,7 +83,8 @@ class PlateCamera(Checked):
         InputError
             If the file cannot be read, or is another document.
         """
-        document = of_kind(read_json(path), ("stellar camera",))
+        document = read_json(path)
+        document["kind"].choice(("stellar camera",))
         values, covariance = read_camera(document, INTERIOR)
         return cls(
             values,

@@ -38,29 +38,15 @@ def weight_of(covariance: Floats) -> Floats:
     return np.asarray(root.T @ root, float)
 
 
-def of_kind(document: Tree, kinds: Sequence[str]) -> Tree:
-    """Return a document of one of several kinds.
-
-    InputError: if it is another document.
-    """
-    kind = document["kind"]
-    if kind.value not in kinds:
-        raise kind.error(phrase("error.choice", value=str(kind.value), names=kinds))
-    return document
-
-
 def read_camera(document: Tree, names: Sequence[str]) -> tuple[Floats, Floats]:
     """Return camera parameters and their covariance, zero for unlisted parameters.
 
     InputError: if a parameter is missing or unknown, a number is invalid, or a variance is negative.
     """
     members = [document["parameters"][name] for name in names]
-    values = [member.get("value", None) if isinstance(member.value, dict) else member for member in members]
+    values = [member["value"] if isinstance(member.value, dict) else member for member in members]
     order, matrix = document["covariance"]["order"], document["covariance"]["matrix"]
-    for name in order:
-        if name.value not in names:
-            raise name.error(phrase("error.choice", value=str(name.value), names=list(names)))
-    rows = [names.index(name.value) for name in order]
+    rows = [names.index(name.choice(names)) for name in order]
     block = np.array([row.numbers(len(rows)) for row in matrix]).reshape(-1, len(rows))
     if len(block) != len(rows) or not (np.diag(block) >= 0).all():
         raise matrix.error(phrase("error.covariance"))
@@ -235,13 +221,12 @@ class SkyCamera:
         InputError
             If the file cannot be read, or is another document.
         """
-        document = of_kind(read_json(path), _KINDS)
-        lens = document.get("lens", "brown")
-        if lens.value not in LENSES:
-            raise lens.error(phrase("error.choice", value=str(lens.value), names=list(LENSES)))
-        values, covariance = read_camera(document, LENSES[lens.value].names)
-        of = BrownCamera if lens.value == "brown" else SkyCamera
-        return of(values, covariance, lens.value, document.get("common_scale", False).value is True)
+        document = read_json(path)
+        document["kind"].choice(_KINDS)
+        lens = document.get("lens", "brown").choice(LENSES)
+        values, covariance = read_camera(document, LENSES[lens].names)
+        of = BrownCamera if lens == "brown" else SkyCamera
+        return of(values, covariance, lens, document.get("common_scale", False).value is True)
 
 
 def _turned(rays: Floats) -> Floats:
