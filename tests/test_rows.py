@@ -3,6 +3,7 @@
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from photogram import InputError, Message
@@ -24,19 +25,16 @@ def test_rows_hold_cells_and_places(tmp_path):
     table = read_records(path, spelling=lambda names: [name.lower() for name in names])
     assert (table.columns, table.head, table.path) == (("id", "x"), Place(path, 2, "ID,x"), path)
     assert [place.text for place in table.comments] == ["# a remark"]
-    rows = list(table.rows)
-    assert [(row.text("id"), row.number("x"), row.place.record) for row in rows] == [
-        ("a, b", 1.5, 5),
-        ("c", None, 6),
-    ]
-    assert list(table.rows) == rows
+    assert table.texts("id") == ["a, b", "c"]
+    assert np.array_equal(table.numbers("x"), [1.5, np.nan], equal_nan=True)
+    assert [table.place(row).record for row in (0, 1)] == [5, 6]
 
 
 def read_numbers(path):
     """Read the column x of a table."""
     table = read_records(path)
     table.require("id", "x")
-    return [row.required("x") for row in table.rows]
+    return table.given(("x",))
 
 
 @pytest.mark.parametrize(
@@ -63,10 +61,10 @@ def test_damaged_tables_name_file_and_record(tmp_path, text, record, words):
 
 
 def test_cells_may_be_missing_at_the_end_of_a_ragged_table(tmp_path):
-    rows = list(read_records(written(tmp_path, "id,x,y\n1,2\n3\n"), ragged=True).rows)
-    assert [row.number("x") for row in rows] == [2.0, None]
+    table = read_records(written(tmp_path, "id,x,y\n1,2\n3\n"), ragged=True)
+    assert np.array_equal(table.numbers("x"), [2.0, np.nan], equal_nan=True)
     with pytest.raises(InputError, match=r"record 3: column x: must have a value"):
-        rows[1].required("x")
+        table.given(("x",))
 
 
 def test_a_limit_of_the_host_is_an_error_of_the_record():

@@ -217,7 +217,7 @@ def test_bad_rows_are_named(folder, file, old, new, message, record):
 
 def test_blank_rows_do_not_count_but_their_records_do(folder):
     change(folder, "stars.csv", "2,0.2,", "\n\n2,x,")
-    with rejected("error.at: cells.cell ra_rad: error.number x") as raised:
+    with rejected("error.column ra_rad: error.number x") as raised:
         read_plain(folder / "plate.toml")
     assert raised.value.record == 5
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from photogram.absolute_orientation.stations import (
@@ -14,7 +13,7 @@ from photogram.absolute_orientation.stations import (
 )
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
-from photogram.io.column_table import ColumnTable, TableRow
+from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import cells, read_records
 from photogram.io.files import read_lines
 from photogram.io.places import Place, at_place
@@ -63,28 +62,25 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
     path = path_of("path", path)
     table = read_records(path, spelling=lambda names: [spelling(name) for name in names])
     _check_header(table)
-    rows = list(table.rows)
-    if not rows:
+    ids = table.texts("id")
+    if not ids:
         raise InputError(phrase("orientation.no-stations"), file=path)
-    known: dict[str, TableRow] = {}
-    for row in rows:
-        if not row.text("id"):
-            raise row.error(phrase("orientation.no-id"))
-        if known.setdefault(row.text("id"), row) is not row:
-            raise row.error(phrase("orientation.repeated", station=row.text("id")))
+    known: dict[str, int] = {}
+    for row, name in enumerate(ids):
+        if not name:
+            raise table.error(row, phrase("orientation.no-id"))
+        if known.setdefault(name, row) != row:
+            raise table.error(row, phrase("orientation.repeated", station=name))
     weighted = [name for name in MODEL_SD_COLUMNS if name in table.columns]
     if weighted and len(weighted) < 3:
         raise InputError(phrase("orientation.incomplete-sd", names=weighted), file=path)
 
-    def numbers(columns: tuple[str, ...], blank: float | None) -> list[list[float]]:
-        return [[_number(row, name, blank) for name in columns] for row in rows]
-
-    control, model = numbers(CONTROL_COLUMNS, math.nan), numbers(MODEL_COLUMNS, None)
-    control_sd = numbers(CONTROL_SD_COLUMNS, 0.0)
-    model_sd = numbers(MODEL_SD_COLUMNS, None) if weighted else None
+    control, model = table.vectors(CONTROL_COLUMNS), table.given(MODEL_COLUMNS)
+    control_sd = table.vectors(CONTROL_SD_COLUMNS, 0.0, infinite=True)
+    model_sd = table.given(MODEL_SD_COLUMNS) if weighted else None
     with at_place(Place(path)):
         return Stations(
-            [row.text("id") for row in rows],
+            ids,
             control,
             model,
             control_sd=control_sd,
@@ -99,13 +95,3 @@ def _check_header(table: ColumnTable) -> None:
     table.require(*REQUIRED)
     if unknown := [name for name in table.columns if name not in allowed]:
         raise table.head.error(phrase("orientation.column", column=unknown[0], names=list(allowed)))
-
-
-def _number(row: TableRow, column: str, blank: float | None) -> float:
-    """Read a number; infinity only as a standard deviation of control."""
-    text = row.text(column)
-    if column in CONTROL_SD_COLUMNS and text.lower() in ("inf", "+inf", "infinity"):
-        return math.inf
-    if not text and blank is not None:
-        return blank
-    return row.required(column)

@@ -57,9 +57,9 @@ def correct_table(
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([*table.records.columns, *columns])
-    for row, numbers, within in zip(table.records.rows, values.tolist(), in_range, strict=True):
+    for row, (numbers, within) in enumerate(zip(values.tolist(), in_range, strict=True)):
         texts = [f"{number:.4f}" for number in numbers]
-        writer.writerow([*cells(row.place, table.records.delimiter), *texts, within])
+        writer.writerow([*cells(table.records.place(row), table.records.delimiter), *texts, within])
     return buffer.getvalue().encode(), remarks
 
 

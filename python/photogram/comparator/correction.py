@@ -304,12 +304,13 @@ class Correction:
                 shaped("coefficients_um", scaled, (2, COUNT)),
                 np.zeros((2 * COUNT, 2 * COUNT)),
             )
-        linear = (document[name] for name in ("scale_x", "scale_y", "nonorthogonality_rad"))
+        scale_x, scale_y, lean = (document[name] for name in ("scale_x", "scale_y", "nonorthogonality_rad"))
         given = document["identity"]
         identity = (
             None if given is None else Identity(**{own.name: given[own.name] for own in fields(Identity)})
         )
-        return cls(*linear, polynomial, document["covariance"], identity)
+        covariance = shaped("covariance", document["covariance"], (PARAMETERS, PARAMETERS))
+        return cls(scale_x, scale_y, lean, polynomial, covariance, identity)
 
     def to_json(self) -> bytes:
         """Return the correction as a JSON document (UTF-8)."""

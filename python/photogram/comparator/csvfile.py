@@ -68,22 +68,27 @@ class Table:
             raise self.records.error(row, phrase("comparators.coordinate"))
         return xy
 
+    def measured(self) -> tuple[ColumnTable, Floats]:
+        """Return the rows with coordinates, and these."""
+        rows = np.flatnonzero(~np.isnan(self.xy_um[:, 0]))
+        return self.records.some(rows.tolist()), self.xy_um[rows]
+
 
 def read_table(path: Path, *columns: str, keys: Keys | None = None) -> Table:
     """Read a table with coordinates and other columns; `keys` are the possible settings, None for any."""
     records = read_records(path, spelling=lambda names: [name.lower() for name in names])
     records.require(*columns)
-    settings, places = dict[str, Any](), dict[str, Place]()
-    for place in records.comments if keys is not None else ():
+    settings, places, readers = dict[str, Any](), dict[str, Place](), keys or {}
+    for place in [] if keys is None else records.comments:
         key, equals, value = (place.text or "").lstrip("# ").partition("=")
         name = key.strip().lower()
         if not equals or name == NOTE:
             continue
-        if name not in keys:
-            raise place.error(unknown_name("setting", "_".join(name.split()), keys))
+        if name not in readers:
+            raise place.error(unknown_name("setting", "_".join(name.split()), readers))
         if name in settings:
             raise place.error(phrase("error.repeated", kind="setting", name=name))
-        settings[name], places[name] = keys[name](place, value.strip(), name), place
+        settings[name], places[name] = readers[name](place, value.strip(), name), place
     units = [{unit for unit in MICROMETRES if f"{axis}_{unit}" in records.columns} for axis in "xy"]
     if units[0] != units[1] or len(units[0]) != 1:
         raise records.head.error(phrase("comparators.units", names=list(records.columns)))

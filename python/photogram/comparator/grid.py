@@ -140,12 +140,12 @@ def read_grid(path: Path) -> Grid:
     """
     path = path_of("path", path)
     table = read_table(path, "point", keys=KEYS)
-    rows = [row for row, x in zip(table.records.rows, table.xy_um[:, 0], strict=True) if not np.isnan(x)]
+    rows, xy_um = table.measured()
     settings = {name: value for name, value in table.settings.items() if name not in ("grid", "owner")}
     return Grid(
         table.settings.get("grid", 0),
-        np.array([row.integer("point") for row in rows], dtype=np.int64),
-        table.xy_um[[row.row for row in rows]],
+        rows.wholes("point"),
+        xy_um,
         source=path,
         **settings,
     )

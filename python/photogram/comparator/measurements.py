@@ -5,10 +5,11 @@ Tables have the columns case, point, x_um, y_um and optionally plate, leg, opera
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from photogram.arguments.objects import path_of, require
 from photogram.comparator.cards import MAX_LEG, check_number, read_cards
@@ -16,7 +17,6 @@ from photogram.comparator.csvfile import Keys, Table, read_table, settings_lines
 from photogram.comparator.grid import Grid, find_grid
 from photogram.comparator.readings import LARGEST_UM, Reading, Session, collect_cases
 from photogram.errors import InputError
-from photogram.io.column_table import TableRow
 from photogram.io.numbers import is_whole_number
 from photogram.io.places import Place, at_place
 from photogram.words import phrase
@@ -112,12 +112,7 @@ def read_csv(
     if not plates:
         raise InputError(phrase("comparators.no-grid"), file=paths[0])
     only_plate = next(iter(plates)) if len(plates) == 1 else 0
-    cases = collect_cases(
-        _reading(row, (x, y), only_plate)
-        for table in tables
-        for row, (x, y) in zip(table.records.rows, table.xy_um.tolist(), strict=True)
-        if not math.isnan(x)
-    )
+    cases = collect_cases(reading for table in tables for reading in _readings(table, only_plate))
     settings = _settings(tables, {} if left_handed is None else {"left_handed": left_handed})
     session = Session(cases=cases, grids=plates, source=paths[0], **settings)
     session.check()
@@ -144,18 +139,15 @@ def _named_grids(table: Table) -> list[Grid]:
     return [find_grid(name if is_whole_number(name) else str(folder / name)) for name in names]
 
 
-def _reading(row: TableRow, xy_um: tuple[float, float], only_plate: int) -> Reading:
-    leg = row.integer("leg", 0)
-    check_number(row.place, "leg", leg, 0, MAX_LEG)
-    return Reading(
-        plate=row.integer("plate", only_plate),
-        case=row.integer("case"),
-        operator=row.integer("operator", 0),
-        leg=leg,
-        point=row.integer("point"),
-        xy_um=xy_um,
-        place=row.place,
-    )
+def _readings(table: Table, only_plate: int) -> Iterator[Reading]:
+    rows, xy_um = table.measured()
+    defaults = {"plate": only_plate, "case": None, "operator": 0, "leg": 0, "point": None}
+    columns = {name: rows.wholes(name, default) for name, default in defaults.items()}
+    for row in np.flatnonzero(columns["leg"] > MAX_LEG)[:1].tolist():
+        check_number(rows.place(row), "leg", int(columns["leg"][row]), 0, MAX_LEG)
+    for row, (x, y) in enumerate(xy_um.tolist()):
+        numbers = {name: int(column[row]) for name, column in columns.items()}
+        yield Reading(xy_um=(x, y), place=rows.place(row), **numbers)
 
 
 def to_csv(session: Session) -> bytes:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.io.files import read_text
-from photogram.io.numbers import Marks, finite_number, marks_of
+from photogram.io.numbers import Marks, finite_number, marks_of, whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import missing_columns, unknown_name
@@ -55,42 +55,9 @@ class TableRow(NamedTuple):
     table: ColumnTable
     row: int
 
-    @property
-    def place(self) -> Place:
-        """Location of the row."""
-        return self.table.place(self.row)
-
     def error(self, message: str | Phrase) -> InputError:
         """Return an error with the location of the row."""
         return self.table.error(self.row, message)
-
-    def text(self, column: str) -> str:
-        """Return a cell; empty if the column is missing."""
-        cells = self.table.cells.get(column)
-        return "" if cells is None else cells[self.row]  # type: ignore[index]
-
-    def number(self, column: str) -> float | None:
-        """Return a finite number; None if the cell is blank or the column is missing."""
-        text = self.text(column)
-        if not text:
-            return None
-        commas = self.table.delimiter != "," and "." not in text
-        text = text.replace(",", ".") if commas else text
-        return self.place.number(text, phrase("cells.cell", column=column))
-
-    def required(self, column: str) -> float:
-        """Return a finite number."""
-        value = self.number(column)
-        if value is None:
-            raise self.error(phrase("error.column", column=column, message=phrase("error.empty")))
-        return value
-
-    def integer(self, column: str, default: int | None = None) -> int:
-        """Return an integer that is not negative; `default` if missing."""
-        text = self.text(column)
-        if not text and default is not None:
-            return default
-        return self.place.whole(text, phrase("cells.cell", column=column))
 
 
 @dataclass(frozen=True)
@@ -116,11 +83,6 @@ class ColumnTable:
     def headings(self) -> list[tuple[str, str]]:
         """Internal name and name in the file of each column."""
         return list(zip(self.columns, self.own or self.columns, strict=True))
-
-    @property
-    def rows(self) -> Iterator[TableRow]:
-        """The rows of a table of :func:`photogram.io.delimited.read_records`."""
-        return map(self.at, range(self.count))
 
     @property
     def comments(self) -> list[Place]:
@@ -281,6 +243,13 @@ class ColumnTable:
                 message = message_of(error)
                 raise self.error(row, phrase("error.column", column=column, message=message)) from None
         return values
+
+    def wholes(self, column: str, default: int | None = None) -> Indices:
+        """Return (rows,) integers that are not negative, with `default` for missing cells."""
+        read = partial(whole_number, highest=2**53)  # Exact as numbers
+        values = self.numbers(column, math.nan if default is None else default, read=read)
+        self.check_given(values[:, np.newaxis], [column])
+        return values.astype(np.int64)
 
     def vectors(
         self,

@@ -13,7 +13,6 @@ from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
 from photogram.io.angles import ARCSEC
-from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records, renaming
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
@@ -113,25 +112,26 @@ class Catalogue:
         """
         given = read_records(path, spelling=renaming(_ALIASES), ragged=True)
         given.require("id", "ra_deg", "dec_deg", "magnitude")
-        rows = list(given.rows)
-        first: dict[str, TableRow] = {}
-        for row in rows:
-            name = row.text("id")
-            if first.setdefault(name, row) is not row:
-                raise row.error(phrase("error.repeated", kind="star", name=name))
-            if not abs(row.required("dec_deg")) <= 90:
-                limits = phrase("error.range", low=-90, high=90, value=row.required("dec_deg"))
-                raise row.error(phrase("error.column", column="dec_deg", message=limits))
-        values = [[row.required(name) if name in given else 0.0 for name in _COLUMNS[1:]] for row in rows]
-        table = np.array(values, float).reshape(-1, 6)
+        ids = tuple(given.texts("id"))
+        first: dict[str, int] = {}
+        for row, name in enumerate(ids):
+            if first.setdefault(name, row) != row:
+                raise given.error(row, phrase("error.repeated", kind="star", name=name))
+        numbers = [
+            given.given((name,)) if name in given else np.zeros((len(ids), 1)) for name in _COLUMNS[1:]
+        ]
+        table = np.hstack(numbers)
+        for row in np.flatnonzero(~(np.abs(table[:, 1]) <= 90))[:1].tolist():
+            limits = {"low": -90, "high": 90, "value": float(table[row, 1])}
+            raise given.cell_error(row, "dec_deg", "error.range", **limits)
         return cls(
-            tuple(row.text("id") for row in rows),
+            ids,
             np.radians(table[:, :2]),
             _MAS * table[:, 2:4],
             _MAS * table[:, 4],
             table[:, 5].copy(),
             epoch,
-            _MAS * np.array([[row.number(name) or 0.0 for name in _ERRORS] for row in rows]).reshape(-1, 4),
+            _MAS * np.nan_to_num(given.vectors(_ERRORS)),
         )
 
     @cached_property

@@ -14,7 +14,6 @@ from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.angles import ARCSEC
-from photogram.io.column_table import TableRow
 from photogram.io.delimited import read_records, renaming
 from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlTree, read_document
@@ -130,7 +129,8 @@ def _night(document: TomlTree) -> Night:
         camera["height_px"].number(1, _LARGEST_FRAME),
     )
     prior = SkyCamera.read(camera["prior"].named_file()) if "prior" in camera else None
-    exposures = _Exposures(list(document["exposures"]), images["file"].named_file(), blind is not None)
+    file = images["file"].named_file()
+    exposures = _Exposures(list(document["exposures"]), file, frame, blind is not None)
     catalogue = _catalogue(stars, exposures.named)
     place = replace(site(document["station"]), effects=effects(document.table("places")))
     motion = Earth(
@@ -145,7 +145,7 @@ def _night(document: TomlTree) -> Night:
         lenses=tuple(LENSES) if camera.get("lens", "brown").word() == AUTO else (),
         common_scale=camera.get("common_scale", prior is not None and prior.common_scale).switch(),
         tripod=camera.get("tripod", False).switch(),
-        exposures=[*exposures.read(catalogue, frame, place, motion)],
+        exposures=[*exposures.read(catalogue, place, motion)],
         names=exposures.names,
         pixel_sd=images.get("sd_px", 0.1).positive(),
         attitude_error=math.radians(matching.get("attitude_error_deg", 1.0).number(0, 180)),
@@ -213,10 +213,9 @@ def _catalogue(table: TomlTree, named: Set[str]) -> Catalogue:
 
 
 class _Exposures:
-    def __init__(self, tables: list[TomlTree], file: Path, blind: bool) -> None:
+    def __init__(self, tables: list[TomlTree], file: Path, frame: tuple[float, float], blind: bool) -> None:
         self.tables, self.blind = tables, blind
         self.names = tuple(table["name"].word() for table in tables)
-        self.rows: dict[str, list[TableRow]] = {name: [] for name in self.names}
         for table, name in zip(tables, self.names, strict=True):
             if self.names.count(name) > 1:
                 raise table["name"].error(phrase("error.repeated", kind="exposure", name=name))
@@ -226,63 +225,51 @@ class _Exposures:
         lowered = {name.casefold() for name in images.columns}
         pairs = {name: f"y{name[1:]}" for name in _FIRST_PIXELS}
         heading = next((name for name in pairs if {name, pairs[name]} <= lowered), "x_px")
-        self.offset = _FIRST_PIXELS["x_px"] - _FIRST_PIXELS[heading]
         aliases = {"x_px": [heading], "y_px": [pairs[heading]], **_ALIASES}
         images = images.renamed(dict(zip(images.columns, renaming(aliases)(images.columns), strict=True)))
         images.require(*(() if single else ("exposure",)), "x_px", "y_px")
-        for row in images.rows:
-            name = row.text("exposure") or single
-            if name not in self.rows:
-                raise row.error(unknown_name("exposure", name, self.names))
-            self.rows[name].append(row)
+        self.images, self.exposures = images, images.texts("exposure", single)
+        for row, name in enumerate(self.exposures):
+            if name not in self.names:
+                raise images.error(row, unknown_name("exposure", name, self.names))
+        self.xy = images.given(("x_px", "y_px")) + _FIRST_PIXELS["x_px"] - _FIRST_PIXELS[heading]
+        outside = ~((self.xy >= np.negative(frame)) & (self.xy <= 2 * np.array(frame))).all(axis=1)
+        for row in np.flatnonzero(outside)[:1].tolist():
+            x, y = self.xy[row].tolist()
+            raise images.error(row, phrase("stars.outside", x=x, y=y, width=frame[0], height=frame[1]))
+        self.stars = images.texts("star")
+        self.brightest = np.argsort(images.numbers("magnitude", math.inf), kind="stable")
 
     @property
     def named(self) -> Set[str]:
         """Stars named by images."""
-        return {star_key(row.text("star")) for rows in self.rows.values() for row in rows} - {""}
+        return {star_key(name) for name in self.stars} - {""}
 
-    def read(
-        self, catalogue: Catalogue, frame: tuple[float, float], site: Site, earth: Earth
-    ) -> Iterator[Exposure]:
+    def read(self, catalogue: Catalogue, site: Site, earth: Earth) -> Iterator[Exposure]:
         """Return the exposures."""
         index = {star_key(name): i for i, name in enumerate(catalogue.ids)}
         index |= {name: i for i, name in enumerate(catalogue.ids)}
         for table, name in zip(self.tables, self.names, strict=True):
-            utc, rows = table["utc"].text(), _by_magnitude(self.rows[name])
+            utc, rows = table["utc"].text(), [row for row in self.brightest if self.exposures[row] == name]
             with at_place(table["utc"]):
                 epoch(utc)
             stars = None
-            if any(row.text("star") for row in rows):
-                stars = np.array([_star(row, index) for row in rows], np.int64)
+            if any(self.stars[row] for row in rows):
+                stars = np.array([self._star(row, index) for row in rows], np.int64)
             if self.blind:
                 attitude = np.full(3, np.nan) if stars is not None else np.zeros(3)
             else:
                 attitude = _attitude(table, utc, stars, site, earth)
-            xy = np.array([_image(row, frame, self.offset) for row in rows]).reshape(-1, 2)
-            yield Exposure(utc, xy, attitude, stars)
+            yield Exposure(utc, self.xy[rows].reshape(-1, 2), attitude, stars)
 
-
-def _by_magnitude(rows: list[TableRow]) -> list[TableRow]:
-    magnitudes = [row.number("magnitude") for row in rows]
-    faint = [math.inf if magnitude is None else magnitude for magnitude in magnitudes]
-    return [rows[i] for i in sorted(range(len(rows)), key=lambda i: faint[i])]
-
-
-def _image(row: TableRow, frame: tuple[float, float], offset: float) -> tuple[float, float]:
-    xy = row.required("x_px") + offset, row.required("y_px") + offset
-    if not all(-size <= value <= 2 * size for value, size in zip(xy, frame, strict=True)):
-        raise row.error(phrase("stars.outside", x=xy[0], y=xy[1], width=frame[0], height=frame[1]))
-    return xy
-
-
-def _star(row: TableRow, index: dict[str, int]) -> int:
-    name = row.text("star")
-    if not name:
-        return -1
-    found = index.get(name, index.get(star_key(name), -1))
-    if found < 0:
-        raise row.error(phrase("stars.not-in-catalogue", star=name))
-    return found
+    def _star(self, row: int, index: Mapping[str, int]) -> int:
+        name = self.stars[row]
+        if not name:
+            return -1
+        found = index.get(name, index.get(star_key(name), -1))
+        if found < 0:
+            raise self.images.error(row, phrase("stars.not-in-catalogue", star=name))
+        return found
 
 
 def _attitude(table: TomlTree, utc: str, stars: Indices | None, site: Site, earth: Earth) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Bools, Floats
 from photogram.io.angles import ARCSEC
-from photogram.io.column_table import TableRow
+from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_records
 from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlTree, read_document
@@ -87,40 +87,36 @@ def _problem(document: TomlTree) -> Problem:
     unit = camera["prior_unit_m"].positive() if "prior_unit_m" in camera else None
     initial, fixed = _camera(camera, known)
     stars, images = document["stars"], document["images"]
-    star_rows = _rows(stars, "star", "ra_rad", "dec_rad")
-    image_rows = _rows(images, "star", "point", "x_m", "y_m")
+    star_table = _table(stars, "star", "ra_rad", "dec_rad")
+    image_table = _table(images, "star", "point", "x_m", "y_m")
     station = replace(site(document["station"]), effects=effects(document.table("places")))
-    ids = tuple(row.text("star") for row in star_rows)
+    ids, seen = tuple(star_table.texts("star")), image_table.texts("star")
     place: dict[str, int] = {}
-    for index, row in enumerate(star_rows):
-        if place.setdefault(star_key(ids[index]), index) != index:
-            raise row.error(phrase("error.repeated", kind="star", name=ids[index]))
-        if not _is_landmark(row) and abs(row.required("dec_rad")) > math.pi / 2:
-            raise row.error(phrase("stars.declination", star=ids[index], value=row.required("dec_rad")))
-    for row in image_rows:
-        name = row.text("star")
+    for row, name in enumerate(ids):
+        if place.setdefault(star_key(name), row) != row:
+            raise star_table.error(row, phrase("error.repeated", kind="star", name=name))
+    for row, name in enumerate(seen):
         if star_key(name) not in place:
-            raise row.error(phrase("stars.unlisted", star=name))
-    star_weight, image_weight = _common_weight(stars), _common_weight(images)
-    places, weights = _stars(star_rows, star_weight, station)
+            raise image_table.error(row, phrase("stars.unlisted", star=name))
+    places, weights, on_ground = _stars(stars, star_table, station)
     options = _options(document)
-    landmarks = {star_key(ids[i]) for i, row in enumerate(star_rows) if _is_landmark(row)}
+    landmarks = {star_key(ids[row]) for row in np.flatnonzero(on_ground).tolist()}
     if landmarks and options.refraction:
         raise stars["file"].error(phrase("stars.landmarks-and-refraction"))
     dut1 = document.table("places").get("dut1_s", 0.0).number(-1, 1)
     sidereal = partial(sidereal_time, station, dut1=dut1)
-    groups, times = _groups_and_times(images, image_rows, landmarks, sidereal)
+    groups, times = _groups_and_times(images, image_table, landmarks, sidereal)
     problem = Problem(
         site=station,
         star_ids=ids,
-        star_names=tuple(row.text("name") or row.text("star") for row in star_rows),
+        star_names=tuple(name or star for name, star in zip(star_table.texts("name"), ids, strict=True)),
         star_places=places,
         star_weights=weights,
-        image_points=tuple(row.text("point") for row in image_rows),
-        image_stars=np.array([place[star_key(row.text("star"))] for row in image_rows], np.int64),
+        image_points=tuple(image_table.texts("point")),
+        image_stars=np.array([place[star_key(name)] for name in seen], np.int64),
         image_groups=np.array(groups, np.int64),
-        image_xy=_pairs(image_rows, "x_m", "y_m"),
-        image_weights=_matrices([_weight(row, image_weight, _IMAGE_WEIGHT) for row in image_rows]),
+        image_xy=image_table.given(("x_m", "y_m")),
+        image_weights=_weights(images, image_table, _IMAGE_WEIGHT),
         image_times=np.array(times),
         initial=initial,
         parameter_weights=_parameter_weights(document.table("weights")),
@@ -174,60 +170,40 @@ def _parameter_weights(table: TomlTree) -> Floats:
     return weights
 
 
-def _common_weight(table: TomlTree) -> list[float] | None:
-    return table["weight"].numbers(3) if "weight" in table else None
-
-
-def _rows(table: TomlTree, *columns: str) -> list[TableRow]:
-    """Return the rows of the file of a table, with required columns."""
+def _table(table: TomlTree, *columns: str) -> ColumnTable:
+    """Return the file of a table, with required columns."""
     found = read_records(table["file"].named_file(), ragged=True)
     found.require(*columns)
-    return list(found.rows)
+    return found
 
 
-def _pairs(rows: list[TableRow], first: str, second: str) -> Floats:
-    return np.array([[row.required(first), row.required(second)] for row in rows]).reshape(-1, 2)
+def _weights(table: TomlTree, rows: ColumnTable, names: Sequence[str]) -> Floats:
+    """Return (n, 2, 2) weights of rows, or the common one."""
+    values = np.nan_to_num(rows.vectors(names))
+    if "weight" in table:
+        values[:] = table["weight"].numbers(3, infinite=True)
+    return values[:, [[0, 2], [2, 1]]]
 
 
-def _matrices(weights: list[Floats]) -> Floats:
-    return np.array(weights).reshape(-1, 2, 2)
-
-
-def _weight(row: TableRow, common: list[float] | None, names: tuple[str, str, str]) -> Floats:
-    first, second, cross = common if common is not None else [row.number(name) or 0.0 for name in names]
-    return np.array([[first, cross], [cross, second]])
-
-
-def _is_landmark(row: TableRow) -> bool:
-    """Return whether a row has a terrestrial direction instead of a star position."""
-    return bool(row.text("azimuth_north_deg"))
-
-
-def _stars(rows: list[TableRow], common: list[float] | None, station: Site) -> tuple[Floats, Floats]:
-    places, weights = [], []
-    for row in rows:
-        weight = _star_weight(row, common)
-        if _is_landmark(row):
-            azimuth, elevation = (
-                math.radians(row.required(f"{name}_deg")) for name in ("azimuth_north", "elevation")
-            )
-            with at_place(row.place):
-                place, weight = landmark(station, azimuth, elevation, weight)
-        else:
-            place = np.array([row.required("ra_rad"), row.required("dec_rad")])
-        places.append(place)
-        weights.append(weight)
-    return np.array(places).reshape(-1, 2), _matrices(weights)
-
-
-def _star_weight(row: TableRow, common: list[float] | None) -> Floats:
-    if row.text("unknown") in ("1", "true", "yes"):
-        return np.zeros((2, 2))
-    return _weight(row, common, _STAR_WEIGHT)
+def _stars(table: TomlTree, rows: ColumnTable, station: Site) -> tuple[Floats, Floats, Bools]:
+    """Return places and weights, and the landmarks, which have a terrestrial direction instead."""
+    places, weights = rows.vectors(("ra_rad", "dec_rad")), _weights(table, rows, _STAR_WEIGHT)
+    weights[np.isin(rows.texts("unknown"), ("1", "true", "yes"))] = 0.0
+    directions = rows.vectors(("azimuth_north_deg", "elevation_deg"))
+    landmarks = np.isfinite(directions[:, 0])
+    for row in np.flatnonzero(landmarks).tolist():
+        azimuth, elevation = np.radians(directions[row]).tolist()
+        with at_place(rows.place(row)):
+            places[row], weights[row] = landmark(station, azimuth, elevation, weights[row])
+    rows.check_given(places, ("ra_rad", "dec_rad"))
+    for row in np.flatnonzero(~landmarks & (np.abs(places[:, 1]) > math.pi / 2))[:1].tolist():
+        fields = {"star": rows.texts("star")[row], "value": float(places[row, 1])}
+        raise rows.error(row, phrase("stars.declination", **fields))
+    return places, weights, landmarks
 
 
 def _groups_and_times(
-    table: TomlTree, rows: Sequence[TableRow], landmarks: Set[str], sidereal: Callable[[str], float]
+    table: TomlTree, rows: ColumnTable, landmarks: Set[str], sidereal: Callable[[str], float]
 ) -> tuple[list[int], list[float]]:
     """Return groups and sidereal times of images.
 
@@ -236,33 +212,35 @@ def _groups_and_times(
     post, event = table.get("first_post", 500).whole(), table.get("first_event", 900).whole()
     corrections = table.get("time_corrections_rad", [0.0, 0.0, 0.0]).numbers(3)
     groups, times = [], []
-    for row in rows:
-        name, digits = row.text("orientation"), row.text("point").removeprefix("-")
+    given = rows.numbers("sidereal_time_rad").tolist()
+    columns = (rows.texts(name) for name in ("star", "point", "orientation", "utc"))
+    for row, (star, point, name, utc) in enumerate(zip(*columns, strict=True)):
+        digits = point.removeprefix("-")
         if name:
             if name not in GROUPS:
-                message = phrase("error.choice", value=name, names=GROUPS)
-                raise row.error(phrase("error.column", column="orientation", message=message))
+                raise rows.cell_error(row, "orientation", "error.choice", value=name, names=GROUPS)
             group = GROUPS.index(name)
         elif digits.isascii() and digits.isdigit():
             # The trail is the last three digits.
             trail = int(digits[-3:])
             group = 0 if trail < post else 1 if trail < event else 2
         else:
-            raise row.error(phrase("stars.no-orientation", point=row.text("point")))
-        if star_key(row.text("star")) in landmarks:
+            raise rows.error(row, phrase("stars.no-orientation", point=point))
+        time = given[row] + corrections[group]
+        if star_key(star) in landmarks:
             time = HOUR
-        elif utc := row.text("utc"):
-            with at_place(row.place):
+        elif utc:
+            with at_place(rows.place(row)):
                 time = sidereal(utc) + corrections[group]
-        else:
-            time = row.required("sidereal_time_rad") + corrections[group]
+        elif math.isnan(time):
+            raise rows.cell_error(row, "sidereal_time_rad", "error.empty")
         groups.append(group)
         times.append(time)
     return groups, times
 
 
 def _axis(table: TomlTree) -> Axis:
-    xx, yy, xy = table["weight"].numbers(3)
+    xx, yy, xy = table["weight"].numbers(3, infinite=True)
     group = table.get("orientation", "event").choice(GROUPS)
     return Axis(
         azimuth=math.radians(table["azimuth_deg"].number(-360, 360)),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import MISSING
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from photogram.arguments.fields import Checked, option
+from photogram.arguments.fields import Checked
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
@@ -20,7 +19,7 @@ from photogram.comparator.grid import Grid
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import phrase
 
 ISO = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})$")
@@ -91,8 +90,8 @@ class RecordedCalibration(Checked):
     name: str
     day: date
     correction: Correction
-    random_um: float = option(MISSING, 0, is_open=True)
-    freedom: int = option(MISSING, 1)
+    random_um: float = field(metadata={"low": 0, "open": True})
+    freedom: int = field(metadata={"low": 1, "open": False})
     pointing_um: tuple[float, float]
     pointing_covariance_um2: float
     pointing_freedom: int
@@ -171,7 +170,7 @@ def _from_document(document: Any, name: str) -> RecordedCalibration:
         RecordedCase(
             number=each["case"],
             **{name: each[name] for name in ("operator", "plate", "left_handed", "points", "means_um")},
-            counts=[counts[each["case"], point] for point in each["points"]],
+            counts=np.array([counts[each["case"], point] for point in each["points"]], dtype=np.int64),
             rotation_rad=placed[each["case"]]["rotation_rad"],
             translation_um=placed[each["case"]]["translation_um"],
         )
