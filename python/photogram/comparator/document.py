@@ -56,6 +56,10 @@ def calibration_document(calibration: Calibration) -> Document:
     polynomials = [terms(tests), coefficients(nonlinear)] if nonlinear and tests else []
     disagreeing = [outliers(screening), far_pointings(calibration.far_pointings)]
     date = f", {session.date}" if session.date else ""
+    drawings = [
+        Drawing(f"picture-{name}", name.replace("-", " ").capitalize(), "", sketch)
+        for name, sketch in plotters(calibration).items()
+    ]
     return verdict_document(
         verdict,
         f"Calibration of comparator {session.comparator}",
@@ -63,7 +67,7 @@ def calibration_document(calibration: Calibration) -> Document:
         highlights=_highlights(calibration),
         sections=[
             Section("variance", "Where the errors come from", [by_variance], by_variance.about),
-            Section("pictures", "Pictures", _pictures(calibration)),
+            Section("pictures", "Pictures", [Layers("picture-layers", drawings)]),
             Section.of(linear(own.correction, own.covariance, own.degrees_of_freedom)),
             Section("polynomials", "Polynomials", polynomials, POLYNOMIALS),
             Section.of(of_cases),
@@ -110,14 +114,6 @@ def _joint(joint: JointFit) -> list[Part]:
         Facts("Joint adjustment", facts),
         linear(joint.correction, joint.covariance, freedom, "joint_parameters"),
     ]
-
-
-def _pictures(calibration: Calibration) -> list[Part]:
-    layers = [
-        Drawing(f"picture-{name}", name.replace("-", " ").capitalize(), "", sketch)
-        for name, sketch in plotters(calibration).items()
-    ]
-    return [Layers("picture-layers", layers)]
 
 
 def _members(calibration: Calibration) -> dict[str, Any]:

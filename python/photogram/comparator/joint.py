@@ -111,7 +111,7 @@ def adjust_jointly(
             random = problem.random()
         for plate in grid:
             if weights.grid_um[plate] is None:
-                grid[plate] *= math.sqrt(max(problem.grid_ratio(plate, grid[plate]), 0.01))
+                grid[plate] *= math.sqrt(max(problem.grid_test(plate, grid[plate])[0], 0.01))
                 grid[plate] = max(grid[plate], LEAST_UM)
         changes = [abs(random - before), *(abs(grid[plate] - grid_before[plate]) for plate in grid)]
         if max(changes) <= SETTLED * max(before, LEAST_UM):
@@ -198,27 +198,20 @@ class _Problem:
         variance = ratio * float(self.variance.mean()) - float(self._pointing().mean())
         return math.sqrt(max(variance, LEAST_UM**2))
 
-    def grid_ratio(self, plate: int, sigma_um: float) -> float:
-        """Return the weighted squares of plate corrections over their redundancy."""
-        squares, redundancy = self._grid_squares(plate, sigma_um)
-        return squares / float(redundancy.sum()) if redundancy.sum() > 1e-9 else 1.0
+    def grid_test(self, plate: int, sigma_um: float) -> tuple[float, GlobalTest | None]:
+        """Return the weighted squares of plate corrections over their redundancy, and their test.
 
-    def _grid_test(self, plate: int, sigma_um: float) -> GlobalTest | None:
-        """Test the corrections of a plate against their standard deviation.
-
-        Their weighted squares are nearly c times chi-square with g degrees of freedom (Satterthwaite). The
-        same mean and variance give c = sum r^2 / sum r, g = sum r / c.
+        The squares are nearly c times chi-square with g degrees of freedom (Satterthwaite). The same mean and
+        variance give c = sum r^2 / sum r, g = sum r / c.
         """
-        squares, redundancy = self._grid_squares(plate, sigma_um)
-        if redundancy.sum() <= 1e-9:
-            return None
-        part = float((redundancy**2).sum() / redundancy.sum())
-        return global_test(squares / part, float(redundancy.sum()) / part)
-
-    def _grid_squares(self, plate: int, sigma_um: float) -> tuple[float, Floats]:
         rows = self.plate_of == plate
         corrections = self.solution.grid_xy[rows] - self.grid_xy[rows]
-        return float((corrections**2).sum()) / sigma_um**2, self.solution.grid_redundancy[rows]
+        redundancy = self.solution.grid_redundancy[rows]
+        squares, freedom = float((corrections**2).sum()) / sigma_um**2, float(redundancy.sum())
+        if freedom <= 1e-9:
+            return 1.0, None
+        part = float((redundancy**2).sum()) / freedom
+        return squares / freedom, global_test(squares / part, freedom / part)
 
     def fit(self, random: float, grid: Mapping[int, float]) -> JointFit:
         """Return the last solution with its standard deviations."""
@@ -262,12 +255,13 @@ class _Problem:
 
     def _plate(self, plate: int, sigma_um: float, scale: float) -> JointPlate:
         rows, estimated = self.plate_of == plate, self.weights.grid_um[plate] is None
+        ratio, test = self.grid_test(plate, sigma_um) if sigma_um > 0 else (None, None)
         return JointPlate(
             points=self.points_of[plate],
             corrections_um=np.asarray(self.solution.grid_xy[rows] - self.grid_xy[rows]),
             covariance_um2=scale * self.solution.grid_cofactors[rows],
             sigma_um=sigma_um,
             estimated=estimated,
-            variance_ratio=self.grid_ratio(plate, sigma_um) if sigma_um > 0 else None,
-            test=self._grid_test(plate, sigma_um) if sigma_um > 0 and not estimated else None,
+            variance_ratio=ratio,
+            test=None if estimated else test,
         )

@@ -93,7 +93,11 @@ class Reduction:
             right=np.empty((len(everywhere), 2, 0)),
         )
         frame = Frame.of(everywhere)
-        linear = _orthonormal(reduction.without_rigid(_linear(frame.arguments(everywhere))))
+        arguments = frame.arguments(everywhere)
+        # Columns of the scales and of the lack of orthogonality.
+        scales = np.zeros((len(arguments), 2, 3))
+        scales[:, 0, 0], scales[:, 1, 1], scales[:, 0, 2] = arguments[:, 0], arguments[:, 1], arguments[:, 1]
+        linear = np.linalg.qr(reduction.without_rigid(scales).reshape(-1, 3))[0].reshape(scales.shape)
         if isinstance(stage, CombinedLinear):
             return cls(reduction.starts, reduction.rigid, linear, linear)
         functions = np.linalg.qr(design(frame, everywhere))[0]
@@ -185,15 +189,3 @@ def _rigid(xy_um: Floats) -> Floats:
     x, y = (xy_um - xy_um.mean(axis=0)).T / np.linalg.norm(xy_um - xy_um.mean(axis=0))
     even, zero = np.full_like(x, 1 / np.sqrt(len(x))), np.zeros_like(x)
     return np.stack([np.column_stack([even, zero, -y]), np.column_stack([zero, even, x])], axis=1)
-
-
-def _linear(arguments: Floats) -> Floats:
-    """Return the columns of scales and lack of orthogonality, (n, 2, 3)."""
-    columns = np.zeros((len(arguments), 2, 3))
-    columns[:, 0, 0], columns[:, 1, 1], columns[:, 0, 2] = arguments[:, 0], arguments[:, 1], arguments[:, 1]
-    return columns
-
-
-def _orthonormal(columns: Floats) -> Floats:
-    q: Floats = np.linalg.qr(columns.reshape(-1, columns.shape[2]))[0]
-    return q.reshape(columns.shape)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,6 @@ from photogram.formats.read_options import ReadOptions
 from photogram.formats.reduced_coordinates import (
     HOLDS,
     ReducedBuilder,
-    ReducedImages,
     by_photo,
     given_control,
     lost_of_reduced,
@@ -111,22 +110,17 @@ def write(project: Project) -> Mapping[str, bytes]:
         lines += [f"{words[point]} {x!r} {y!r}" for point, x, y in own]
         lines.append(END)
     files = {IMAGES: ("\n".join(lines) + "\n").encode()}
-    if reduced.posed.any():
-        files[ORIENTATION] = "".join(_oriented(project, reduced, words, owners)).encode()
+    if len(rows := np.flatnonzero(reduced.posed)):
+        angles = Attitudes(reduced.matrices[rows]).values("omega_phi_kappa") * (200 / np.pi)
+        lines = []
+        for row, own in zip(rows.tolist(), angles.tolist(), strict=True):
+            numbers = " ".join(map(repr, [*block.photo_positions[row].tolist(), *own]))
+            lines.append(f"ORIA {words[block.photo_ids[row]]} {owners[row]} {numbers}\n")
+        files[ORIENTATION] = "".join(lines).encode()
     files[CAMERAS] = csv_text({"camera": [words[name] for name in reduced.names], "c": reduced.distances})
     if table := control_table(project):
         files["control.csv"] = csv_text({**table, "point": [words[name] for name in table["point"]]})
     return files
-
-
-def _oriented(
-    project: Project, reduced: ReducedImages, words: Mapping[str, str], owners: Sequence[str]
-) -> Iterator[str]:
-    rows = np.flatnonzero(reduced.posed)
-    angles = Attitudes(reduced.matrices[rows]).values("omega_phi_kappa") * (200 / np.pi)
-    for row, own in zip(rows.tolist(), angles.tolist(), strict=True):
-        numbers = [*project.block.photo_positions[row].tolist(), *own]
-        yield f"ORIA {words[project.block.photo_ids[row]]} {owners[row]} {' '.join(map(repr, numbers))}\n"
 
 
 FORMAT = Format(

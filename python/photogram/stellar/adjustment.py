@@ -68,7 +68,10 @@ def calibrate(
     stages: tuple[Stage, ...] = ()
     if options.minimum_stars:
         smallest, limit = _minimum_problem(problem), options.max_iterations_minimum
-        solved = iterate(smallest, initial, _free_minimum(problem), solution="minimum", limit=limit)
+        estimated = np.zeros(len(initial), bool)
+        estimated[6:14] = ~problem.fixed[6:14]
+        estimated[INDEX["cy"]] &= not options.common_scale
+        solved = iterate(smallest, initial, estimated, solution="minimum", limit=limit)
         stages = (Stage.of(smallest, solved),)
         initial = solved.parameters.copy()
         initial[0:3] = initial[3:6] = initial[6:9]
@@ -146,14 +149,6 @@ def free_parameters(problem: Problem) -> Bools:
     if problem.options.common_scale:
         free[INDEX["cy"]] = False
     free[22:] = False
-    return free
-
-
-def _free_minimum(problem: Problem) -> Bools:
-    free = np.zeros(len(problem.initial), bool)
-    free[6:14] = ~problem.fixed[6:14]
-    if problem.options.common_scale:
-        free[INDEX["cy"]] = False
     return free
 
 

@@ -290,7 +290,10 @@ def _weights(cards: Cards, count: int) -> Floats:
     if count >= _FULL:
         for first, end in [(0, 22), (22, 26)] if count > _FULL else [(0, 22)]:
             for row in range(first, end):
-                weights[row, row:end] = _row(cards, end - row)
+                values = list[float]()
+                while len(values) < end - row:
+                    values += cards.take("card 19 (weights of parameters)").reals(1, 12, 6)
+                weights[row, row:end] = values[: end - row]
     else:
         for _ in range(count):
             card = cards.take("card 19 (weights of parameters)")
@@ -302,13 +305,6 @@ def _weights(cards: Cards, count: int) -> Floats:
                     raise card.error(phrase("stars.no-weight", row=row, column=column))
                 weights[min(row, column) - 1, max(row, column) - 1] = card.real(start + 4, start + 15)
     return np.triu(weights) + np.triu(weights, 1).T
-
-
-def _row(cards: Cards, count: int) -> list[float]:
-    values: list[float] = []
-    while len(values) < count:
-        values += cards.take("card 19 (weights of parameters)").reals(1, 12, 6)
-    return values[:count]
 
 
 def _common_weight(cards: Cards, name: str) -> Floats:

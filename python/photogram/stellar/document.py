@@ -61,10 +61,15 @@ def plate_document(result: Result) -> Document:
         Section.of(tables.movement(result)),
         remarks_section(result.messages),
     ]
-    histograms = tables.histograms(result) if problem.options.histogram else []
+    options = problem.options
+    histograms = tables.histograms(result) if options.histogram else []
+    forms = [
+        "SCALE AFTER DISTORTION" if options.distortion_first else "SCALE BEFORE DISTORTION",
+        "ITERATION AS PUBLISHED" if options.as_published else "STRICT ITERATION",
+    ]
     details = [
         Section("problem", "Problem", [Facts("Problem", _problem(result))]),
-        Section("descriptors", "Problem descriptors", [Remarks([*descriptors(result), *_forms(result)])]),
+        Section("descriptors", "Problem descriptors", [Remarks([*descriptors(result), *forms])]),
         *map(Section.of, tables.stages(result)),
         Section("residuals", "Residuals", [Facts("Residuals", _residuals(result))]),
         *of_solution.values(),
@@ -202,6 +207,11 @@ def _much(result: Result) -> list[Fact]:
 def _good(result: Result) -> list[Fact]:
     sums = result.solved.sums
     squares = zip(("plate", "stars", "parameters", "total"), (*sums, sum(sums)), strict=True)
+    pair, freedom, scales = [INDEX["cx"], INDEX["cy"]], result.degrees_of_freedom, about("scales.none")
+    if result.solved.free[pair].all() and freedom:
+        f, p = equal(result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], freedom)
+        code = f"scales.{'refused' if p < LEVEL else 'kept'}"
+        scales = about(code, f=f, freedom=freedom, p=p, level=LEVEL)
     return [
         Fact.of("Mean error of unit weight, computed", 1e6 * result.computed_mean_error, "µm", figures=9),
         Fact.of("Mean error of unit weight, in use", 1e6 * result.mean_error, "µm", _UNIT, figures=9),
@@ -209,7 +219,7 @@ def _good(result: Result) -> list[Fact]:
             Fact.of(f"Weighted sum of squares, {name}", 1e12 * square, "µm²", figures=9)
             for name, square in squares
         ),
-        Fact("Test of cx = cy", _scale_test(result)),
+        Fact("Test of cx = cy", scales),
     ]
 
 
@@ -236,14 +246,6 @@ def _prior(result: Result, name: str, weights: Floats, size: float, unit: str) -
     if not len(weights) or not have_common_weight(weights):
         return Fact(name, "individual weights" if len(weights) else "-")
     return Fact.of(name, result.mean_error / np.sqrt(np.diag(weights[0])) / size, unit, decimals=4)
-
-
-def _scale_test(result: Result) -> str:
-    pair, freedom = [INDEX["cx"], INDEX["cy"]], result.degrees_of_freedom
-    if not (result.solved.free[pair].all() and freedom):
-        return about("scales.none")
-    f, p = equal(result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], freedom)
-    return about(f"scales.{'refused' if p < LEVEL else 'kept'}", f=f, freedom=freedom, p=p, level=LEVEL)
 
 
 def _derived(result: Result) -> list[Fact]:
@@ -314,12 +316,4 @@ def _station(name: str, site: Site) -> list[Fact]:
         Fact(name, f"{site.number} {site.name}".strip() or "-"),
         Fact(f"{name}, latitude", tables.degrees(site.latitude)),
         Fact(f"{name}, longitude west", tables.degrees(site.longitude_west)),
-    ]
-
-
-def _forms(result: Result) -> list[str]:
-    o = result.problem.options
-    return [
-        "SCALE AFTER DISTORTION" if o.distortion_first else "SCALE BEFORE DISTORTION",
-        "ITERATION AS PUBLISHED" if o.as_published else "STRICT ITERATION",
     ]

@@ -22,9 +22,10 @@ _MAX_COLOURS = len(COLOURS)  # Further exposures have the same colour
 def sketches(result: CalibratedNight) -> dict[str, Plot]:
     """Return all plots by name."""
     x, y = result.calibration.residuals.T
+    arrows, bar = vectors(result.calibration.xy, result.calibration.residuals, _groups(result), "px")
     return {
         "stars": _stars(result),
-        "residuals": _residuals(result),
+        "residuals": _frame(result, "Residuals (measured minus computed)", arrows, [bar]),
         "histogram": bells({"x": x, "y": y, "x and y": np.concatenate([x, y])}, "px"),
         "distortion": _of_brown(result) if result.camera.lens == "brown" else _of_angle(result),
     }
@@ -62,12 +63,6 @@ def _stars(result: CalibratedNight) -> Plot:
         for k, (label, chosen) in enumerate(_groups(result))
     ]
     return _frame(result, "Stars in the frame, and the principal point", marks)
-
-
-def _residuals(result: CalibratedNight) -> Plot:
-    found = result.calibration
-    arrows, bar = vectors(found.xy, found.residuals, _groups(result), "px")
-    return _frame(result, "Residuals (measured minus computed)", arrows, [bar])
 
 
 def _of_angle(result: CalibratedNight) -> Plot:
@@ -116,10 +111,8 @@ def _of_brown(result: CalibratedNight) -> Plot:
         curves(errors, across, "px", "Its mean error"),
     ]
     used = float(np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max())
-    outermost = [replace(panel, marks=[_outermost(used, panel), *panel.marks]) for panel in panels]
-    return Plot(11.0, 4.4, outermost, 2)
-
-
-def _outermost(used: float, panel: Panel) -> Line:
-    places = np.column_stack([np.full(2, used), panel.limits[:, 1]])
-    return Line(places, FAINT, 1.0, ":", label="outermost star")
+    for row, panel in enumerate(panels):
+        places = np.column_stack([np.full(2, used), panel.limits[:, 1]])
+        line = Line(places, FAINT, 1.0, ":", label="outermost star")
+        panels[row] = replace(panel, marks=[line, *panel.marks])
+    return Plot(11.0, 4.4, panels, 2)

@@ -252,6 +252,10 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
     estimated = int(np.isfinite(found.star_residuals[:, 0]).sum())
     measured = sum(len(exposure.xy) for exposure in result.exposures)
     rms = np.sqrt(np.mean(found.residuals**2, axis=0))
+    tested = about("global-test.none")
+    if (test := result.test) is not None:
+        verdict, (low, high) = "fails" if test.rejected_high or test.rejected_low else "holds", test.limits
+        tested = about(f"global-test.{verdict}", variance=test.variance, low=low, high=high)
     lens = result.camera.lens + (" (fx = fy)" if result.camera.common_scale else "")
     much = [
         Fact("Status", f"{found.status}, {found.iterations} iterations"),
@@ -265,7 +269,7 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
     ]
     good = [
         Fact.of("Mean error of unit weight", found.mean_error, decimals=4),
-        Fact("Global test", _global_test(result)),
+        Fact("Global test", tested),
         Fact.of("Mean error of an image coordinate", found.mean_error * night.pixel_sd, "px", decimals=4),
         Fact.of("rms of residuals in x and y", rms, "px", decimals=4),
         Fact.of(
@@ -288,11 +292,3 @@ def _first_attitudes(night: Night) -> str:
         return "given, and the stars named"
     roll = "" if night.roll_known else ", but for the roll"
     return f"given within {math.degrees(night.attitude_error):g} degrees{roll}"
-
-
-def _global_test(result: CalibratedNight) -> str:
-    test = result.test
-    if test is None:
-        return about("global-test.none")
-    verdict, (low, high) = "fails" if test.rejected_high or test.rejected_low else "holds", test.limits
-    return about(f"global-test.{verdict}", variance=test.variance, low=low, high=high)

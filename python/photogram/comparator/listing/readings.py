@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 COLUMNS = 3  # Readings per line of the input listing
 
 
-# Warnings of the program of 1971
+# Warnings of the program of 1971, which it printed in capitals
 PRINTED = frozenset(f"comparators.{name}" for name in ("special-grid", "legs", "identical", "no-closeout"))
 
 
@@ -48,16 +48,11 @@ def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
     ]
     lines += [f"  {name:<30}{value}" for name, value in settings]
     if calibration.options.pages == "published":
-        return lines + _printed(calibration)
+        printed = [str(message.text).upper() for message in calibration.messages if message.code in PRINTED]
+        return lines + (["", *(f"  {text}" for text in printed)] if printed else [])
     lines += ["", "PROBLEMS"]
     remarks = [line for message in calibration.messages for line in str(message).splitlines()]
     return lines + [f"  {line}" for line in remarks or ["NONE"]]
-
-
-def _printed(calibration: Calibration) -> list[str]:
-    """Return the warnings of the 1971 program in capitals."""
-    remarks = [str(message.text).upper() for message in calibration.messages if message.code in PRINTED]
-    return ["", *(f"  {text}" for text in remarks)] if remarks else []
 
 
 def _grid(grid: Grid, left_handed: bool) -> list[str]:

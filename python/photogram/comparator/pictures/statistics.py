@@ -12,7 +12,6 @@ from photogram.show.sketch.marks import Line, Panel, Polygons, Texts, boxes
 from photogram.show.sketch.plot import Plot
 
 if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
     from photogram.comparator import Calibration
 
 
@@ -20,7 +19,8 @@ def residual_histogram(calibration: Calibration) -> Plot:
     """Draw histograms of the final residuals with normal curves."""
     residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
     limit = float(np.abs(residuals).max()) * 1.1 or 1.0
-    edges = np.linspace(-limit, limit, _bins(len(residuals)) + 1)
+    bins = 2 * round(math.sqrt(len(residuals)) * 0.75) + 1  # Odd
+    edges = np.linspace(-limit, limit, bins + 1)
     counts = [np.histogram(own, edges)[0] for own in residuals.T]
     sigmas = [math.sqrt(float((own**2).mean())) or 1.0 for own in residuals.T]
     scale = len(residuals) * (edges[1] - edges[0]) / math.sqrt(2 * math.pi)
@@ -42,11 +42,6 @@ def residual_histogram(calibration: Calibration) -> Plot:
     return Plot(10.0, 3.9, panels, 2, title=title)
 
 
-def _bins(count: int) -> int:
-    """Return an odd number of bins that grows with the root of the count."""
-    return 2 * round(math.sqrt(count) * 0.75) + 1
-
-
 def variance_bars(calibration: Calibration) -> Plot:
     """Draw the components of the error as bars of variance."""
     components = calibration.variance.components_um
@@ -57,14 +52,11 @@ def variance_bars(calibration: Calibration) -> Plot:
     shares = 100 * values / total if total else 0 * values
     every = zip(names, shares.tolist(), strict=True)
     texts = [f"{components[name]:.3f} µm, {share:.0f} %" for name, share in every]
+    bars = boxes(np.column_stack([0 * values, places - 0.3]), np.column_stack([values, places + 0.3]))
     marks = [
-        Polygons(_bars(values, places), MAIN, 0.75, MAIN, 0.0, 0.0),
+        Polygons(bars, MAIN, 0.75, MAIN, 0.0, 0.0),
         Texts(np.column_stack([values + 0.01 * right, places]), texts, 8.0),
     ]
     title = f"Components of the error: {components['total']:.3f} µm before calibration"
     limits = np.array([[0.0, -0.5], [right, len(names) - 0.5]])
     return Plot(8.0, 2.9, [Panel(limits, marks, title, "variance, µm²", up_names=names)])
-
-
-def _bars(values: Floats, places: Floats) -> Floats:
-    return boxes(np.column_stack([0 * values, places - 0.3]), np.column_stack([values, places + 0.3]))

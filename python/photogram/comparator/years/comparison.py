@@ -140,16 +140,15 @@ def _precision(records: Sequence[RecordedCalibration]) -> tuple[Floats, Floats, 
                 (record.pointing_um[axis], 0.5 / record.pointing_freedom) for record in records
             ]
     if all(record.random_um > LEAST_UM for record in records):
-        rows["random comparator"] = [(record.random_um, _variance(record)) for record in records]
+        rows["random comparator"] = []
+        for record in records:
+            counts = np.concatenate([case.counts for case in record.cases])
+            pointing = float(np.mean(np.square(record.pointing_um)) * (1 / counts).mean())
+            variance = 0.5 / record.freedom * (1 + pointing / record.random_um**2) ** 2
+            rows["random comparator"].append((record.random_um, variance))
     pairs = np.array([*rows.values()]).reshape(-1, len(records), 2)
     logs, variances = np.log(pairs[..., 0]).T, pairs[..., 1].T
     return PERCENT * (logs - logs.mean(axis=0)), PERCENT**2 * variances, tuple(rows)
-
-
-def _variance(record: RecordedCalibration) -> float:
-    counts = np.concatenate([case.counts for case in record.cases])
-    pointing = float(np.mean(np.square(record.pointing_um)) * (1 / counts).mean())
-    return 0.5 / record.freedom * (1 + pointing / record.random_um**2) ** 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
