@@ -38,7 +38,8 @@ class Format:
     recognises
         Function of a path: whether it contains a project of the format. Reads only the start of a file.
     read
-        Function that returns a project. Its only error is `InputError`, with file, record and text.
+        Function that returns a project; None if the format is write-only. Its only error is `InputError`,
+        with file, record and text.
     write
         Function that returns the files of a project by name relative to a directory; None if the format is
         read-only.
@@ -69,7 +70,7 @@ class Format:
     name: str
     title: str
     recognises: Callable[[Path], bool]
-    read: Callable[[Path, ReadOptions], Project]
+    read: Callable[[Path, ReadOptions], Project] | None
     write: Callable[[Project], Mapping[str, bytes]] | None = None
     cannot_hold: Callable[[Project], Sequence[Phrase | str]] = lambda _: ()
     results: Callable[[Project, Result], Mapping[str, bytes]] | None = None

@@ -76,19 +76,13 @@ def _written(name: str, project: Project) -> Mapping[str, bytes]:
     return CAMERA_FORMATS[name](rig_of_project(project))
 
 
-def _unread(path: Path, options: ReadOptions) -> Project:
-    """Reject reading of a format with cameras only."""
-    del options
-    raise InputError(phrase("format.cameras-only"), file=path)
-
-
 FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
     {
         name: Format(
             name=name,
             title=title,
             recognises=lambda _: False,
-            read=_unread,
+            read=None,
             write=partial(_written, name),
             cannot_hold=later("photogram.formats.targets.calibrations", "lost_beside_cameras"),
             pixels=True,
@@ -170,6 +164,7 @@ def read(path: Path, options: ReadOptions | None = None, **changes: Any) -> Proj
                 raise InputError(phrase("format.settings", title=chosen.title))
             if (kinds := [each for each in options.sd if each not in SD]) and chosen.name != "plain":
                 raise InputError(phrase("format.kind", kind=kinds[0], title=chosen.title))
+            assert chosen.read is not None  # Formats of cameras are not among the detected formats
             project = chosen.read(path, options)
             own = getattr(project.details.get("settings"), "photo_files", None)
             if options.photos_dir or options.gnss or own:

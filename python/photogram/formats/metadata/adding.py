@@ -96,7 +96,15 @@ def _with_positions(
     known = located([records[name] for name in photos], crs, sd.get("gnss"), option)
     messages = [*metadata.messages, *remarks_on(known.records)]
     if photos:
-        messages += _told(metadata, known, antenna)
+        positions = told(counts(each.position for each in known.records))
+        sources = counts(each.deviations for each in known.records)
+        specified = sources.pop(WITHOUT, 0)
+        deviations = [told(sources)] * bool(sources) + [f"{specified} of --sd gnss"] * bool(specified)
+        fields = {"n": len(photos), "positions": positions, "deviations": deviations}
+        messages.append(Message.of("photos.observed", metadata.directory, **fields))
+    if flights := {flight for flight in known.flights if flight}:
+        code = "photos.flights" if antenna is None else "photos.flights-antenna"
+        messages.append(Message.of(code, n=len(flights), shift=SHIFT_SD, lever=LEVER_SD))
     lacks = list(project.lacks)
     if lacking:
         lacks.append(Phrase("read.positions", {"n": lacking, "option": option_sd("gnss")}))
@@ -139,23 +147,6 @@ def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) 
             phrase("photos.none", names=strange, known=list(metadata.photos)), file=metadata.directory
         )
     return found
-
-
-def _told(
-    metadata: Metadata, known: Located, antenna: tuple[float, float, float, float] | None
-) -> list[Message]:
-    """Return messages on position observations: sources, and shared parameters."""
-    records = known.records
-    positions = told(counts(each.position for each in records))
-    sources = counts(each.deviations for each in records)
-    specified = sources.pop(WITHOUT, 0)
-    deviations = [told(sources)] * bool(sources) + [f"{specified} of --sd gnss"] * bool(specified)
-    fields = {"n": len(records), "positions": positions, "deviations": deviations}
-    messages = [Message.of("photos.observed", metadata.directory, **fields)]
-    if flights := {flight for flight in known.flights if flight}:
-        code = "photos.flights" if antenna is None else "photos.flights-antenna"
-        messages.append(Message.of(code, n=len(flights), shift=SHIFT_SD, lever=LEVER_SD))
-    return messages
 
 
 def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[Project, Floats, Floats]:

@@ -363,7 +363,19 @@ def read_gnss_file(
     found = _Sources(path, tables=[path])
     first = next((place.text or "" for place in filled_lines(path)), "").strip()
     if path.suffix.lower() == EXPOSURES:
-        said = _of_exposures(path, photos, found.messages, antenna=mrk_antenna)
+        exposures = read_exposures(path, antenna=mrk_antenna)
+        if not exposures:
+            raise InputError(phrase("format.missing", what="exposures"), file=path)
+        names: dict[int, str] = {}
+        for photo in photos:
+            number = number_of(PurePosixPath(photo).stem)
+            if number is not None and number in exposures and names.setdefault(number, photo) != photo:
+                fields = {"number": number, "names": [names[number], photo]}
+                raise InputError(phrase("photos.exposure", **fields), file=path)
+        if not names:
+            raise InputError(phrase("photos.numbers", numbers=list(exposures), names=list(photos)), file=path)
+        found.messages += _unused(path, len(exposures), len(names))
+        said: Mapping[str, Said] = {photo: exposures[number] for number, photo in names.items()}
     elif is_events(path):
         said = _of_events(path, photos, directory)
     elif first.upper().startswith(SYSTEMS):
@@ -374,26 +386,6 @@ def read_gnss_file(
         raise InputError(phrase("photos.positions"), file=path)
     found.said, found.flights = {name: [one] for name, one in said.items()}, dict.fromkeys(said, path.stem)
     return found.metadata()
-
-
-def _of_exposures(
-    path: Path, photos: Sequence[str], messages: list[Message], *, antenna: bool
-) -> Mapping[str, Said]:
-    """Return exposures of an .MRK file by photo, by number in its name."""
-    exposures = read_exposures(path, antenna=antenna)
-    if not exposures:
-        raise InputError(phrase("format.missing", what="exposures"), file=path)
-    names: dict[int, str] = {}
-    for photo in photos:
-        number = number_of(PurePosixPath(photo).stem)
-        if number is not None and number in exposures and names.setdefault(number, photo) != photo:
-            raise InputError(
-                phrase("photos.exposure", number=number, names=[names[number], photo]), file=path
-            )
-    if not names:
-        raise InputError(phrase("photos.numbers", numbers=list(exposures), names=list(photos)), file=path)
-    messages += _unused(path, len(exposures), len(names))
-    return {photo: exposures[number] for number, photo in names.items()}
 
 
 def _of_events(path: Path, photos: Sequence[str], directory: Path | None) -> Mapping[str, Said]:
