@@ -7,7 +7,6 @@ import io
 
 import numpy as np
 
-from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.comparator.correction import Correction
 from photogram.comparator.csvfile import Table
@@ -33,10 +32,11 @@ def correct_table(
     inside the calibrated range. With `invert`, readings are computed from corrected coordinates.
     """
     xy_um = table.xy_um
-    for row in np.flatnonzero(~(np.abs(xy_um).max(axis=1, initial=0.0) <= LARGEST_UM))[:1].tolist():
-        with at_place(table.records.place(row)):
-            require(not np.isnan(xy_um[row]).any(), "x, y", "empty")
-            require(False, "x, y", "most", value=float(np.abs(xy_um[row]).max()), high=LARGEST_UM)
+    sizes = np.abs(xy_um).max(axis=1, initial=0.0)
+    for row in np.flatnonzero(~(sizes <= LARGEST_UM))[:1].tolist():
+        code = "error.empty" if np.isnan(sizes[row]) else "error.most"
+        with at_place(table.records.place(row), "x, y"):
+            raise InputError(phrase(code, value=float(sizes[row]), high=LARGEST_UM))
     if not len(xy_um):
         raise InputError(phrase("error.empty-file", content="measurements"), file=table.records.path)
     if invert:
