@@ -32,9 +32,7 @@ def test_an_exposure_held_out_is_what_an_adjustment_without_it_says(night, resul
     exposures = [
         replace(e, attitude=a) for e, a in zip(result.exposures, result.calibration.attitudes, strict=True)
     ]
-    tests = held_out(
-        exposures, result.calibration, night.site, night.catalogue, pixel_sd=0.1, earth=night.earth
-    )
+    tests = held_out(exposures, result.calibration, replace(night, pixel_sd=0.1))
     found = result.calibration
     total = found.mean_error**2 * found.degrees_of_freedom
     for number, test in enumerate(tests):

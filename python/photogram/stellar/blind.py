@@ -11,17 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.stellar.places import Earth, station_attitude
-from photogram.stellar.sky import Site
+from photogram.stellar.places import station_attitude
 from photogram.stellar.sky_calibration import Exposure
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram.stellar import Night
 
 ATTITUDE_ERROR, FIELD_ERROR = math.radians(1.5), 0.05
 """Largest errors of attitudes (radians) and of the principal distance (relative)."""
@@ -40,16 +42,10 @@ class Located:
     reason: Phrase | None = None  # Reason of a failure
 
 
-def locate(
-    exposures: Sequence[Exposure],
-    site: Site,
-    frame: tuple[float, float],
-    fields: tuple[float, float],
-    earth: Earth | None = None,
-) -> list[Located]:
+def locate(exposures: Sequence[Exposure], night: Night, fields: tuple[float, float]) -> list[Located]:
     """Locate exposures, whose images are sorted by brightness; attitudes are not used.
 
-    The frame is in pixels. `fields` are the smallest and largest horizontal field of view, radians.
+    `fields` are the smallest and largest horizontal field of view, radians.
 
     InputError: if fields of view are out of range. ModuleNotFoundError: if tetra3rs is not installed.
     """
@@ -61,7 +57,7 @@ def locate(
     tried = [low * (high / low) ** ((k + 0.5) / count) for k in range(count)]
     directions = []
     for exposure in exposures:
-        located = _located(base, exposure, site, frame, tried, earth or Earth())
+        located = _located(base, exposure, night, tried)
         if located.reason is None:
             # All exposures have one camera: its field of view is tested first.
             tried.sort(key=lambda field: abs(math.log(math.radians(field) / located.field)))
@@ -81,15 +77,9 @@ def _database(low: float, high: float) -> Any:
     )
 
 
-def _located(
-    base: Any,
-    exposure: Exposure,
-    site: Site,
-    frame: tuple[float, float],
-    fields: Sequence[float],
-    earth: Earth,
-) -> Located:
-    xy = exposure.xy[:_MAX_IMAGES] - 0.5 * np.array(frame)
+def _located(base: Any, exposure: Exposure, night: Night, fields: Sequence[float]) -> Located:
+    width, height = night.frame
+    xy = exposure.xy[:_MAX_IMAGES] - 0.5 * np.array(night.frame)
     # The weights decrease in the order of brightness.
     images = np.column_stack([xy, np.arange(len(xy), 0, -1.0)])
     mirrored = False
@@ -98,8 +88,8 @@ def _located(
             images,
             fov_estimate_deg=field,
             fov_max_error_deg=field * (math.sqrt(_STEP) - 1),
-            image_width=round(frame[0]),
-            image_height=round(frame[1]),
+            image_width=round(width),
+            image_height=round(height),
             solve_timeout_ms=_TIMEOUT_MS,
         )
         if not solved:
@@ -108,6 +98,6 @@ def _located(
             mirrored = True
             continue
         matrix = np.asarray(solved.rotation_matrix_icrs_to_camera, float)
-        attitude = station_attitude(matrix, site, exposure.utc, earth)
+        attitude = station_attitude(matrix, night.site, exposure.utc, night.earth)
         return Located(attitude, math.radians(solved.fov_deg))
     return Located(np.full(3, math.nan), math.nan, phrase("stars.mirrored" if mirrored else "stars.nowhere"))

@@ -16,17 +16,18 @@ against the mean of the others it has 3.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.odds import binomial_tail
-from photogram.stellar.places import Earth
-from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, partials
+
+if TYPE_CHECKING:
+    from photogram.stellar import Night
 
 LEVEL = 0.05  # Probability that any exposure of a correct night fails a test of all exposures
 
@@ -119,23 +120,15 @@ class HeldOut:
         return self.factor > NOTABLE and self.probability < LEVEL / exposures
 
 
-def held_out(
-    exposures: Sequence[Exposure],
-    found: SkyCalibration,
-    site: Site,
-    catalogue: Catalogue,
-    *,
-    pixel_sd: float,
-    earth: Earth,
-) -> list[HeldOut]:
+def held_out(exposures: Sequence[Exposure], found: SkyCalibration, night: Night) -> list[HeldOut]:
     """Test each exposure, with adjusted attitudes, against the camera of the others."""
     sd = np.sqrt(np.diag(found.camera.covariance))
     free = np.flatnonzero(sd > 0)
     unit, freedom = found.mean_error, found.degrees_of_freedom
     if not (freedom > 0 and unit > 0 and len(free)):
         return [HeldOut(np.nan, 1.0)] * len(exposures)
-    scale = sd[free] / unit
-    attitude, camera = partials(exposures, found.camera, site, catalogue, earth)
+    scale, pixel_sd = sd[free] / unit, night.pixel_sd
+    attitude, camera = partials(exposures, found.camera, night.site, night.catalogue, night.earth)
     camera = camera[:, :, free] * (scale / pixel_sd)
     attitude, residuals = attitude / pixel_sd, found.residuals / pixel_sd
     cofactors = found.camera.covariance[np.ix_(free, free)] / unit**2 / np.outer(scale, scale)

@@ -11,11 +11,9 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
-from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import FEWEST, STRETCH, Match, Search, match
 from photogram.stellar.odds import ACCEPTED, DOUBTFUL, expected_false, log_odds, star_probabilities
-from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.sky import Site
+from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.sky_calibration import Exposure, project_sky, stars_near
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase, phrase
@@ -56,9 +54,7 @@ def has_named_stars(exposure: Exposure) -> bool:
     return exposure.stars is not None and int((exposure.stars >= 0).sum()) >= STARS_OF_AN_ATTITUDE
 
 
-def attitude_of_stars(
-    exposure: Exposure, camera: SkyCamera, site: Site, catalogue: Catalogue, earth: Earth
-) -> tuple[Floats, float]:
+def attitude_of_stars(exposure: Exposure, camera: SkyCamera, night: Night) -> tuple[Floats, float]:
     """Return the attitude from named stars, and the sum of squared misfits.
 
     Misfits are between unit directions of images under the camera and of their stars.
@@ -66,9 +62,9 @@ def attitude_of_stars(
     stars = exposure.stars
     assert stars is not None
     has = np.flatnonzero(stars >= 0)
-    place = earth.site_of_date(site)
-    places = apparent_places(catalogue.take(stars[has]), exposure.utc, place.effects)
-    time = sidereal_time(place, exposure.utc, earth.dut1)
+    place = night.earth.site_of_date(night.site)
+    places = apparent_places(night.catalogue.take(stars[has]), exposure.utc, place.effects)
+    time = sidereal_time(place, exposure.utc, night.earth.dut1)
     rays, seen = camera.rays(exposure.xy[has]), local_directions(place.standard_coordinates(places, time))
     attitude = turned_to(rays, seen)
     return attitude, float(np.nansum((rays - seen @ _photocore.pointing_matrix(attitude).T) ** 2))

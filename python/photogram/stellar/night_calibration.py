@@ -87,11 +87,7 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
 def _located(night: Night, fields: tuple[float, float]) -> Night:
     """Return the night with attitudes and field of view located on the whole sky."""
     unknown = [index for index, exposure in enumerate(night.exposures) if exposure.stars is None]
-    found = (
-        locate([night.exposures[index] for index in unknown], night.site, night.frame, fields, night.earth)
-        if unknown
-        else []
-    )
+    found = locate([night.exposures[index] for index in unknown], night, fields) if unknown else []
     reasons = {index: place.reason for index, place in zip(unknown, found, strict=True) if place.reason}
     seen = [place.field for place in found if place.reason is None] or _field_of_stars(night, fields)
     if not seen:
@@ -118,20 +114,14 @@ def _field_of_stars(night: Night, fields: tuple[float, float]) -> list[float]:
 
     def misfit(field: float) -> float:
         camera = SkyCamera.of_field(*night.frame, field)
-        return sum(
-            attitude_of_stars(exposure, camera, night.site, night.catalogue, night.earth)[1]
-            for exposure in named
-        )
+        return sum(attitude_of_stars(exposure, camera, night)[1] for exposure in named)
 
     return [min(np.geomspace(*fields, _MAX_FIELDS).tolist(), key=misfit)] if named else []
 
 
 def _directed(night: Night) -> Night:
     exposures = [
-        replace(
-            exposure,
-            attitude=attitude_of_stars(exposure, night.camera, night.site, night.catalogue, night.earth)[0],
-        )
+        replace(exposure, attitude=attitude_of_stars(exposure, night.camera, night)[0])
         if has_named_stars(exposure) and np.isnan(exposure.attitude).any()
         else exposure
         for exposure in night.exposures

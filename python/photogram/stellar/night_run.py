@@ -181,14 +181,7 @@ class Run:
         images, matched = np.array([(len(seen.kept), seen.count) for seen in unnamed]).reshape(-1, 2).T
         if poor := fewer_stars(images, matched):
             return unnamed[poor[0]].index, _counted("stars.few-matches", unnamed[poor[0]])
-        tests = held_out(
-            self.exposures(),
-            self.found,
-            night.site,
-            night.catalogue,
-            pixel_sd=night.pixel_sd,
-            earth=night.earth,
-        )
+        tests = held_out(self.exposures(), self.found, night)
         unlike = [(test.factor, k) for k, test in enumerate(tests) if test.unlike(len(tests))]
         if not unlike:
             return None
