@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.distributions import (
     LEVEL,
@@ -47,20 +47,28 @@ class Tested:
     )
 
     def at(self, place: tuple[int, ...]) -> Tested:
-        shape = np.shape(self.values)
+        marks = np.zeros(np.shape(self.values), dtype=bool)
+        marks[place] = True
+        return self._some(marks)
+
+    def _some(self, marks: Bools) -> Tested:
+        """Return the marked tests as a vector."""
         dimension, second = (
-            np.broadcast_to(np.asarray(each), shape) for each in (self.dimension, self.second)
+            np.broadcast_to(np.asarray(each), marks.shape)[marks] for each in (self.dimension, self.second)
         )
-        return replace(
-            self,
-            values=np.array([self.values[place]]),
-            dimension=np.array([dimension[place]]),
-            second=np.array([second[place]]),
-        )
+        return replace(self, values=self.values[marks], dimension=dimension, second=second)
 
     def largest(self) -> tuple[int, ...] | None:
         """Return the first index of the least probable value; None without values."""
-        sizes = np.abs(self.values) if self._alike else -self.log_probability()
+        if self._alike:
+            sizes = np.abs(self.values)
+        else:
+            # Of chi-square values with the same degrees of freedom, the largest is the least probable.
+            marks = ~np.isnan(self.values)
+            if self.statistic == "T":
+                marks = self._above(lambda _, values: float(np.nextafter(values.max(), -math.inf)))
+            sizes = np.full(marks.shape, math.nan)
+            sizes[marks] = -self._some(marks).log_probability()
         sizes = np.where(np.isnan(sizes), -math.inf, sizes)
         if not sizes.size or sizes.max() == -math.inf:
             return None
@@ -68,19 +76,32 @@ class Tested:
 
     def beyond(self, level: float, factor: float = 1.0) -> list[tuple[float, tuple[int, ...]]]:
         """Return log p-values below the level with indices; see :meth:`log_probability`."""
+        # Only values beyond the limit of their degrees of freedom need a probability.
         if self._alike:
-            # All have one limit: only values beyond it need a probability.
             dimension, second = float(np.asarray(self.dimension)), float(np.asarray(self.second))
             limit = math.sqrt(critical_fisher(level, dimension, second) * dimension)
-            scale = factor if math.isinf(second) else 1.0
-            places = np.argwhere(np.abs(self.values) > limit * scale)
-            chosen = replace(self, values=self.values[tuple(places.T)])
-            log_p = chosen.log_probability(factor)
+            marks = np.abs(self.values) > limit * (factor if math.isinf(second) else 1.0)
+        elif self.statistic == "T":
+            marks = self._above(lambda dimension, _: critical_chi_square(level, dimension) * factor**2)
         else:
-            every = self.log_probability(factor)
-            places = np.argwhere(every < math.log(level))
-            log_p = every[tuple(places.T)]
-        return [(float(each), tuple(place)) for each, place in zip(log_p, places.tolist(), strict=True)]
+            marks = self.log_probability(factor) < math.log(level)
+        places = np.argwhere(marks).tolist()
+        log_p = self._some(marks).log_probability(factor).tolist()
+        return [(each, tuple(place)) for each, place in zip(log_p, places, strict=True)]
+
+    def _above(self, limit: Callable[[float, Floats], float]) -> Bools:
+        """Mark values of T above a limit, which depends on the degrees of freedom and all values of these."""
+        found = np.zeros(np.shape(self.values), dtype=bool)
+        for dimension, marks in self._by_dimension:
+            found |= marks & (self.values > limit(dimension, self.values[marks]))
+        return found
+
+    @cached_property
+    def _by_dimension(self) -> list[tuple[float, Bools]]:
+        """The degrees of freedom of T, each with a mask of its values."""
+        tested = ~np.isnan(self.values)
+        own = np.broadcast_to(np.asarray(self.dimension, dtype=np.float64), tested.shape)
+        return [(each, tested & (own == each)) for each in np.unique(own[tested]).tolist() if each > 0]
 
     @property
     def _alike(self) -> bool:
