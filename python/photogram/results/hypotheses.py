@@ -84,6 +84,11 @@ class Effect:
     at: tuple[int, int] | None  # point and coordinate of this change
     change: float  # largest change in the linear unit
 
+    @property
+    def rank(self) -> float:
+        """Size of the effect for sorting: rounding does not define an order of equal effects."""
+        return round(math.log1p(self.ratio), 7)
+
 
 @dataclass(frozen=True, eq=False)
 class Hypotheses:
@@ -173,12 +178,12 @@ class Hypotheses:
     def harmful(self) -> list[int]:
         """Rows whose undetected errors move too many points, the worst first."""
         rows = [row for row in self.effects if self._is_harmful(row)]
-        return sorted(rows, key=lambda row: (not np.isnan(self.mdb[row, 0]), -self.effects[row].ratio))
+        return sorted(rows, key=lambda row: (not np.isnan(self.mdb[row, 0]), -self.effects[row].rank))
 
     @property
     def worst(self) -> int | None:
         """The first of these rows, else the row with the largest effect, errors of the datum last."""
-        rows = sorted(self.effects, key=lambda row: (self.code[row] in DATUM, -self.effects[row].ratio))
+        rows = sorted(self.effects, key=lambda row: (self.code[row] in DATUM, -self.effects[row].rank))
         return next(iter([*self.harmful, *rows]), None)
 
     def unchecked(self) -> list[Phrase]:
@@ -319,9 +324,9 @@ class Hypotheses:
     @property
     def effective(self) -> Indices:
         """Rows of the largest effects of undetected errors, for documents."""
-        ratios = np.zeros(len(self.code))
-        ratios[[*self.effects]] = [effect.ratio for effect in self.effects.values()]
-        return np.argsort(-ratios, kind="stable")[:LISTED]
+        ranks = np.zeros(len(self.code))
+        ranks[[*self.effects]] = [effect.rank for effect in self.effects.values()]
+        return np.argsort(-ranks, kind="stable")[:LISTED]
 
     def tests(self, rows: Indices | None = None) -> Table:
         """Return the declared table of the tests of all hypotheses, or of some."""
