@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,8 @@ HARMFUL = {
 """Reasons of the core for excluding points that would distort others, and messages on their images."""
 
 
+IN_PARALLEL = range(5_000, 1_000_000)
+"""Numbers of image observations with work on two threads: fewer need less time, more need more memory."""
 DISTANCES = frozenset({"c", "f", "fx", "fy"})  # Names of principal distances
 CHANGED = 2.3  # Factor of standard deviations that differences of three check points detect
 UNKNOWN = 1 / 3  # Largest standard deviation of a determined principal distance, relative to it
@@ -126,8 +129,21 @@ def block_findings(result: Result) -> Findings:
     intersected = not result.photo_given_sd.any()
     # Data snooping requires the complete block and adjusted photos.
     tests_more = result.WHOLE and not intersected
-    fixed, systematic = ([], []) if intersected else (held_tested(result), block_patterns(result))
-    found = network_findings(result, fixed, systematic)
+
+    def residual_findings() -> tuple[Sequence[Systematic], list[Phrase]]:
+        test = _robust_test(result) if result.loss else result.global_test
+        copies = duplicates(result.block, test.factor if test else 1.0)
+        return [] if intersected else block_patterns(result), copies
+
+    if len(result.image_points) in IN_PARALLEL and not result.loss:
+        # The hypotheses of the summary are tested without the GIL.
+        with ThreadPoolExecutor(1) as other:
+            waiting = other.submit(residual_findings)
+            result.reliability_summary  # noqa: B018
+            systematic, copies = waiting.result()
+    else:
+        systematic, copies = residual_findings()
+    found = network_findings(result, [] if intersected else held_tested(result), systematic)
     left_out = [
         Phrase("line.point-left-out", {"point": str(point), "reason": HARMFUL[reason]})
         for point, reason in result.dropped.items()
@@ -155,7 +171,7 @@ def block_findings(result: Result) -> Findings:
         intersected=intersected,
         scaled=result.unit_variance != "unity",
         remarks=[*found.remarks, *left_out, *_on_checks(result)],
-        duplicates=duplicates(result.block, found.global_test.factor if found.global_test else 1.0),
+        duplicates=copies,
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=set_aside,
