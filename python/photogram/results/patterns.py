@@ -180,14 +180,15 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:
     """Test the heights of control for bending over the area."""
-    w = np.where(result.point_redundancy > TESTABLE, result.point_standardized, math.nan)[:, 2]
-    tested, plan = np.isfinite(w), result.point_positions[:, :2]
-    if not (tested.any() and np.ptp(plan[tested], axis=0).any()):
+    w = np.where(result.point_redundancy[:, 2] > TESTABLE, result.point_standardized[:, 2], math.nan)
+    tested = np.isfinite(w)
+    w, plan = w[tested], result.point_positions[tested, :2]
+    if not (len(w) and np.ptp(plan, axis=0).any()):
         return None
-    plan = plan - plan[tested].mean(axis=0)
-    x, y = (plan / np.abs(plan[tested]).max()).T
+    plan = plan - plan.mean(axis=0)
+    x, y = (plan / np.abs(plan).max()).T
     design = np.column_stack([np.ones(len(w)), x, y, x * x, x * y, y * y])
-    return _regressed("bending", fits.regression(w, design, tested))
+    return _regressed("bending", fits.regression(w, design))
 
 
 def _regressed(code: str, found: fits.Fit | None, **fields: Phrase) -> Systematic | None:

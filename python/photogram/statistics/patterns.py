@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
 MOST = 20_000  # Largest number of values in the test of normality
@@ -206,12 +206,12 @@ class Fit:
     rms: float  # Root mean square of the fitted values, in standard deviations
 
 
-def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit | None:
+def regression(values: Floats, design: Floats) -> Fit | None:
     """Test the dependence of values on k columns by F with k and n - k.
 
     None with fewer than k + 5 values.
     """
-    kept = np.isfinite(values) & (np.ones(len(values), dtype=bool) if used is None else used)
+    kept = np.isfinite(values)
     y, x = values[kept], design[kept]
     if len(y) < x.shape[1] + 5:
         return None
