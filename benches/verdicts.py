@@ -237,17 +237,14 @@ def _images(change: Callable[[Survey, float], np.ndarray]) -> Mistake:
 def _readout(survey: Survey, size: float) -> np.ndarray:
     """Return changes of images with a readout time in exposures: the photo moves while it is read."""
     change = np.zeros_like(survey.xy)
-    ends = len(survey.poses) - 1
     for photo, pose in enumerate(survey.poses):
-        before, after = survey.poses[max(photo - 1, 0)], survey.poses[min(photo + 1, ends)]
-        if abs(before[5] - after[5]) > 1 or 0 in (photo, ends):
-            continue
+        near = survey.poses[max(photo - 1, 0) : photo + 2]
+        strip = near[(np.abs(near - pose)[:, [1, 5]] < [15, 1]).all(axis=1)]
+        velocity = (strip[-1] - strip[0])[:3] / (len(strip) - 1)
         own = survey.photos == photo
         seconds = size * (survey.xy[own, 1] / HEIGHT - 0.5)
         moved = [
-            projected(
-                np.concatenate([pose[:3] + (after - before)[:3] / 2 * t, pose[3:]]), survey.points[[k]]
-            )[0]
+            projected(np.concatenate([pose[:3] + velocity * t, pose[3:]]), survey.points[[k]])[0]
             - projected(pose, survey.points[[k]])[0]
             for k, t in zip(survey.seen[own], seconds, strict=True)
         ]
