@@ -14,7 +14,6 @@ from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
 from photogram.diagnosis.control_sets import exchange
 from photogram.diagnosis.hypotheses import KAPPA, TURNS
-from photogram.diagnosis.robust import fit, mad_sd
 from photogram.diagnosis.structure import parts_of
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check
@@ -565,16 +564,6 @@ def test_strips_are_cut_where_the_flight_turns():
     stray[8] += [20000.0, 9000.0, 0]
     assert [strip.tolist() for strip in strips_of(stray)] == [strip.tolist() for strip in strips]
     assert [strip.tolist() for strip in strips_of(stray[:1])] == [[0]]
-
-
-def test_a_robust_fit_does_not_see_outliers():
-    rng = np.random.default_rng(9)
-    x = np.linspace(-1, 1, 40)
-    design = np.vander(x, 2)
-    values = design @ [[2.0], [1.0]] + 0.01 * rng.standard_normal((40, 1))
-    values[::5] += 50
-    np.testing.assert_allclose(fit(design, values).ravel(), [2, 1], atol=0.02)
-    assert mad_sd(values - design @ [[2.0], [1.0]]) < 0.03
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -14,7 +14,7 @@ from photogram.network.block import Block
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Clock
 from photogram.results.result import Result
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 LEAPS = range(13, 19)  # GPS - UTC in seconds from 1999 on; 18 since 2017
 TAI_GPS, ET_TAI = 19.0, 32.184  # TAI - GPS and ET - TAI, seconds; ET as in SPICE, within 2 ms
@@ -32,14 +32,11 @@ def differences() -> Iterator[tuple[str, str, float]]:
         yield "ET", "UTC", leap + TAI_GPS + ET_TAI
 
 
-def scales_of(shift: float) -> list[Phrase]:
-    """Return pairs of time scales with a constant shift; seconds added to the second."""
-    return [
-        phrase("moving.time-scales", first=to, second=of, seconds=sign * seconds)
-        for ahead, behind, seconds in differences()
-        for sign, of, to in ((1, behind, ahead), (-1, ahead, behind))
-        if abs(shift - sign * seconds) < WITHIN
-    ]
+def shifts() -> Iterator[tuple[str, str, float]]:
+    """Yield time scales of data and of a table, and the seconds that convert times of the data."""
+    for ahead, behind, seconds in differences():
+        yield behind, ahead, seconds
+        yield ahead, behind, -seconds
 
 
 SIGNIFICANT = 5.0
@@ -51,8 +48,12 @@ def known_offsets(result: Result) -> list[Message]:
     found = []
     for each in result.unknowns:
         offset = float(each.position[0])
-        significant = isinstance(each.given, Clock) and abs(offset) > SIGNIFICANT * each.sd[0]
-        if significant and (scales := scales_of(offset)):
+        scales = [
+            phrase("moving.time-scales", first=table, second=scale, seconds=seconds)
+            for scale, table, seconds in shifts()
+            if abs(offset - seconds) < WITHIN
+        ]
+        if scales and isinstance(each.given, Clock) and abs(offset) > SIGNIFICANT * each.sd[0]:
             message = phrase("moving.clock-offset", clock=each.given.title, offset=offset, scales=scales)
             found.append(Message(message))
     return found

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import chain, combinations
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +11,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.findings import Level, Section, section_of
 from photogram.diagnosis.robust import mad_sd
 from photogram.network.block import Block
-from photogram.network.directions import without_lenses
-from photogram.network.rays import Rays, meet
+from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 
 BAD_PHOTO = 4.0  # A bad photo exceeds the median residual of the median photo by this factor,
@@ -24,9 +22,6 @@ CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
 """Control differences in robust standard deviations that are reported."""
 FEWEST_CONTROL = 4  # Control points that a comparison needs
 CANDIDATES = 5  # Number of photos with the largest residuals that are omitted by trial
-PARTED, FEWEST_OF_TWO = 0.1, 2
-"""Largest part of the residuals, and least rays per group, if one name belongs to two points."""
-AS_WELL = 3.0  # Least ratio of the remaining residual without one ray to that of two groups
 MOST_PHOTOS = 20
 
 
@@ -60,60 +55,6 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
     points = np.zeros(len(block.point_ids), dtype=bool)
     points[block.image_points[rays.used & (sizes > MISSING * np.maximum(usual, block.image_sd.max()))]] = True
     return section, Suspects(bad, points, _control(rays.without(points[block.image_points]), section))
-
-
-class _Meeting:
-    """Intersections of some rays of a point."""
-
-    def __init__(self, rays: Rays) -> None:
-        self.rays = rays
-        self.across, self.right = rays.equations()
-
-    def at(self, own: Indices, rows: Indices) -> tuple[Floats, Bools]:
-        """Return residuals of `rows` where rays `own` meet, and whether that is in front of them."""
-        normal, constant = self.across[own].sum(axis=0), self.right[own].sum(axis=0)
-        position = meet(normal[np.newaxis], constant[np.newaxis], np.array([len(own)]))
-        residuals, in_front = self.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
-        return np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf), in_front
-
-    def largest(self, rows: Indices) -> float:
-        """Return the largest residual of rays at their intersection."""
-        return float(self.at(rows, rows)[0].max())
-
-    def without_one(self, rows: Indices) -> tuple[float, int]:
-        """Return the least of the largest residuals without one ray, and its place; infinite with two."""
-        left = [self.largest(rows[rows != row]) for row in rows.tolist()] if len(rows) > 2 else [np.inf]
-        return min(left), int(np.argmin(left))
-
-    def parted(self, rows: Indices) -> tuple[Indices, Indices, float] | None:
-        """Return two groups of rays that meet, if no single one explains the residual of all, and this."""
-        before, groups = self.largest(rows), list[tuple[float, Indices, Indices]]()
-        for pair in combinations(rows.tolist(), 2):
-            alone, in_front = self.at(np.array(pair), rows)
-            # Rays of two points may meet anywhere, even behind the cameras, with any residual.
-            near = in_front & (
-                alone < PARTED * min(before, float(alone[np.isfinite(alone)].max(initial=0.0)))
-            )
-            one, other = rows[near], rows[~near]
-            if min(len(one), len(other)) >= FEWEST_OF_TWO:
-                groups.append((max(self.largest(one), self.largest(other)), one, other))
-        left, one, other = min(groups, key=lambda each: each[0], default=(np.inf, rows, rows))
-        is_parted = left < PARTED * before and AS_WELL * left < self.without_one(rows)[0]
-        return (one, other, before) if is_parted else None
-
-
-def parted_rays(block: Block, points: Sequence[int]) -> Iterator[tuple[int, Indices, Indices, float]]:
-    """Yield points whose rays meet in two groups: the photos of both, and the largest residual of all.
-
-    `block` has adjusted stations.
-    """
-    plain = without_lenses(block)
-    if not points or len(plain.image_xy) < len(block.image_xy):
-        return
-    meeting = _Meeting(Rays.of(plain))
-    for point in points:
-        if found := meeting.parted(np.flatnonzero(block.image_points == point)):
-            yield point, block.image_photos[found[0]], block.image_photos[found[1]], found[2]
 
 
 def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import combinations
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Bools
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.findings import Finding, Level, Section, finding, small_unit
-from photogram.diagnosis.gross import parted_rays
 from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, spread_of
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block, flown_by
+from photogram.network.directions import without_lenses
+from photogram.network.rays import Rays, meet
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
 from photogram.results.snooping_log import Exchange, Removal
@@ -33,6 +35,9 @@ CODES = {
 ODDS = 20.0  # Likelihood ratio below which another observation is an alternative
 BLUNDER, TWENTIETH = 3.0, 1.96
 SHOWN = 20
+PARTED, FEWEST_OF_TWO = 0.1, 2
+"""Largest part of the residuals, and least rays per group, if one name belongs to two points."""
+AS_WELL = 3.0  # Least ratio of the remaining residual without one ray to that of two groups
 
 
 class Misfits:
@@ -88,19 +93,28 @@ class Misfits:
         block, explained = self.block, set[int]()
         images = [image for entry in entries if entry.rows and (image := self._image_of(entry)) >= 0]
         points, counts = np.unique(block.image_points[images], return_counts=True)
-        points = np.union1d(points[counts > 1], block.image_points[self.suspected])
-        reached = block.replace(
-            photo_positions=self.result.photo_positions, photo_attitudes=self.result.photo_attitudes
-        )
-        for point, one, other, before in parted_rays(reached, points.tolist()):
-            first, second = ([block.photo_ids[photo] for photo in own] for own in (one, other))
-            name, unit = block.point_ids[point], block.image_unit
-            message = phrase(
-                "check.name-used-twice", point=name, first=first, second=second, before=before, unit=unit
-            )
-            found = finding("grave", message, [*first, *second], [name], {f"residual_{unit}": before})
-            self.of_suspects.append(found)
-            explained |= {*np.flatnonzero(block.image_points == point).tolist()}
+        poses = {
+            "photo_positions": self.result.photo_positions,
+            "photo_attitudes": self.result.photo_attitudes,
+        }
+        plain = without_lenses(block.replace(**poses))
+        if len(plain.image_xy) < len(block.image_xy):
+            return explained
+        rays = Rays.of(plain)
+        equations = rays.equations()
+        for point in np.union1d(points[counts > 1], block.image_points[self.suspected]).tolist():
+            rows = np.flatnonzero(block.image_points == point)
+            one, other, before = _groups(rays, equations, rows)
+            if len(one):
+                first, second = (
+                    [block.photo_ids[photo] for photo in block.image_photos[own]] for own in (one, other)
+                )
+                name, unit = block.point_ids[point], block.image_unit
+                fields = {"point": name, "first": first, "second": second, "before": before, "unit": unit}
+                message = phrase("check.name-used-twice", **fields)
+                found = finding("grave", message, [*first, *second], [name], {f"residual_{unit}": before})
+                self.of_suspects.append(found)
+                explained |= {*rows.tolist()}
         return explained
 
     def _level(self, entry: Removal) -> Level:
@@ -162,6 +176,36 @@ class Misfits:
             code = f"check.rival.{'two-rays' if two else 'images'}"
         others = [ids[of[own]] for own in rivals if of[own] >= 0]
         return phrase(code, names=others) if others else "", others
+
+
+def _groups(rays: Rays, equations: tuple[Floats, Floats], rows: Indices) -> tuple[Indices, Indices, float]:
+    """Return two groups of rays of a point that intersect, and the largest residual of all.
+
+    The groups are empty if a single ray explains the residuals as well.
+    """
+
+    def sizes(own: Indices) -> tuple[Floats, Bools]:
+        """Return residuals of all rays where some intersect, and whether that is in front of them."""
+        normal, constant = (each[own].sum(axis=0, keepdims=True) for each in equations)
+        position = meet(normal, constant, np.array([len(own)]))
+        residuals, in_front = rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
+        return np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf), in_front
+
+    def largest(kept: Bools) -> float:
+        return float(sizes(rows[kept])[0][kept].max())
+
+    everything = np.ones(len(rows), dtype=bool)
+    before, best = largest(everything), (math.inf, everything)
+    for pair in combinations(rows.tolist(), 2):
+        alone, in_front = sizes(np.array(pair))
+        # Rays of two points may meet anywhere, even behind the cameras, with any residual.
+        near = in_front & (alone < PARTED * min(before, float(alone[np.isfinite(alone)].max(initial=0.0))))
+        if FEWEST_OF_TWO <= near.sum() <= len(rows) - FEWEST_OF_TWO:
+            best = min(best, (max(largest(near), largest(~near)), near), key=lambda each: each[0])
+    left, near = best
+    single = min((largest(rows != row) for row in rows.tolist()), default=0.0) if len(rows) > 2 else 0.0
+    is_parted = left < PARTED * before and AS_WELL * left < single
+    return rows[near & is_parted], rows[~near & is_parted], before
 
 
 def exchanged(exchanges: Iterable[Exchange]) -> list[Finding]:

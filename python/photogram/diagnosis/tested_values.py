@@ -43,10 +43,6 @@ def sizes_of_tests(result: Result) -> dict[str, Floats]:
 
 def outliers(result: Result) -> dict[str, Bools]:
     """Return components by type beyond the critical value of the largest of all test values."""
-    limit = normal_limit(tested_count(result), FOUND)
-    return {name: each > limit for name, each in sizes_of_tests(result).items()}
-
-
-def tested_count(result: Result) -> int:
-    """Return the number of tested components."""
-    return sum(int((each > 0).sum()) for each in sizes_of_tests(result).values())
+    sizes = sizes_of_tests(result)
+    limit = normal_limit(sum(int((each > 0).sum()) for each in sizes.values()), FOUND)
+    return {name: each > limit for name, each in sizes.items()}

@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.clocks import differences
+from photogram.diagnosis.clocks import shifts
 from photogram.diagnosis.hypotheses import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
 from photogram.diagnosis.positions import arm_of
@@ -52,11 +52,7 @@ def _of_images(block: Block) -> Predicted | None:
 
 
 def _of_records(block: Block) -> Predicted | None:
-    tried = (
-        Proposal(f"records {seconds:+g} s", message, partial(shifted_records, seconds=seconds))
-        for message, seconds in shifts("records")
-    )
-    return predict(tried, block, _records_misfit, what="records")
+    return predict(_of_times("records", _shifted_records), block, _records_misfit, what="records")
 
 
 def _records_misfit(block: Block) -> Floats:
@@ -89,38 +85,38 @@ def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Proposal]:
     """Yield possible mistakes for `photos` on trajectories, without observations."""
     if any(each.trajectory is not None for each in block.timed):
         yield from _of_tables()
-        for message, seconds in shifts("images"):
-            yield Proposal(f"images {seconds:+g} s", message, partial(_shifted_images, seconds=seconds))
+        yield from _of_times("images", _shifted_images)
     if block.principal_distances is not None or any("c" in each.names for each in block.cameras):
         yield Proposal("sign of c", phrase("mistake.sign of c"), _looking_back)
     if any(each.lines is not None for each in block.timed):
         yield from _of_scanners(block, photos)
 
 
-def shifts(of: str) -> Iterator[tuple[Phrase, float]]:
-    """Yield possible time scales of `images` or `records`, and their shift in seconds."""
-    for ahead, behind, seconds in differences():
-        for sign, own, table in ((1, behind, ahead), (-1, ahead, behind)):
-            fields = {"scale": own, "table": table, "seconds": sign * seconds}
-            yield phrase(f"mistake.times.{of}", **fields), sign * seconds
+def _of_times(of: str, change: Callable[..., Block]) -> Iterator[Proposal]:
+    """Yield possible time scales of `images` or `records`."""
+    for scale, table, seconds in shifts():
+        message = phrase(f"mistake.times.{of}", scale=scale, table=table, seconds=seconds)
+        yield Proposal(f"{of} {seconds:+g} s", message, partial(change, seconds=seconds))
 
 
 def _of_tables() -> Iterator[Proposal]:
-    def changed(name: str, message: Phrase, change: Callable[[Table], Table]) -> Proposal:
-        return Proposal(name, message, partial(_with_tables, change=change))
-
-    def transposed(table: Table) -> Table:
-        return replace(table, attitudes=np.swapaxes(table.attitudes, 1, 2))
-
-    yield changed("inverse", phrase("mistake.table.inverse"), transposed)
+    changes: dict[str, tuple[Phrase, Callable[[Table], Table]]] = {
+        "inverse": (phrase("mistake.table.inverse"), _transposed),
+        "kilometres": (phrase("mistake.table.kilometres"), partial(_scaled, factor=KILOMETRE)),
+        "metres": (phrase("mistake.table.metres"), partial(_scaled, factor=1 / KILOMETRE)),
+    }
     for name, (cause, _) in quaternion_readings(np.eye(3)[np.newaxis]).items():
+        changes[name] = phrase("mistake.table.quaternions", cause=cause), partial(_read_as, name=name)
+    for name, (message, change) in changes.items():
+        yield Proposal(name, message, partial(_with_tables, change=change))
 
-        def read(table: Table, name: str = name) -> Table:
-            return replace(table, attitudes=quaternion_readings(table.attitudes)[name][1])
 
-        yield changed(name, phrase("mistake.table.quaternions", cause=cause), read)
-    for name, factor in (("kilometres", KILOMETRE), ("metres", 1 / KILOMETRE)):
-        yield changed(name, phrase(f"mistake.table.{name}"), partial(_scaled, factor=factor))
+def _transposed(table: Table) -> Table:
+    return replace(table, attitudes=np.swapaxes(table.attitudes, 1, 2))
+
+
+def _read_as(table: Table, name: str) -> Table:
+    return replace(table, attitudes=quaternion_readings(table.attitudes)[name][1])
 
 
 def _scaled(table: Table, factor: float) -> Table:
@@ -167,7 +163,7 @@ def _shifted_images(block: Block, seconds: float) -> Block:
     return block.replace(timed=[later(each) for each in block.timed])
 
 
-def shifted_records(block: Block, seconds: float) -> Block:
+def _shifted_records(block: Block, seconds: float) -> Block:
     """Return a block with later times of its observed positions on trajectories."""
     return block.replace(
         observations=[

@@ -51,15 +51,12 @@ class View:
         return self.block.image_unit
 
     def changed(self, change: Change) -> Self:
-        """Return the view of the corrected block."""
-        return self.of_seen(change(self.seen))
-
-    def of_seen(self, meant: Block) -> Self:
-        """Return the view of the corrected block, given the corrected `seen`.
+        """Return the view of the corrected block.
 
         If image coordinates change for cameras with lenses, the new block has no lenses, because distortions
         would not fit.
         """
+        meant = change(self.seen)
         if meant is self.seen:
             return self
         if self.seen is self.block:
