@@ -21,7 +21,7 @@ from photogram.collection.core_arrays import collection_network, collection_tria
 from photogram.collection.findings import collection_held
 from photogram.collection.parameters import POSE
 from photogram.collection.result import AdjustedCollection
-from photogram.diagnosis.diagnose import Manner, check_block
+from photogram.diagnosis.diagnose import check_block
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Section
 from photogram.errors import AdjustmentError
@@ -166,7 +166,7 @@ def check(network: Collection, threads: int | None) -> Diagnosis:
         section.figure("robust adjustment", adjusted.status)
     except AdjustmentError as error:
         section.remark("collection.no-robust-start", error=error)
-    sections, result = check_block(as_block(network), Manner({"threads": threads}))
+    sections, result = check_block(as_block(network), {"threads": threads})
     return Diagnosis("", [section, *sections], result)
 
 

@@ -33,27 +33,16 @@ from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectories import flown_checked
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError, InputError
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import as_seen
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
 
-__all__ = ["Manner", "check_block", "diagnose"]
-
 FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
 HARDLY = 10.0  # Multiple of the usual residual that coarse stations can cause before the adjustment
 MOST_SETS = 5  # Maximum number of successive corrections of sets
-
-
-@dataclass(frozen=True)
-class Manner:
-    """Settings of a check."""
-
-    options: dict[str, Any] = field(default_factory=dict)  # Options of :func:`photogram.adjust`
-    words: Words = field(default_factory=Words)  # Names of things in messages
-    intersect_only: str = ""  # Reason for not adjusting stations; empty if they are adjusted
 
 
 def diagnose(
@@ -108,27 +97,33 @@ def diagnose(
             raise kind_error("result", "the result of a block", result)
         return diagnosis_of(adjusted)
     if isinstance(network, Block):
-        return Diagnosis(network.title, *check_block(as_seen(network), Manner({"threads": threads})))
+        return Diagnosis(network.title, *check_block(as_seen(network), {"threads": threads}))
     if not hasattr(network, "_check"):
         raise kind_error("network", "a block, a project or a collection", network)
     found: Diagnosis = network._check(threads)
     return found
 
 
-def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
-    """Check a block; return the sections and the adjustment, if any."""
+def check_block(
+    block: Block, options: dict[str, Any], words: Words | None = None, intersect_only: str = ""
+) -> tuple[list[Section], Any]:
+    """Check a block with options of `photogram.adjust`; return the sections and the adjustment, if any.
+
+    `intersect_only` is the reason for not adjusting stations; empty if they are adjusted.
+    """
+    given = Adjuster(options), words or Words(), intersect_only
     if not len(block.image_xy):
         raise argument_error("block", "no-images")
     # Absurd values overflow, and comparisons with them fail. Their effect is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):
-            return flown_checked(block, manner.words, Adjuster(manner.options))
+            return flown_checked(block, given[1], given[0])
         if np.isfinite(block.photo_positions).all() and np.isfinite(block.photo_attitudes).all():
-            return _checked(block, manner)
+            return _checked(block, *given)
         started, section = _started(block)
         if started is None:
             return [section], None
-        sections, result = _checked(started, manner)
+        sections, result = _checked(started, *given)
         return [section, *sections], result
 
 
@@ -152,8 +147,9 @@ def _started(block: Block) -> tuple[Block | None, Section]:
     return usable, section
 
 
-def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
-    words, adjusted = manner.words, Adjuster(manner.options)
+def _checked(
+    block: Block, adjusted: Adjuster, words: Words, intersect_only: str
+) -> tuple[list[Section], Any]:
     lens: list[Finding] = []
     given = block
     for mistake in at("lens"):
@@ -164,14 +160,14 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     sets, upright, oriented, exact = orientation(view, words)
     sets.findings[:0] = lens
     errors, suspects = gross(oriented.seen, oriented.unit)
-    if not manner.intersect_only:
+    if not intersect_only:
         start = oriented
         oriented = _sets(sets, oriented, suspects, adjusted)
         if oriented is not start:
             errors, suspects = gross(oriented.seen, oriented.unit)
     if suspects.photos.any():
         spare_explained(upright, oriented.seen, suspects.photos)
-    edited = _edited(oriented, suspects, manner, adjusted)
+    edited = _edited(oriented, suspects, intersect_only, adjusted)
     errors.findings = _judged(errors.findings, edited)
     if edited.first is not None and edited.last is not None:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
@@ -225,15 +221,15 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
     return view
 
 
-def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) -> Edited:
+def _edited(view: View, suspects: Suspects, intersect_only: str, adjusted: Adjuster) -> Edited:
     """Adjust the block, or only intersect it if its stations are good enough."""
-    if not manner.intersect_only:
+    if not intersect_only:
         return edit(view.block, suspects, adjusted)
     met = Rays.of(view.seen).intersect()
     ratio = met.sizes / view.seen.image_sd.mean(axis=1)
     if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
         return edit(view.block.with_fixed_photos(), suspects, adjusted)
-    reason = f"{manner.intersect_only}, and the stations are not adjusted ones"
+    reason = f"{intersect_only}, and the stations are not adjusted ones"
     return Edited(section_of("blunders"), reason=reason, asked=False)
 
 

@@ -45,8 +45,8 @@ def seam_hints(result: Result) -> list[Message]:
             # The two parts join at the middle of the photo.
             away = block.image_xy[own] - forms[block.photo_ids[row]].matrix[:, 0]
             for axis, k in product((0, 1), (0, 1)):
-                step = _step(away, axis, result.residuals[own, k], block.image_sd[own, k])
-                found.append((*step, axis, row, film.readings.pitch))
+                jump = _step(away, axis, result.residuals[own, k], block.image_sd[own, k])
+                found.append((*jump, axis, row, film.readings.pitch))
     value, step, axis, row, pitch = max(found)
     if not value > normal_limit(4 * len(result.films), FOUND):
         return []

@@ -12,19 +12,6 @@ from photogram.show.page import Fact, Facts, Part, Text
 from photogram.statistics.verdict import Verdict
 from photogram.words import Phrase, phrase
 
-__all__ = [
-    "Finding",
-    "Level",
-    "Section",
-    "Words",
-    "finding",
-    "likely",
-    "note_all",
-    "note_verdict",
-    "section_of",
-    "small_unit",
-]
-
 Level = Literal["grave", "look"]
 
 
@@ -140,9 +127,9 @@ def finding(
 
 def note_all(section: Section, kind: str, level: Level, messages: Sequence[Message | Phrase | str]) -> None:
     """Add a finding for each message."""
-    for message in messages:
-        own = message if isinstance(message, Message) else Message(message)
-        section.findings.append(Finding(kind, level, str(message), phrase=own.phrase))
+    for each in messages:
+        own = each if isinstance(each, Phrase) else getattr(each, "phrase", None)
+        section.findings.append(Finding(kind, level, str(each), phrase=own))
 
 
 def likely(causes: Sequence[Phrase], effect: Phrase) -> Phrase:

@@ -72,21 +72,14 @@ def _sizes(result: Result) -> Floats:
     Without convergence there are no redundancy numbers, and scaled residuals are used, which are smaller than
     test values. Observations of points that were excluded as harmful are the worst.
     """
-    block, test = result.block, result.global_test
-    harmful = [name for name, reason in result.dropped.items() if reason in HARMFUL]
-    sizes = np.zeros(len(block.image_xy))
+    block, test, sizes = result.block, result.global_test, np.zeros(len(result.block.image_xy))
     if not result.converged or (test is not None and test.rejected_high):
-        relative = np.where(result.used_images, np.abs(result.residuals / block.image_sd).max(axis=1), 0.0)
-        usual = (
-            max(float(np.median(relative[result.used_images])) / MEDIAN_OF_LARGER, 1.0)
-            if relative.any()
-            else 1.0
-        )
-        sizes = np.where(relative > usual * normal_limit(relative.size), relative, 0.0)
-    if harmful:
-        rows = {name: row for row, name in enumerate(block.point_ids)}
-        sizes[np.isin(block.image_points, [rows[name] for name in harmful])] = np.inf
-    return sizes
+        used = result.used_images
+        relative = np.where(used, np.abs(result.residuals / block.image_sd).max(axis=1), 0.0)
+        usual = float(np.median(relative[used])) / MEDIAN_OF_LARGER if used.any() else 1.0
+        sizes = np.where(relative > max(usual, 1.0) * normal_limit(relative.size), relative, 0.0)
+    harmful = [result.dropped.get(name) in HARMFUL for name in block.point_ids]
+    return np.where(np.array(harmful)[block.image_points], np.inf, sizes)
 
 
 def _neighbours(block: Block, photo: int) -> Indices:

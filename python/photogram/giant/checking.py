@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools
-from photogram.diagnosis.diagnose import Manner, check_block
+from photogram.diagnosis.diagnose import check_block
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.giant.diagnostics import error_warnings
@@ -61,7 +61,7 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     common = project.common
     why = "COMMON column 10 asks for intersection only" if common.intersection_only else ""
     options = {"unit_variance": common.unbiased_variance, "threads": threads}
-    sections, result = check_block(block, Manner(options, _GuideWords(), why))
+    sections, result = check_block(block, options, _GuideWords(), why)
     files = Section("Input", "Remarks on the files, and the warnings of the 1987 program.")
     counts = {"photos": len(block.photo_ids), "points": len(block.point_ids), "images": len(block.image_xy)}
     files.remark("giant.counts", **counts)
