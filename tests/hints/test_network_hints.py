@@ -92,7 +92,6 @@ def test_mistakes_are_named(network, mistake):
     [
         ("radians as degrees", "radians for degrees"),
         ("photo-to-ground", "sense"),
-        ("gon", "gon"),
         ("sign of phi", "sign of phi"),
     ],
 )

@@ -14,11 +14,10 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.hypotheses import attitude_readings, hypotheses, turns
-from photogram.diagnosis.mistakes import Adjuster, Proposal
+from photogram.diagnosis.hypotheses import hypotheses, turns
+from photogram.diagnosis.mistakes import Proposal
 from photogram.diagnosis.predictions import EACH, SUSPICION, Predicted, predict
 from photogram.diagnosis.regression import (
-    LEAST,
     MOST,
     UNKNOWN,
     control_misfit,
@@ -32,17 +31,13 @@ from photogram.diagnosis.regression import (
 from photogram.diagnosis.views import View
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
-from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block, checked
 from photogram.network.film_reduction import as_seen
 from photogram.network.motion import at_rest
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
-from photogram.network.subset import kept_images, of_photos
 from photogram.words import phrase
 
-SLIGHT = float(np.radians(1.0))  # Attitudes closer than this to the resected ones are correct
-CLEARLY = 5.0  # A rival reading must be closer to the resected attitudes by this factor
 BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
 """Factor between metres and millimetres; limits of the median, and of the logarithm of each distance."""
 
@@ -61,7 +56,7 @@ def hints(block: Block) -> list[Message]:
         found = [Message(verdict.message) for verdict in verdicts(block)]
         bar = distances_in_millimetres(block)
         bars = [] if bar is None else [Message(bar.message)]
-        return [*(found or readings(block)), *latitudes(block), *bars]
+        return [*found, *latitudes(block), *bars]
 
 
 def verdicts(block: Block) -> list[Predicted]:
@@ -130,39 +125,6 @@ def latitudes(block: Block) -> list[Message]:
         for what, positions in (("photos", block.photo_positions), ("points", block.point_positions))
         if (np.abs(positions[:, 1]) > np.pi / 2).any()
     ]
-
-
-def readings(block: Block) -> list[Message]:
-    """Compare given attitudes with adjusted ones; finds mistakes in small angles."""
-    if block.spheroid is not None:
-        return []
-    known = given_points(block)[block.image_points]
-    counts = np.bincount(block.image_photos[known], minlength=len(block.photo_ids))
-    rows = spread(np.flatnonzero(counts >= LEAST), MOST)
-    if len(rows) < 2:
-        return []
-    chosen = np.isin(np.arange(len(block.photo_ids)), rows)
-    free = view(of_photos(kept_images(block, known), chosen), np.arange(len(rows)))
-    point_sd = np.where(np.isfinite(free.point_positions), 0.0, np.inf)
-    resected = Adjuster({}).converged(free.replace(point_sd=point_sd))
-    if resected is None:
-        return []
-    turned = Attitudes.of(angles_form(block.photo_to_ground), resected.photo_attitudes).matrices
-    own = _apart(Rays.of(block).cameras[rows], turned)
-    rivals = [
-        (_apart(matrices[rows], turned), cause) for cause, matrices in attitude_readings(block).values()
-    ]
-    (least, cause), (second, _) = sorted(rivals, key=lambda rival: rival[0])[:2]
-    if own < SLIGHT or CLEARLY * least > min(own, second):
-        return []
-    angles = {"after": float(np.degrees(least)), "before": float(np.degrees(own))}
-    return [Message(phrase("convention.attitudes", cause=cause, **angles))]
-
-
-def _apart(given: Floats, found: Floats) -> float:
-    """Return the rms angle between attitudes, radians."""
-    trace = np.einsum("pij,pij->p", given, found)
-    return float(np.sqrt((np.arccos(np.clip((trace - 1) / 2, -1, 1)) ** 2).mean()))
 
 
 def distances_in_millimetres(block: Block) -> Proposal | None:

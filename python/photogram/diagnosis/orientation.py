@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.conventions import distances_in_millimetres, latitudes, readings, verdicts
+from photogram.diagnosis.conventions import distances_in_millimetres, latitudes, verdicts
 from photogram.diagnosis.findings import Finding, Section, Words, finding, note_all, section_of
 from photogram.diagnosis.hypotheses import KAPPA, TURNS
 from photogram.diagnosis.predictions import Predicted
@@ -56,7 +56,7 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
     if not exact:
         section.remark("check.remark.approximate")
     if view is start:
-        note_all(section, "convention", "grave", [*readings(view.seen), *latitudes(view.seen)])
+        note_all(section, "convention", "grave", latitudes(view.seen))
     return section, _sides(blocks, view, explanations, words), view, exact
 
 
