@@ -53,10 +53,8 @@ def hints(block: Block) -> list[Message]:
         return []
     with np.errstate(all="ignore"):
         block = View.of(checked(rest)).seen
-        found = [Message(verdict.message) for verdict in verdicts(block)]
         bar = distances_in_millimetres(block)
-        bars = [] if bar is None else [Message(bar.message)]
-        return [*found, *latitudes(block), *bars]
+        return [Message(each.message) for each in (*verdicts(block), bar) if each is not None]
 
 
 def verdicts(block: Block) -> list[Predicted]:
@@ -114,17 +112,6 @@ def _single(block: Block, photos: Indices) -> list[Predicted]:
             best = [tried[name] for name in found.names]
             alike[(*found.names,)] = replace(first, best=best, photos=names)
     return [*alike.values()]
-
-
-def latitudes(block: Block) -> list[Message]:
-    """Report latitudes beyond the poles."""
-    if block.spheroid is None:
-        return []
-    return [
-        Message(phrase(f"convention.latitudes.{what}"))
-        for what, positions in (("photos", block.photo_positions), ("points", block.point_positions))
-        if (np.abs(positions[:, 1]) > np.pi / 2).any()
-    ]
 
 
 def distances_in_millimetres(block: Block) -> Proposal | None:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.conventions import distances_in_millimetres, latitudes, verdicts
-from photogram.diagnosis.findings import Finding, Section, Words, finding, note_all, section_of
+from photogram.diagnosis.conventions import distances_in_millimetres, verdicts
+from photogram.diagnosis.findings import Finding, Section, Words, finding, section_of
 from photogram.diagnosis.hypotheses import KAPPA, TURNS
 from photogram.diagnosis.predictions import Predicted
 from photogram.diagnosis.views import View
@@ -28,7 +28,7 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
     Returns the sections on conventions and on sides, the corrected view, and whether the correction is exact.
     """
     section = section_of("conventions")
-    start, exact = view, True
+    exact = True
     explanations: list[Finding] = []
     blocks: list[Block] = []  # Before the first mistake in sides, and after the last one of several photos
     for _ in range(MOST):
@@ -55,8 +55,6 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
         section.remark("check.remark.corrected")
     if not exact:
         section.remark("check.remark.approximate")
-    if view is start:
-        note_all(section, "convention", "grave", latitudes(view.seen))
     return section, _sides(blocks, view, explanations, words), view, exact
 
 
