@@ -23,7 +23,7 @@ from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Finding, Section, Words, section_of
 from photogram.diagnosis.gross import Suspects, gross
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
-from photogram.diagnosis.lenses import half_pixel, lenses_estimated
+from photogram.diagnosis.lenses import half_pixel
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.orientation import orientation, spare_explained
 from photogram.diagnosis.registry import at
@@ -156,7 +156,7 @@ def _checked(
         if (terms := mistake(given, adjusted)) is not None:
             lens.append(terms.finding(mistake.kind))
             given = terms.best[0].change(given)
-    view = View.of(lenses_estimated(given, lens, adjusted))
+    view = View.of(given)
     sets, upright, oriented, exact = orientation(view, words)
     sets.findings[:0] = lens
     errors, suspects = gross(oriented.seen, oriented.unit)

@@ -14,9 +14,7 @@ from photogram.diagnosis.findings import Finding, finding
 from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.wider_models import calibrated, calibration_words
 from photogram.results.result import Result
-from photogram.statistics.evidence import Evidence
 from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[AKk]([1-6])")
@@ -36,28 +34,6 @@ def wrong_terms(block: Block, adjusted: Adjuster) -> Explained | None:
         return None
     found = explain(block, _proposals(block), adjusted)
     return found if found is not None and found.is_certain else None
-
-
-def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
-    """Return a block with estimated lens parameters, if these explain the residuals.
-
-    A wrong lens makes good observations look like gross errors, positions of photos and control first.
-    """
-    can_be = any(calibration_words(camera) for camera in block.cameras)
-    first = adjusted.converged(block) if can_be else None
-    if first is None or first.global_test is None or not first.global_test.problem():
-        return block
-    found = first._findings()
-    if not Evidence(found).lens:
-        return block
-    result = adjusted.converged(block.replace(cameras=[calibrated(camera) for camera in block.cameras]))
-    if result is None or result.global_test is None:
-        return block
-    times = first.global_test.factor / result.global_test.factor
-    largest = max((each for each in found.systematic if each.large), key=lambda each: each.fall)
-    fields = {"pattern": largest.sentence, "calibrate": found.calibrate, "times": times}
-    findings.append(finding("grave", phrase("check.lens", **fields), values={"times_smaller": times}))
-    return block.replace(cameras=[each.restarted() for each in result.cameras])
 
 
 def _given_terms(camera: Camera) -> dict[str, int]:
