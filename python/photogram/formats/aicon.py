@@ -36,11 +36,12 @@ IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
 _NOT_ORIENTED = 1
 
 
-class _Reader:
+class _Reader(BlockBuilder):
     """A block, with the photos and points that are inactive in the files."""
 
     def __init__(self, path: Path, control_sd: tuple[float, ...] | None) -> None:
-        self.block, self.control_sd = BlockBuilder(path, TITLE), control_sd
+        super().__init__(path, TITLE)
+        self.control_sd = control_sd
         self.inactive: dict[str, set[str]] = {"photos": set(), "points": set()}
 
 
@@ -56,13 +57,12 @@ def read(path: Path, options: ReadOptions) -> Project:
     }
     if files[CAMERAS] is None:
         raise InputError(phrase("format.files", name=f"*{CAMERAS}"), file=images)
-    reader, files[IMAGES] = _Reader(images, options.sd.get("control")), images
+    block, files[IMAGES] = _Reader(images, options.sd.get("control")), images
     readers = {CAMERAS: _cameras, POSES: _poses, POINTS: _points, IMAGES: _images, BARS: _bars}
     for suffix, take in readers.items():
         if (file := files[suffix]) is not None:
-            take(file, reader)
-    block = reader.block
-    for kind, names in reader.inactive.items():
+            take(file, block)
+    for kind, names in block.inactive.items():
         if names:
             block.messages.append(Message(phrase("aicon.inactive", n=len(names), what=kind)))
     photos, points, xy = block.image_rows()
@@ -77,8 +77,7 @@ def _lines(path: Path) -> Iterator[Card]:
     return (each for each in cards(path) if each.words)
 
 
-def _cameras(path: Path, reader: _Reader) -> None:
-    block = reader.block
+def _cameras(path: Path, block: _Reader) -> None:
     lines = _lines(path)
     for head in lines:
         name = head.words[0]
@@ -103,44 +102,44 @@ def _cameras(path: Path, reader: _Reader) -> None:
         raise InputError(phrase("format.missing", what="a camera"), file=path)
 
 
-def _poses(path: Path, reader: _Reader) -> None:
+def _poses(path: Path, block: _Reader) -> None:
     for card in _lines(path):
         name = card.words[0]
         order, active, state = card.numbers(8, "order active state").tolist()
         if not active:
-            reader.inactive["photos"].add(name)
+            block.inactive["photos"].add(name)
             continue
-        reader.block.photo(name, card.words[1], card.place)
+        block.photo(name, card.words[1], card.place)
         if state == _NOT_ORIENTED:
             continue
         if order != 0:
             raise card.place.error(phrase("aicon.order", order=order))
         pose = card.numbers(2, "X Y Z omega phi kappa")
-        reader.block.pose(name, pose[:3], Attitudes.of("omega_phi_kappa", [pose[3:]]).matrices[0])
+        block.pose(name, pose[:3], Attitudes.of("omega_phi_kappa", [pose[3:]]).matrices[0])
 
 
-def _points(path: Path, reader: _Reader) -> None:
+def _points(path: Path, block: _Reader) -> None:
     for card in _lines(path):
         name = card.words[0]
         if len(card.words) >= 9 and not card.number(8, "active"):
-            reader.inactive["points"].add(name)
+            block.inactive["points"].add(name)
             continue
         xyz = card.numbers(1, "X Y Z")
-        reader.block.start(name, xyz, card.place)
+        block.start(name, xyz, card.place)
         if len(card.words) >= 10 and not card.number(9, "new"):
             sd = card.numbers(4, "sX sY sZ")
             if (sd < 0).any():
                 raise card.place.error(phrase("format.negative"))
-            reader.block.control(name, xyz, reader.control_sd or sd, card.place)
+            block.control(name, xyz, block.control_sd or sd, card.place)
 
 
-def _images(path: Path, reader: _Reader) -> None:
-    lost, block, only = 0, reader.block, list(reader.block.camera_rows)
+def _images(path: Path, block: _Reader) -> None:
+    lost, only = 0, list(block.camera_rows)
     for card in _lines(path):
         x, y, *sd = card.numbers(2, "x y sx sy").tolist()
         active = len(card.words) < 10 or card.number(9, "active") > 0
         photo, point = card.words[0], card.words[1]
-        if not active or photo in reader.inactive["photos"] or point in reader.inactive["points"]:
+        if not active or photo in block.inactive["photos"] or point in block.inactive["points"]:
             lost += 1
             continue
         if photo not in block.photo_rows:
@@ -154,7 +153,7 @@ def _images(path: Path, reader: _Reader) -> None:
         block.messages.append(Message(phrase("aicon.inactive", n=lost, what="image observations"), path))
 
 
-def _bars(path: Path, reader: _Reader) -> None:
+def _bars(path: Path, block: _Reader) -> None:
     for card in _lines(path):
         # Names of bars may contain blanks: the columns follow the last quotation mark.
         own = Card(card.place)
@@ -163,12 +162,12 @@ def _bars(path: Path, reader: _Reader) -> None:
         if len(own.words) > 4 and not own.number(4, "active"):
             continue
         first, second = own.words[:2]
-        if not {first, second} <= reader.block.point_rows.keys():
-            reader.block.messages.append(Message(phrase("aicon.bar", first=first, second=second), path))
+        if not {first, second} <= block.point_rows.keys():
+            block.messages.append(Message(phrase("aicon.bar", first=first, second=second), path))
             continue
         if not (length > 0 and sd > 0) or first == second:
             raise card.place.error(phrase("aicon.length"))
-        reader.block.observations.append(Distance(first, second, length, sd))
+        block.observations.append(Distance(first, second, length, sd))
 
 
 FORMAT = Format(name="aicon", title=TITLE, recognises=partial(has_suffix, IMAGES), read=read)

@@ -107,42 +107,38 @@ def _model(document: Tree, wanted: int | None, messages: list[Message]) -> Tree:
     return models[chosen]
 
 
+_PROJECTIONS = {
+    "perspective": ("radial", "k1 k2"),
+    "fisheye": ("radial_fisheye", "k1 k2"),
+    "simple_radial": ("opencv", "k1"),
+    "radial": ("opencv", "k1 k2"),
+    "brown": ("full_opencv", "k1 k2 k3 p1 p2"),
+    "fisheye_opencv": ("opencv_fisheye", "k1 k2 k3 k4"),
+    **dict.fromkeys(("spherical", "equirectangular"), ("equirectangular", "")),
+}
+"""Camera model of each type of projection, and its terms of distortion."""
+
+
 def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
     kind = each.get("projection_type", "perspective")
-    scale = float(max(width, height))
-    middle = {"cx": width / 2, "cy": height / 2}
-
-    def terms(*names: str) -> dict[str, float]:
-        return {term: each.get(term, 0.0).number() for term in names}
-
-    if kind.value in ("perspective", "fisheye"):
-        model = "radial" if kind.value == "perspective" else "radial_fisheye"
-        return Camera(model, {"f": scale * each["focal"].number(), **middle, **terms("k1", "k2")}, name=name)
-    if kind.value in ("spherical", "equirectangular"):
+    if not isinstance(kind.value, str) or kind.value not in _PROJECTIONS:
+        raise unknown(kind, "projection type", _PROJECTIONS)
+    model, terms = _PROJECTIONS[kind.value]
+    if model == "equirectangular":
         if width != 2 * height:
             raise each.error(phrase("opensfm.spherical", width=width, height=height))
-        return Camera("equirectangular", {"w": float(width), "h": float(height)}, name=name)
-    models = {
-        "simple_radial": ("opencv", ("k1",)),
-        "radial": ("opencv", ("k1", "k2")),
-        "brown": ("full_opencv", ("k1", "k2", "k3", "p1", "p2")),
-        "fisheye_opencv": ("opencv_fisheye", ("k1", "k2", "k3", "k4")),
-    }
-    if not isinstance(kind.value, str) or kind.value not in models:
-        raise unknown(kind, "projection type", {**models, "perspective": 0, "fisheye": 0, "spherical": 0})
-    model, names = models[kind.value]
-    fx = each["focal_x"].number()
-    return Camera(
-        model,
-        {
-            "fx": scale * fx,
-            "fy": scale * each.get("focal_y", fx).number(),
-            "cx": middle["cx"] + scale * each.get("c_x", 0.0).number(),
-            "cy": middle["cy"] + scale * each.get("c_y", 0.0).number(),
-            **terms(*names),
-        },
-        name=name,
-    )
+        return Camera(model, {"w": float(width), "h": float(height)}, name=name)
+    scale = float(max(width, height))
+    values = {term: each.get(term, 0.0).number() for term in terms.split()}
+    values |= {"cx": width / 2, "cy": height / 2}
+    if model.startswith("radial"):
+        values["f"] = scale * each["focal"].number()
+    else:
+        fx = each["focal_x"].number()
+        values |= {"fx": scale * fx, "fy": scale * each.get("focal_y", fx).number()}
+        for axis in "xy":
+            values[f"c{axis}"] += scale * each.get(f"c_{axis}", 0.0).number()
+    return Camera(model, values, name=name)
 
 
 def _gps(shots: dict[str, Tree], options: ReadOptions, messages: list[Message]) -> Observations[Position]:

@@ -74,45 +74,32 @@ def known_points(
         sd[:, 2] = np.where(points.is_constrained[rows], sd[:, 2], 0.0)
     sd[points.is_fixed[rows]] = 0.0
     known = KnownPoints(coordinates, sd, coordinates, [], [])
-    _constrain(known, network, rows, metres, spheroid, place)
-    return replace(known, positions=np.where(np.isfinite(sd), coordinates, np.nan))
-
-
-def full_matrices(packed: Floats) -> Floats:
-    """Return (n, 3, 3) symmetric matrices of (n, 6) upper triangles, row by row."""
-    return packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
-
-
-def _constrain(
-    known: KnownPoints,
-    network: ControlNetwork,
-    rows: Indices,
-    metres: Floats,
-    spheroid: Spheroid | None,
-    place: Place,
-) -> None:
-    """Apply the covariance matrices of constrained points."""
-    points, own = network.points, np.flatnonzero(network.points.is_constrained[rows])
+    own = np.flatnonzero(points.is_constrained[rows])
     covariances = full_matrices(points.apriori_covariance[rows[own]])
     given = np.isfinite(covariances).all(axis=(1, 2))
     _report(known, "isis.no-covariance", points.ids, rows[own[~given]])
     own, covariances = own[given], covariances[given]
     bad = np.flatnonzero(~(np.linalg.eigvalsh(covariances) > 0).all(axis=1))
     if len(bad):
-        name = points.ids[rows[own[bad[0]]]]
-        raise place.error(phrase("isis.covariance", point=name))
+        raise place.error(phrase("isis.covariance", point=points.ids[rows[own[bad[0]]]]))
     if spheroid:
-        axes = local_frames(known.starts[own])
+        axes = local_frames(coordinates[own])
         covariances = axes @ covariances @ axes.transpose(0, 2, 1)
-    single = points.constrained[rows[own]][:, _LOCAL if spheroid else [0, 1, 2]]
+    single = points.constrained[rows[own]][:, order]
     whole = single.all(axis=1) | ~single.any(axis=1)
     for row, covariance in zip(own[whole], covariances[whole], strict=True):
-        known.sd[row] = np.inf
-        known.controls.append(Control(points.ids[rows[row]], known.starts[row], covariance=covariance))
+        sd[row] = np.inf
+        known.controls.append(Control(points.ids[rows[row]], coordinates[row], covariance=covariance))
     deviations = np.sqrt(np.einsum("nkk->nk", covariances)) * metres[own]
     parts = np.flatnonzero(~whole)
-    known.sd[own[parts]] = np.where(single[parts], deviations[parts], known.sd[own[parts]])
+    sd[own[parts]] = np.where(single[parts], deviations[parts], sd[own[parts]])
     _report(known, "isis.single-coordinates", points.ids, rows[own[parts]])
+    return replace(known, positions=np.where(np.isfinite(sd), coordinates, np.nan))
+
+
+def full_matrices(packed: Floats) -> Floats:
+    """Return (n, 3, 3) symmetric matrices of (n, 6) upper triangles, row by row."""
+    return packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
 
 def _report(known: KnownPoints, code: str, ids: Sequence[str], rows: Indices) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from photogram.errors import InputError, message_of
+from photogram.io.column_table import FALSE, TRUE
 from photogram.io.files import read_lines
 from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.messages import unknown_name
@@ -25,11 +26,9 @@ MOST = 8  # The highest degree of a polynomial
 
 
 def _yes(text: str) -> bool:
-    if text.lower() in ("yes", "y", "true", "t", "on", "1"):
-        return True
-    if text.lower() in ("no", "n", "false", "f", "off", "0"):
-        return False
-    raise InputError(phrase("format.unknown", what="value", value=text, names=["yes", "no"]))
+    if text.lower() not in TRUE | FALSE:
+        raise InputError(phrase("format.unknown", what="value", value=text, names=["yes", "no"]))
+    return text.lower() in TRUE
 
 
 def _degree(text: str) -> int:
