@@ -14,6 +14,7 @@ from photogram.film.marks import DECIDED, which_mark
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
+from photogram.io.column_table import ColumnTable
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
@@ -210,7 +211,7 @@ def _name_marks(tables: Tables, photo: ScannedPhoto, photos: Sequence[ScannedPho
     return None
 
 
-def side_of(tables: Tables, photo: ScannedPhoto, photos: Sequence[ScannedPhoto]) -> bool:
+def side_of(tables: Tables, table: ColumnTable, photo: ScannedPhoto, photos: Sequence[ScannedPhoto]) -> bool:
     """Return whether a photo is mirrored: given, by marks, or by images."""
     given, q = photo.given_side, photo.places
     true = photo.true if len(q) else q
@@ -218,7 +219,7 @@ def side_of(tables: Tables, photo: ScannedPhoto, photos: Sequence[ScannedPhoto])
     if given is not None and found is not None and found != given:
         sides = mirror_message(given, side_residuals(q, true))
         message = phrase("error.at", what=f"photo {photo.name}", message=sides)
-        raise ContradictionError.of(tables.rows("photos").error(photo.row, message))
+        raise ContradictionError.of(table.error(photo.row, message))
     if found is None and given is None and len(q) > 1:
         chosen = photo.way_by_images([Lying(q, False), Lying(q, True)], photos)
         found = None if chosen is None else bool(chosen)

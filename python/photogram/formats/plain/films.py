@@ -82,8 +82,7 @@ def read_scanned(
 
     `points` are the (n, 3) coordinates of all points of the images; NaN where unknown.
     """
-    texts = photos.table.texts("film")
-    films = [texts[row] for row in photos.rows.tolist()]
+    films = photos.table.texts("film")
     scanned = np.array([bool(name) for name in films], dtype=bool)
     for table in ("fiducial_images", "fiducials", "films", "scanners"):
         if table in tables.settings.tables and not scanned.any():
@@ -93,8 +92,8 @@ def read_scanned(
     if scanned.any():
         if tables.settings.image == "um":
             raise InputError(phrase("plain.film-unit"), file=tables.settings.path)
-        reader = _Reader(tables, photos, cameras, covariances, films)
-        reader.photos = reader.scanned_photos(images, points, films)
+        reader = _Reader(tables, photos, cameras, covariances)
+        reader.photos = reader.scanned_photos(images, points)
         read_marks(tables, photos, reader.photos)
         reader.read(found)
         if tables.settings.interior == "before":
@@ -104,22 +103,16 @@ def read_scanned(
 
 
 class _Reader:
-    def __init__(
-        self,
-        tables: Tables,
-        photos: Photos,
-        cameras: Cameras,
-        covariances: Covariances,
-        films: Sequence[str],
-    ) -> None:
+    def __init__(self, tables: Tables, photos: Photos, cameras: Cameras, covariances: Covariances) -> None:
         self.tables, self.table, self.covariances = tables, photos.table, covariances
         self.all_photos, self.cameras = photos, cameras
         self.machines = read_scanners(tables, covariances)
-        self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
+        self.films = photos.table.texts("film")
+        self.kinds = read_films(tables, list(dict.fromkeys(filter(None, self.films))), tables.settings.film)
         self.fiducials = read_fiducials(tables, set(photos.taken), cameras.certificates)
         self.photos: list[ScannedPhoto] = []
 
-    def scanned_photos(self, images: Images, points: Floats, films: Sequence[str]) -> list[ScannedPhoto]:
+    def scanned_photos(self, images: Images, points: Floats) -> list[ScannedPhoto]:
         """Return the photos on film with their images."""
         photos, table = self.all_photos, self.table
         comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
@@ -130,7 +123,7 @@ class _Reader:
             for camera, own in self.fiducials.items()
         }
         found = []
-        for at, (row, film) in enumerate(zip(photos.rows.tolist(), films, strict=True)):
+        for row, film in enumerate(self.films):
             if not film:
                 continue
             name, side = scanners[row], sides[row].lower()
@@ -139,22 +132,22 @@ class _Reader:
             machine = self.machines[name] if name else next(iter(self.machines.values()), comparator)
             if side and side not in TRUE | FALSE:
                 raise table.cell_error(row, "mirrored", "error.flag", value=side)
-            own = np.flatnonzero(images.photos == at)
-            c = -abs(self.cameras.cameras[photos.cameras[at]].parameters.get("c", np.nan))
+            own = np.flatnonzero(images.photos == row)
+            c = -abs(self.cameras.cameras[photos.cameras[row]].parameters.get("c", np.nan))
             found.append(
                 ScannedPhoto(
-                    photos.names[at],
+                    photos.names[row],
                     row,
-                    photos.taken[at],
+                    photos.taken[row],
                     film,
                     machine,
-                    places.get(photos.taken[at], {}),
+                    places.get(photos.taken[row], {}),
                     side in TRUE if side else None,
                     images.xy[own],
                     sd[own],
                     images.points[own],
                     points[images.points[own]],
-                    (photos.centres[at], photos.matrices[at], c),
+                    (photos.centres[row], photos.matrices[row], c),
                 )
             )
         return found
@@ -203,7 +196,7 @@ class _Reader:
         given = self.table.vectors(_START)
         found: list[tuple[bool, Floats | None]] = []
         for photo in self.photos:
-            mirrored = side_of(self.tables, photo, self.photos)
+            mirrored = side_of(self.tables, self.table, photo, self.photos)
             if message := scale_message(photo, mirrored=mirrored):
                 raise ContradictionError.of(self.table.error(photo.row, message))
             start: Floats | None = None if np.isnan(given[photo.row]).any() else given[photo.row]

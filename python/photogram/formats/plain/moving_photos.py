@@ -59,15 +59,16 @@ def read_timed(
         for field in ("clock", "rate")
     )
     found: list[Timed] = []
-    for place, row in enumerate(photos.rows.tolist()):
-        name, camera, time = photos.names[place], photos.cameras[place], float(photos.times[place])
+    for row, (name, camera, time) in enumerate(
+        zip(photos.names, photos.cameras, photos.times.tolist(), strict=True)
+    ):
         rig, sensor, clock = on_rigs[row], None, clocks[row]
         if rig is None and as_sensors[row]:
             if len(rigs) != 1:
                 raise table.cell_error(row, "rig", "error.empty")
             (rig,) = rigs.values()
         if rig is not None:
-            own = sensor_of(table, row, rig, as_sensors[row] or photos.taken[place])
+            own = sensor_of(table, row, rig, as_sensors[row] or photos.taken[row])
             sensor, clock = rig.sensors.get(own), clock or rig.clocks.get(own)
         said = {
             "trajectory": on[row],
@@ -85,7 +86,7 @@ def read_timed(
         if not math.isnan(time):
             given["time"] = time
         flown, scanned = "trajectory" in given, "lines" in given
-        sd = photos.attitude_sd[place]
+        sd = photos.attitude_sd[row]
         contradictions = {
             "plain.motion-columns": flown and "velocity" in given,
             "plain.line-times-of-frame": scanned and "line_sensor" not in given,

@@ -26,13 +26,9 @@ _OF_IMAGES = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 @dataclass(frozen=True)
 class Photos:
-    """The table of photos in the project frame; unused photos are separate.
-
-    `rows` are the used rows of the table.
-    """
+    """The used rows of the table of photos in the project frame, and the names of unused photos."""
 
     table: ColumnTable
-    rows: Indices
     names: list[str]
     cameras: list[int]
     taken: list[str]
@@ -50,8 +46,11 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     """Read the table of photos; raises the errors of :func:`read`."""
     table = tables.read("photos")
     assert table is not None  # The table of images names photos, too
-    texts = table.names_once("photo")
-    use = table.flags("use")
+    everything, use = table.names_once("photo"), table.flags("use")
+    unused = frozenset(name for name, used in zip(everything, use.tolist(), strict=True) if not used)
+    if unused:
+        table = table.some(np.flatnonzero(use).tolist())
+        tables.remark("plain.unused-photos", table.path, n=len(unused))
     centres = table.vectors(AXES)
     flown = np.array([bool(each) for each in table.texts("trajectory")], dtype=bool)
     sd = tables.deviations(table, "photos", SD_AXES, math.inf)
@@ -68,26 +67,20 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     for row in np.flatnonzero(flown).tolist():
         if np.isfinite([*sd[row], *attitude_sd[row]]).any() or row in observed:
             raise table.error(row, phrase("plain.sd-on-trajectory"))
-    kept = np.flatnonzero(use)
-    if len(kept) < table.count:
-        tables.remark("plain.unused-photos", table.path, n=table.count - len(kept))
-    names = [each.name for each in cameras.cameras]
-    which, groups = cameras_of(table, names), table.texts("group")
-    unused = frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used)
+    which = cameras_of(table, [each.name for each in cameras.cameras])
     return Photos(
         table,
-        kept,
-        [texts[row] for row in kept],
-        [which[row] for row in kept],
-        [cameras.cameras[which[row]].name for row in kept],
-        centres[kept],
-        matrices[kept],
-        sd[kept],
-        attitude_sd[kept],
-        [groups[row] for row in kept],
-        table.numbers("time")[kept],
+        table.texts("photo"),
+        which,
+        [cameras.cameras[row].name for row in which],
+        centres,
+        matrices,
+        sd,
+        attitude_sd,
+        table.texts("group"),
+        table.numbers("time"),
         unused,
-        list(made_of_rows(table, Attitude, {row: own for row, own in observed.items() if use[row]})),
+        list(made_of_rows(table, Attitude, observed)),
     )
 
 
