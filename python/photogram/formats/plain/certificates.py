@@ -36,42 +36,38 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
     table = tables.read("photos")
     if table is None or (not tables.settings.certificates and "certificate" not in table):
         return {}
-    listed = tables.read("cameras")
-    only = "" if listed is None or listed.count != 1 else listed.texts("camera")[0]
-    names, texts = table.texts("camera"), table.texts("certificate")
-    cameras = {row: names[row] or only for row, film in enumerate(table.texts("film")) if film}
-    found: dict[str, Path] = {}
-    for row, camera in cameras.items():
-        if not texts[row]:
+    listed = tables.rows("cameras")
+    only = listed.texts("camera")[0] if listed.count == 1 else ""
+    files = dict[str, Path]()
+    flown = dict[str, dict[date | None, int]]()  # First row of each date of a camera
+    columns = (table.texts(name) for name in ("film", "camera", "certificate", "flown"))
+    for row, (film, name, file, text) in enumerate(zip(*columns, strict=True)):
+        if not film:
             continue
-        path = table.path.parent / texts[row]
-        if found.setdefault(camera, path) != path:
-            fields = {"camera": camera, "certificate": found[camera].name}
-            raise table.cell_error(row, "certificate", "plain.other-certificate", **fields)
-    certificates = {camera: _read(path, camera) for camera, path in found.items()}
-    rest = [name for name in dict.fromkeys(cameras.values()) if name not in found]
-    several = _of_settings(tables, rest)
-    flown = _flown(tables, table, cameras)
-    for camera, each in several.items():
-        certificates[camera] = _valid(table, camera, each, flown[camera])
-    for camera, own in certificates.items():
-        _tell(tables, camera, own, several.get(camera, [own]), sorted(filter(None, flown[camera])))
-    return certificates
-
-
-def _flown(
-    tables: Tables, table: ColumnTable, cameras: Mapping[int, str]
-) -> dict[str, dict[date | None, int]]:
-    """Return the flight dates of each camera, with the first row of each."""
-    texts = table.texts("flown")
-    found: dict[str, dict[date | None, int]] = {}
-    for row, camera in cameras.items():
+        camera = name or only
         try:
-            day = day_of(texts[row]) if texts[row] else tables.settings.flown
+            day = day_of(text) if text else tables.settings.flown
         except ValueError:
-            raise table.cell_error(row, "flown", "error.day", value=texts[row]) from None
-        found.setdefault(camera, {}).setdefault(day, row)
-    return found
+            raise table.cell_error(row, "flown", "error.day", value=text) from None
+        flown.setdefault(camera, {}).setdefault(day, row)
+        if file and files.setdefault(camera, table.path.parent / file) != table.path.parent / file:
+            fields = {"camera": camera, "certificate": files[camera].name}
+            raise table.cell_error(row, "certificate", "plain.other-certificate", **fields)
+    several = {camera: [_read(path, camera)] for camera, path in files.items()}
+    several |= _of_settings(tables, [camera for camera in flown if camera not in files])
+    certificates = {camera: _valid(table, camera, own, flown[camera]) for camera, own in several.items()}
+    for camera, own in certificates.items():
+        remarks: list[str | Phrase] = list(own.told())
+        days = sorted(filter(None, flown[camera]))
+        if not days or len(several[camera]) > 1 or own.verdict.exit_code():
+            dated = phrase("plain.undated") if own.day is None else str(own.day)
+            fields = {"n": len(several[camera]), "day": dated, "verdict": str(own.verdict.headline)}
+            remarks.insert(0, phrase("plain.certificate", **fields))
+        for day in sorted({*days[:1], *days[-1:]}):
+            remarks += [age_remark(own, day), changed_remark(own, several[camera], day)]
+        for message in filter(None, remarks):
+            tables.remark("error.at", own.file, what=f"camera {camera}", message=message)
+    return certificates
 
 
 def _valid(
@@ -121,21 +117,6 @@ def _of_settings(tables: Tables, cameras: Sequence[str]) -> dict[str, list[Certi
             message = phrase("plain.certificates-of", camera=camera, names=sorted(names))
             raise InputError(message, file=tables.settings.path)
     return found
-
-
-def _tell(
-    tables: Tables, camera: str, own: Certificate, several: Sequence[Certificate], flown: Sequence[date]
-) -> None:
-    """Report gaps of a camera certificate, and its age at the flight."""
-    remarks: list[str | Phrase] = list(own.told())
-    if not flown or len(several) > 1 or own.verdict.exit_code():
-        dated = phrase("plain.undated") if own.day is None else str(own.day)
-        fields = {"n": len(several), "day": dated, "verdict": str(own.verdict.headline)}
-        remarks.insert(0, phrase("plain.certificate", **fields))
-    for day in sorted({*flown[:1], *flown[-1:]}):
-        remarks += [age_remark(own, day), changed_remark(own, several, day)]
-    for message in filter(None, remarks):
-        tables.remark("error.at", own.file, what=f"camera {camera}", message=message)
 
 
 def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera:
