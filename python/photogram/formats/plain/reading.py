@@ -186,9 +186,9 @@ def _unknowns(
     """Return the shared parameters that may have covariances."""
     found = [one for own in dict.fromkeys(observations.column("unknowns")) for one in own if one is not None]
     found += of_records(observations)
-    found += [each.sensor for each in mounts]
+    found += [each.sensor for each in (*mounts, *timed) if each.sensor is not None]
     for each in timed:
-        found += [*([] if each.sensor is None else [each.sensor]), *each.scalars]
+        found += each.scalars
         if each.trajectory is not None:
             found += [one for own in each.trajectory.coefficients for one in own]
     return found
@@ -221,11 +221,11 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     sd = tables.deviations(table, "control", SD_AXES)
     if "check" in tables.settings.sd:
         sd = np.where(check, tables.deviations(table, "check", SD_AXES), sd)
-    for row, use in enumerate(uses):
-        if np.isnan(values[row]).all():
-            raise table.error(row, phrase("plain.no-coordinates", point=names[row]))
-        if use == "control" and (np.isnan(sd[row]) & ~np.isnan(values[row])).any():
-            raise table.error(row, phrase("plain.control-sd", point=names[row]))
+    is_control = np.array([each == "control" for each in uses], dtype=bool)
+    without_sd = is_control & (np.isnan(sd) & ~np.isnan(values)).any(axis=1)
+    for code, wrong in (("no-coordinates", np.isnan(values).all(axis=1)), ("control-sd", without_sd)):
+        for row in np.flatnonzero(wrong)[:1].tolist():
+            raise table.error(row, phrase(f"plain.{code}", point=names[row]))
     sd = np.where(np.isnan(sd) | np.isnan(values), np.inf, sd)
     covariances = covariances_of(np.where(np.isinf(sd), 0.0, sd), table)
     values, turned = transform.positions("control", values, covariances, table)
@@ -233,20 +233,15 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     tilted = (turned != turned * np.eye(3)).any(axis=(1, 2))[:, np.newaxis]
     own = np.where(tilted, np.sqrt(np.diagonal(turned, axis1=1, axis2=2)), sd)
     check_sd = np.where(check & np.isfinite(sd), own, np.nan)
-    observed: list[Observation] = []
-    held = sd.copy()
-    for row, use in enumerate(uses):
-        if use != "control":
-            held[row] = np.inf
-            continue
-        # Rotation does not change an isotropic covariance matrix.
-        isotropic = (covariances[row] == covariances[row][0, 0] * np.eye(3)).all()
-        correlated = (turned[row] - np.diag(np.diag(turned[row]))).any()
-        if correlated and np.isfinite(sd[row]).all() and not isotropic:
-            if not is_covariance(turned[row]):
-                raise table.error(row, phrase("error.covariance"))
-            observed.append(Control(names[row], values[row], covariance=(turned[row] + turned[row].T) / 2))
-            held[row] = np.inf
+    held, observed = np.where(is_control[:, np.newaxis], sd, np.inf), list[Observation]()
+    # Rotation does not change an isotropic covariance matrix.
+    isotropic = (covariances == covariances[:, :1, :1] * np.eye(3)).all(axis=(1, 2))
+    correlated = (turned * (1 - np.eye(3))).any(axis=(1, 2)) & np.isfinite(sd).all(axis=1)
+    for row in np.flatnonzero(is_control & correlated & ~isotropic).tolist():
+        if not is_covariance(turned[row]):
+            raise table.error(row, phrase("error.covariance"))
+        observed.append(Control(names[row], values[row], covariance=(turned[row] + turned[row].T) / 2))
+        held[row] = np.inf
     off = np.array([use == "off" for use in uses], dtype=bool)[:, np.newaxis]
     values = np.where(off, np.nan, values)
     vegetated = read_cover(table, names, uses)
