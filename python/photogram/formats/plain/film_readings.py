@@ -276,21 +276,16 @@ def mark_remarks(photos: Sequence[ScannedPhoto], found: Sequence[bool | None]) -
         said.append(phrase("plain.mirrored-photos", n=len(mirrored), all=len(photos)))
     elif mirrored:
         said.append(phrase("plain.mirrored-films", names=mirrored))
-    said += _resampled(photos)
-    return said + list(_round(photos))
-
-
-def _resampled(photos: Sequence[ScannedPhoto]) -> list[Phrase]:
-    """Return a remark on resampled scans: marks of all photos are at the same pixels."""
     readings: dict[tuple[str, str], list[Floats]] = {}
     pixels = [photo for photo in photos if photo.machine.readings.pitch != 1.0]
     for photo in pixels:
         for mark, reading in zip(photo.marks, photo.readings, strict=True):
             readings.setdefault((photo.camera, mark), []).append(reading)
     several = [np.ptp(each, axis=0).max() for each in readings.values() if len(each) > 1]
-    if len(pixels) < 3 or len(several) < 2 or max(several) > SAME:
-        return []
-    return [phrase("plain.resampled")]
+    # Marks of all photos are at the same pixels if the scans were resampled to them.
+    if len(pixels) > 2 and len(several) > 1 and max(several) <= SAME:
+        said.append(phrase("plain.resampled"))
+    return said + list(_round(photos))
 
 
 def _round(photos: Sequence[ScannedPhoto]) -> Iterator[Phrase]:

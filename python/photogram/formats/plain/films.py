@@ -43,7 +43,6 @@ from photogram.formats.project import Project
 from photogram.io.column_table import FALSE, TRUE
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
-from photogram.network.cameras import Camera
 from photogram.network.films import (
     Film,
     FilmBend,
@@ -314,21 +313,17 @@ def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[M
     for row in used:
         camera = found[row]
         if camera.image_y == "up" and camera.parameters.get("c", -1.0) > 0:
-            found[row] = camera = _positive(camera)
+            covariance = camera.covariance
+            if covariance is not None:
+                names, matrix = covariance
+                signs = signs_in_files(names)
+                covariance = names, np.asarray(matrix) * signs * signs[:, np.newaxis]
+            parameters = {**camera.parameters, "c": -camera.parameters["c"]}
+            found[row] = camera = camera.replace(parameters=parameters, covariance=covariance)
             messages.append(Message(phrase("plain.negative-distance", camera=camera.name)))
         if camera.direction == "backward" and not cameras.weights_given[row]:
             found[row] = camera.replace(weights="measured")
     return replace(cameras, cameras=found)
-
-
-def _positive(camera: Camera) -> Camera:
-    covariance = camera.covariance
-    if covariance is not None:
-        names, matrix = covariance
-        signs = signs_in_files(names)
-        covariance = names, np.asarray(matrix) * signs * signs[:, np.newaxis]
-    parameters = {**camera.parameters, "c": -camera.parameters["c"]}
-    return camera.replace(parameters=parameters, covariance=covariance)
 
 
 class WrittenFilms:

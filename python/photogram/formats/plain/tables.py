@@ -284,7 +284,13 @@ class Tables:
         found = np.full((len(values), 3, 3), np.nan)
         known = np.flatnonzero(~np.isnan(values).any(axis=1))
         if len(known):
-            self._check_rows(table, values, known)
+            kind = self.settings.attitude
+            for row in known.tolist() if kind in ("quaternion", "matrix") else ():
+                size = float(np.linalg.norm(values[row]))
+                if kind == "quaternion" and not 0.99 < size < 1.01:
+                    raise table.error(row, phrase("plain.quaternion", length=size))
+                if kind == "matrix" and not is_rotation(values[row].reshape(3, 3)):
+                    raise table.error(row, phrase("plain.rotation-matrix"))
             found[known] = matrices_of(self.settings, values[known])
         return found
 
@@ -309,17 +315,6 @@ class Tables:
         if column.removeprefix("sd_") in ANGULAR:
             return self.angles(table, [column], default, infinite=True)[:, 0]
         return table.numbers(column, default, infinite=True)
-
-    def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
-        """Reject invalid quaternions and matrices, with their rows."""
-        kind = self.settings.attitude
-        for row in known.tolist():
-            if kind == "quaternion":
-                size = float(np.linalg.norm(values[row]))
-                if not 0.99 < size < 1.01:
-                    raise table.error(row, phrase("plain.quaternion", length=size))
-            elif kind == "matrix" and not is_rotation(values[row].reshape(3, 3)):
-                raise table.error(row, phrase("plain.rotation-matrix"))
 
     def deviations(
         self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan

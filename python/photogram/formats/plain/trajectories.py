@@ -341,21 +341,16 @@ def _beside(block: Block) -> list[tuple[Smoothness, Place | None]]:
         for k, each in enumerate(own)
     }
     made_by_splines = {_content(each) for trajectory in shared for each in smoothness_of(trajectory)}
-    own = [each for each in block.observations if isinstance(each, Smoothness)]
-    return [
-        (each, _first(each.coefficients, places)) for each in own if _content(each) not in made_by_splines
-    ]
+    found: list[tuple[Smoothness, Place | None]] = []
+    for each in block.observations.of_type(Smoothness):
+        if _content(each) in made_by_splines:
+            continue
+        keys = [places.get(id(one)) for one in each.coefficients]
+        first = keys[0]
+        expected = [] if first is None else [(*first[:2], first[2] + k) for k in range(len(keys))]
+        found.append((each, first if keys == expected and len(keys) <= len(FACTORS) else None))
+    return found
 
 
 def _content(each: Observation) -> tuple[object, ...]:
     return (*map(id, each.unknowns), each.observed.tobytes(), each.precision.tobytes())
-
-
-def _first(coefficients: Sequence[object], places: Mapping[int, Place]) -> Place | None:
-    """Return the key of the first of neighbouring coefficients; None for others."""
-    found = [places.get(id(each)) for each in coefficients]
-    first = found[0]
-    if first is None or len(found) > len(FACTORS):
-        return None
-    expected = [(*first[:2], first[2] + k) for k in range(len(found))]
-    return first if found == expected else None

@@ -127,28 +127,22 @@ def value_columns(block: Block, unknown: Parameter, own: Sequence[Any]) -> dict[
     """Return the columns of values and standard deviations of unknowns."""
     found: dict[str, Any] = {}
     for column in unknown.values:
-        shape = (3, 3) if column.kind in TURNS else (len(column.names),)
-        values = np.array([np.broadcast_to(_value(each, column), shape) for each in own])
+        turns = column.kind in TURNS
+        values = np.full((len(own), *((3, 3) if turns else (len(column.names),))), math.nan)
+        for row, each in enumerate(own):
+            value = getattr(each, column.field) if isinstance(each, Unknown) else each  # A fixed value
+            if value is None and turns and isinstance(each, Unknown) and not each.is_open:
+                value = np.eye(3)
+            if value is not None:
+                values[row] = value
         if column.kind == "mounting":
             values = values.transpose(0, 2, 1)
-        if column.kind in TURNS or not (np.isnan(values).all() and math.isnan(column.number)):
+        if turns or not (np.isnan(values).all() and math.isnan(column.number)):
             found |= written_values(block, column, values)
-    sd = np.array([_deviations(each, len(unknown.sd)) for each in own], dtype=float)
+    sd = np.full((len(own), len(unknown.sd)), math.nan)
+    for row, each in enumerate(own):
+        if each is not None:
+            sd[row] = each.deviations if isinstance(each, Unknown) else 0.0
     for name, deviations in zip(unknown.sd, sd.T, strict=True):
         found[name] = degrees_typed(deviations) if name.removeprefix("sd_") in ANGULAR else deviations
     return found
-
-
-def _value(own: Any, column: Column) -> Any:
-    """Return the value of an unknown or a fixed value; NaN if it is missing."""
-    if own is None or not isinstance(own, Unknown):
-        return math.nan if own is None else own
-    value = getattr(own, column.field)
-    missing = np.eye(3) if column.kind in TURNS and not own.is_open else math.nan
-    return missing if value is None else value
-
-
-def _deviations(own: Any, count: int) -> Any:
-    if isinstance(own, Unknown):
-        return own.deviations
-    return (math.nan if own is None else 0.0,) * count
