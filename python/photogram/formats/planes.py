@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.refraction import METRES_PER_UNIT
@@ -18,40 +17,25 @@ LIKE_A_PLANE = 1e5  # Metres: if both coordinates are larger, they are map coord
 STEP = 100.0  # Metres, for the computation of scales
 
 
-@dataclass(frozen=True)
-class Bend:
-    """Effect of a map projection on a block."""
+def bend(xyz: Floats, crs: str = "") -> Phrase:
+    """Return the effect of a map projection on (n, 3) positions, metres.
 
-    extent: float  # From the centre of the block to its edge, metres
-    curvature: float  # Height of the plane above a level surface at the edge, d^2 / 2R, metres
-    # Smallest and largest relative excess of horizontal lengths in the plane over lengths in space; heights
-    # have scale 1. None if the projection is unknown
-    scale: tuple[float, float] | None
-
-    @property
-    def phrase(self) -> Phrase:
-        """The effect in words."""
-        sizes = {"curvature": self.curvature, "extent": self.extent}
-        if self.scale is None:
-            return phrase("planes.heights", **sizes)
-        least, largest = (1e6 * part for part in self.scale)
-        return phrase("planes.scales", **sizes, least=least, largest=largest)
-
-
-def bend(xyz: Floats, crs: str = "") -> Bend:
-    """Return the effect of a map projection on (n, 3) positions, metres."""
+    `extent` is the distance from the centre of the block to its edge, `curvature` the height of the plane
+    above a level surface at the edge, d^2 / 2R. If the projection is known, `least` and `largest` are the
+    relative excess (ppm) of horizontal lengths in the plane over lengths in space; heights have scale 1.
+    """
     middle = (xyz.min(axis=0) + xyz.max(axis=0)) / 2
     extent = float(np.hypot(*(xyz - middle)[:, :2].T).max())
-    scale = None
-    if crs:
-        from photogram.formats.crs import geocentric
+    sizes = {"curvature": extent**2 / (2 * RADIUS), "extent": extent}
+    if not crs:
+        return phrase("planes.heights", **sizes)
+    from photogram.formats.crs import geocentric
 
-        corners = np.array([middle, *xyz[xyz[:, :2].argmin(axis=0)], *xyz[xyz[:, :2].argmax(axis=0)]])
-        east = np.array([STEP / 2, 0.0, 0.0])
-        steps = geocentric(crs, corners + east) - geocentric(crs, corners - east)
-        found = STEP / np.linalg.norm(steps, axis=1) - 1
-        scale = float(found.min()), float(found.max())
-    return Bend(extent, extent**2 / (2 * RADIUS), scale)
+    corners = np.array([middle, *xyz[xyz[:, :2].argmin(axis=0)], *xyz[xyz[:, :2].argmax(axis=0)]])
+    east = np.array([STEP / 2, 0.0, 0.0])
+    steps = geocentric(crs, corners + east) - geocentric(crs, corners - east)
+    found = 1e6 * (STEP / np.linalg.norm(steps, axis=1) - 1)
+    return phrase("planes.scales", **sizes, least=float(found.min()), largest=float(found.max()))
 
 
 def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> list[Message]:
@@ -71,8 +55,8 @@ def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> lis
 
         if not is_projected(frame.crs):
             return []
-        return [Message(phrase("planes.projected", crs=frame.crs, bend=bend(known, frame.crs).phrase), path)]
+        return [Message(phrase("planes.projected", crs=frame.crs, bend=bend(known, frame.crs)), path)]
     like_a_map = (np.abs(np.median(known[:, :2], axis=0)) > LIKE_A_PLANE).all()
     if not like_a_map or np.abs(known[:, 2]).max() > LIKE_A_PLANE:
         return []
-    return [Message(phrase("planes.map", bend=bend(known).phrase), path)]
+    return [Message(phrase("planes.map", bend=bend(known)), path)]

@@ -26,7 +26,6 @@ from photogram.formats.plain.tables import (
     columns_of,
     correlations,
     covariances_of,
-    different,
     indices_of,
     made,
     made_of_rows,
@@ -254,7 +253,7 @@ def observation_tables(block: Block) -> _Columns:
                 unknowns = [getattr(each, column.field) for each in own]
                 shared.setdefault(f"{column.names[0]}s", []).extend(unknowns)
     for name, unknowns in shared.items():
-        if distinct := different(unknowns):
+        if distinct := [*dict.fromkeys(each for each in unknowns if each is not None)]:
             (part,) = TABLES[name].unknowns
             found[name] = unknown_columns(block, part, distinct, [each.name for each in distinct])
     return found

@@ -444,11 +444,6 @@ def places_written(block: Block, values: Floats) -> Floats:
     return np.column_stack([degrees_typed(values[:, :2]), values[:, 2]])
 
 
-def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
-    """Return the different unknowns, without repetition."""
-    return list({id(each): each for each in unknowns if each is not None}.values())
-
-
 def angles_of(matrices: Floats, block: Block) -> Floats:
     """Return (n, 3) omega, phi, kappa (degrees) of photo axes as columns; NaN for NaN."""
     return degrees_typed(known_angles(angles_form(block.photo_to_ground), matrices), MATRIX_ROUNDING)
