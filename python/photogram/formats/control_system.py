@@ -6,7 +6,7 @@ A mistake is reported with its remedy if its correction improves the fit ten tim
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -102,10 +102,6 @@ def check_systems(
     return []
 
 
-def _times(factors: Sequence[float], xyz: Floats) -> Floats:
-    return np.asarray(xyz * np.asarray(factors))
-
-
 def _swap(table: ColumnTable) -> str:
     return f"--columns x={heading_of(table, 'y')},y={heading_of(table, 'x')}"
 
@@ -126,16 +122,16 @@ def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Ex
     x, y, z = (heading_of(table, axis) for axis in "xyz")
     yield phrase("control-system.swapped"), _swap(table), _swapped
     feet = phrase("control-system.unit", name=z, unit="ft")
-    yield feet, f"--columns z={z}[ft]", partial(_times, (1.0, 1.0, 0.3048))
+    yield feet, f"--columns z={z}[ft]", partial(np.multiply, (1.0, 1.0, 0.3048))
     if free:
         return
     for column, name, sign in (("x", x, (-1, 1, 1)), ("y", y, (1, -1, 1)), ("z", z, (1, 1, -1))):
         reverse = phrase("control-system.sign", name=name)
-        yield reverse, f"--columns {column}=-{name}", partial(_times, sign)
+        yield reverse, f"--columns {column}=-{name}", partial(np.multiply, sign)
     for unit, scale in (("ft", 0.3048), ("mm", 0.001)):
         option = f"--columns x={x}[{unit}],y={y}[{unit}],z={z}[{unit}]"
         every = phrase("control-system.units", unit=unit)
-        yield every, option, partial(_times, (scale, scale, scale))
+        yield every, option, partial(np.multiply, (scale, scale, scale))
     if (values[:, 0] > ZONE).all():
         zone = phrase("control-system.zone", zone=int(values[0, 0] // ZONE))
         option = "--control-crs CRS, whose eastings have the zone (EPSG:4647 is ETRS89, zone 32)"

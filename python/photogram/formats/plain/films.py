@@ -363,9 +363,18 @@ class WrittenFilms:
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Return the tables of films by name."""
+        names = ("column", "row") if self.pixels else ("x", "y")
+        if any(each.precision[0, 1] for each in self.readings):
+            raise InputError(phrase("plain.correlated-readings"))
+        readings = (
+            {"photo": each.photo, "fiducial": self.by_mark[id(each.mark)]}
+            | columns_of(names, each.observed[:2])
+            | columns_of(deviation_columns(names), np.sqrt(np.diag(each.precision)))
+            for each in self.readings
+        )
         rows = {
             "fiducials": (row for own in self.certificates.values() for row in own.rows()),
-            "fiducial_images": map(self._reading, self.readings),
+            "fiducial_images": readings,
             "films": self._film_rows().values(),
             "scanners": map(scanner_cells, self.machines.values()),
         }
@@ -424,11 +433,3 @@ class WrittenFilms:
         if not set(known.known) <= set(found) or np.any(known.values):
             raise InputError(phrase("plain.film-priors", name=known.name))
         return found | dict(zip(known.known, np.sqrt(np.diag(known.precision)).tolist(), strict=True))
-
-    def _reading(self, each: Fiducial) -> dict[str, Any]:
-        names = ("column", "row") if self.pixels else ("x", "y")
-        if each.precision[0, 1]:
-            raise InputError(phrase("plain.correlated-readings"))
-        sd = columns_of(deviation_columns(names), np.sqrt(np.diag(each.precision)))
-        own = {"photo": each.photo, "fiducial": self.by_mark[id(each.mark)]}
-        return {**own, **columns_of(names, each.observed[:2]), **sd}

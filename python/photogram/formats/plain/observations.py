@@ -279,24 +279,16 @@ def _named_groups(own: Sequence[Any], groups: dict[int, str]) -> dict[str, dict[
         }
         keys.append(key := frozenset((field, value) for field, value in cells.items() if value != _NO_ARM))
         if key not in names:
-            numbered = "lever_arm" in group
-            names[key] = str(len(found) + 1) if numbered else _inertial_name(group, found) if key else ""
+            number, boresight = len(found) + 1, group.get("boresight")
+            name = f"IMU {number}" if boresight is None else getattr(boresight, "name", f"known {number}")
+            name = f"{name} {number}" if name in found else name
+            names[key] = str(number) if "lever_arm" in group else name if key else ""
             if names[key]:
                 found[names[key]] = group
     if "lever_arm" in next(iter(found.values()), {}) and not any(keys):
         return {}
     groups |= {id(each): names[key] for each, key in zip(own, keys, strict=True)} if found else {}
     return found
-
-
-def _inertial_name(group: Mapping[str, Any], groups: Mapping[str, Any]) -> str:
-    """Return the name of a group: of its boresight, if it is unique."""
-    number, boresight = len(groups) + 1, group.get("boresight")
-    if isinstance(boresight, Unknown):
-        name = boresight.name
-    else:
-        name = f"IMU {number}" if boresight is None else f"known {number}"
-    return f"{name} {number}" if name in groups else name
 
 
 def _written(block: Block, name: str, own: Sequence[Any], groups: Mapping[int, str]) -> dict[str, Any]:

@@ -101,8 +101,7 @@ def _attitude_weights(
 ) -> tuple[Floats, dict[int, dict[str, Any]]]:
     """Return attitude standard deviations, and arguments of other attitude observations by row."""
     settings = tables.settings
-    own = f"sd_{ANGLES[settings.attitude][0]}", *(f"sd_{name}" for name in ANGLES[settings.attitude][1:])
-    steps = deviation_columns(ROTATIONS)
+    own, steps = deviation_columns(ANGLES[settings.attitude]), deviation_columns(ROTATIONS)
     free = np.full((table.count, 3), np.inf)
     columns = steps if any(each in table for each in steps) else own
     if not any(each in table for each in columns):
