@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ import numpy as np
 class Valued:
     """A dataclass that compares all fields by value; NaN equals NaN.
 
-    Declare it with `eq=False`, which leaves `==` to this class. The hash uses names, types and sizes only.
+    Declare it with `eq=False`, which leaves `==` to this class. The hash uses names and types only.
     """
 
     _BESIDE: ClassVar[frozenset[str]] = frozenset()
@@ -26,16 +26,8 @@ class Valued:
         return all(alike(getattr(self, name), getattr(other, name)) for name in self._compared())
 
     def __hash__(self) -> int:
-        found: list[Any] = [type(self).__name__]
-        for name in self._compared():
-            value = getattr(self, name)
-            if isinstance(value, str | bool | None):
-                found.append(value)
-            elif isinstance(value, np.ndarray):
-                found.append(value.shape)
-            elif isinstance(value, Sequence | Mapping):
-                found.append(len(value))
-        return hash(tuple(found))
+        values = (getattr(self, name) for name in self._compared())
+        return hash((type(self).__name__, *(each for each in values if isinstance(each, str | bool | None))))
 
     def _compared(self) -> list[str]:
         return [each.name for each in fields(self) if each.name not in self._BESIDE]  # type: ignore[arg-type]
