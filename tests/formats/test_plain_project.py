@@ -516,7 +516,7 @@ def test_tables_of_parquet_are_read_as_those_of_text(example):
     with rejected("error.column point: error.no-name"):
         formats.read(example)
     (example / "images.parquet").write_bytes(b"PAR1 and no more")
-    with rejected("error.parse Parquet Could not open Parquet input source"):
+    with rejected("error.parse Parquet Parquet magic bytes not found"):
         formats.read(example)
 
 
