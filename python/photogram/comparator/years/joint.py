@@ -22,7 +22,7 @@ from photogram.comparator.case import exchanged
 from photogram.comparator.correction import PARAMETERS, parameters_of, partials_of
 from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.grid import Grid
-from photogram.comparator.years.record import RecordedCalibration, RecordedCase
+from photogram.comparator.years.record import RecordedCalibration
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
@@ -47,26 +47,24 @@ class Together:
 
 
 @dataclass(frozen=True, eq=False)
-class _Case:
-    """Linear equations of a case: v = A a + G dg + v0, unknowns a, weights of v."""
+class _Equations:
+    """Linear equations of a calibration: v = A a + G dg + v0, with the weights of v.
+
+    `inverse` is the inverse of A' W A, and `mixed` is A' W G.
+    """
 
     own: Floats
     grid: Floats
     rest: Floats
     weight: Floats
-    rows: Indices
-
-
-@dataclass(frozen=True, eq=False)
-class _Reduced:
-    """Calibration with its own unknowns eliminated."""
-
-    cases: list[_Case]
     active: Indices
     inverse: Floats
     mixed: Floats
-    right: Floats
-    unknowns: int
+
+    @property
+    def right(self) -> Floats:
+        """The right-hand side of the own unknowns."""
+        return -self.own.T @ (self.weight * self.rest)
 
 
 def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
@@ -74,23 +72,32 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
     grids = _grids(records)
     starts = dict(zip(grids, np.cumsum([0, *(len(grid.points) for grid in grids.values())]), strict=False))
     size = 2 * sum(len(grid.points) for grid in grids.values())
-    require(4 * 8 * size**2, f"the covariance of {size // 2} grid points")
-    normal, right = np.zeros((size, size)), np.zeros(size)
+    readings = sum(2 * len(case.points) for record in records for case in record.cases)
+    require(8 * size * (4 * size + 2 * readings), f"the covariance of {size // 2} grid points")
     sigma = np.repeat(
         [grid.sigma_um or 0.0 for grid in grids.values()], [2 * len(g.points) for g in grids.values()]
     )
     free = np.flatnonzero(sigma > 0)
-    reduced = [_reduce(record, grids, starts, normal, right) for record in records]
-    normal[free, free] += 1 / sigma[free] ** 2
+    reduced = [_equations(record, grids, starts, size) for record in records]
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    normal[free, free] = 1 / sigma[free] ** 2
+    for each in reduced:
+        normal += each.grid.T @ (each.weight[:, np.newaxis] * each.grid)
+        normal -= each.mixed.T @ each.inverse @ each.mixed
+        right -= each.grid.T @ (each.weight * each.rest) + each.mixed.T @ (each.inverse @ each.right)
     cofactors, shift = np.zeros((size, size)), np.zeros(size)
     cofactors[np.ix_(free, free)] = _inverse(normal[np.ix_(free, free)], "the grid")
     shift[free] = cofactors[np.ix_(free, free)] @ right[free]
     back = [each.inverse @ each.mixed for each in reduced]
     values = [each.inverse @ each.right - own @ shift for each, own in zip(reduced, back, strict=True)]
-    standardized, squares, count = _residuals(reduced, back, values, cofactors, shift)
-    squares += float((shift[free] ** 2 / sigma[free] ** 2).sum())
-    # Every given coordinate is an observation and an unknown.
-    test = global_test(squares, count - sum(each.unknowns for each in reduced))
+    squares, freedom, standardized = float((shift[free] ** 2 / sigma[free] ** 2).sum()), 0, []
+    for record, each, own_back, steps in zip(records, reduced, back, values, strict=True):
+        v, w = _residuals(each, own_back, steps, cofactors, shift)
+        squares += float((each.weight * v**2).sum())
+        # Every given coordinate is an observation and an unknown.
+        freedom += v.size - len(steps)
+        standardized.append(np.split(w, np.cumsum([len(case.points) for case in record.cases])[:-1]))
+    test = global_test(squares, freedom)
     if test is None:
         raise AdjustmentError(phrase("comparators.no-redundancy"))
     scale = test.variance
@@ -138,57 +145,41 @@ def _growth(own: Grid, other: Grid) -> float:
     return 1.0 + own.expansion_per_k * (other.temperature_c - own.temperature_c)
 
 
-def _reduce(
-    record: RecordedCalibration,
-    grids: Mapping[int, Grid],
-    starts: Mapping[int, int],
-    normal: Floats,
-    right: Floats,
-) -> _Reduced:
-    """Add a calibration to the normal equations of the grid, for back substitution."""
-    active = np.flatnonzero(np.diag(record.correction.covariance) > 0)
-    unknowns = len(active) + 3 * len(record.cases)
-    inner, own_right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
-    mixed = np.zeros((unknowns, len(right)))
-    cases = []
-    for k, case in enumerate(record.cases):
-        columns = np.concatenate([np.arange(len(active)), len(active) + 3 * k + np.arange(3)])
-        made = _equations(record, case, grids[case.plate], starts[case.plate], active)
-        cases.append(made)
-        weighted = made.weight[..., np.newaxis] * made.own
-        inner[np.ix_(columns, columns)] += np.einsum("nia,nib->ab", made.own, weighted)
-        own_right[columns] -= np.einsum("nia,ni->a", weighted, made.rest)
-        places = 2 * made.rows[:, np.newaxis] + np.arange(2)
-        across = np.einsum("nia,nij->anj", weighted, made.grid)
-        np.add.at(mixed, np.ix_(columns, places.ravel()), across.reshape(len(columns), -1))
-        within = np.einsum("nij,ni,nik->njk", made.grid, made.weight, made.grid)
-        np.add.at(normal, (places[:, :, np.newaxis], places[:, np.newaxis, :]), within)
-        np.subtract.at(right, places, np.einsum("nij,ni->nj", made.grid, made.weight * made.rest))
-    inverse = _inverse(inner, record.name)
-    normal -= mixed.T @ inverse @ mixed
-    right -= mixed.T @ (inverse @ own_right)
-    return _Reduced(cases, active, inverse, mixed, own_right, unknowns)
-
-
 def _equations(
-    record: RecordedCalibration, case: RecordedCase, grid: Grid, start: int, active: Indices
-) -> _Case:
-    rows = grid.rows_of(case.points)
-    given = exchanged(grid.xy_um[rows] * _growth(grid, record.grids[case.plate]), case.left_handed)
-    correction = record.correction
-    by_parameters, by_reading = partials_of(correction, case.means_um)
-    corrected = correction.apply(case.means_um)
-    turn = rotation_matrix(case.rotation_rad)
-    # The case absorbs a shift of the corrected readings: both refer to their centre.
-    away = corrected - corrected.mean(axis=0)
-    turned = np.stack([away @ turn[1], -away @ turn[0]], axis=1)[..., np.newaxis]
-    back = -np.asarray(np.linalg.inv(turn @ by_reading))
-    ones = np.broadcast_to(np.eye(2), (len(rows), 2, 2))
-    own = back @ np.concatenate([turn @ by_parameters[:, :, active], turned, ones], axis=2)
-    rest = back @ (corrected @ turn.T + case.translation_um - given)[..., np.newaxis]
-    variance = record.random_um**2 + np.array(record.pointing_um) ** 2 / case.counts[:, np.newaxis]
-    to_grid = -back[:, :, ::-1] if case.left_handed else -back
-    return _Case(np.asarray(own), to_grid, rest[..., 0], 1 / variance, start + rows)
+    record: RecordedCalibration, grids: Mapping[int, Grid], starts: Mapping[int, int], size: int
+) -> _Equations:
+    correction, counts = record.correction, [len(case.points) for case in record.cases]
+    active = np.flatnonzero(np.diag(correction.covariance) > 0)
+    own = np.zeros((sum(counts), 2, len(active) + 3 * len(counts)))
+    grid = np.zeros((sum(counts), 2, size))
+    rest, variance = np.empty((sum(counts), 2)), np.empty((sum(counts), 2))
+    for k, (case, end) in enumerate(zip(record.cases, np.cumsum(counts).tolist(), strict=True)):
+        readings, plate = np.arange(end - len(case.points), end), grids[case.plate]
+        points = plate.rows_of(case.points)
+        growth = _growth(plate, record.grids[case.plate])
+        given = exchanged(plate.xy_um[points] * growth, case.left_handed)
+        by_parameters, by_reading = partials_of(correction, case.means_um)
+        corrected = correction.apply(case.means_um)
+        turn = rotation_matrix(case.rotation_rad)
+        # The case absorbs a shift of the corrected readings: both refer to their centre.
+        away = corrected - corrected.mean(axis=0)
+        turned = np.stack([away @ turn[1], -away @ turn[0]], axis=1)[..., np.newaxis]
+        back = -np.asarray(np.linalg.inv(turn @ by_reading))
+        own[readings, :, : len(active)] = back @ turn @ by_parameters[:, :, active]
+        columns = len(active) + 3 * k
+        own[readings, :, columns : columns + 1] = back @ turned
+        own[readings, :, columns + 1 : columns + 3] = back
+        places = 2 * (starts[case.plate] + points)[:, np.newaxis, np.newaxis] + np.arange(2)
+        to_grid = -back[:, :, ::-1] if case.left_handed else -back
+        grid[readings[:, np.newaxis, np.newaxis], np.arange(2)[:, np.newaxis], places] = to_grid
+        misfit = corrected @ turn.T + case.translation_um - given
+        rest[readings] = (back @ misfit[..., np.newaxis])[..., 0]
+        pointing = np.array(record.pointing_um) ** 2 / case.counts[:, np.newaxis]
+        variance[readings] = record.random_um**2 + pointing
+    weight, own, grid = 1 / variance.ravel(), own.reshape(2 * len(own), -1), grid.reshape(2 * len(grid), -1)
+    weighted = (own * weight[:, np.newaxis]).T
+    inverse = _inverse(weighted @ own, record.name)
+    return _Equations(own, grid, rest.ravel(), weight, active, inverse, weighted @ grid)
 
 
 def _inverse(normal: Floats, what: str) -> Floats:
@@ -202,35 +193,17 @@ def _inverse(normal: Floats, what: str) -> Floats:
 
 
 def _residuals(
-    reduced: Sequence[_Reduced],
-    back: Sequence[Floats],
-    values: Sequence[Floats],
-    cofactors: Floats,
-    shift: Floats,
-) -> tuple[list[list[Floats]], float, int]:
-    """Return standardized residuals, the weighted sum of squares, and the count."""
-    standardized, squares, count = [], 0.0, 0
-    for each, own_back, own_values in zip(reduced, back, values, strict=True):
-        with_grid = own_back @ cofactors
-        own_cofactors = each.inverse + with_grid @ own_back.T
-        of_cases = []
-        for k, case in enumerate(each.cases):
-            columns = np.concatenate([np.arange(len(each.active)), len(each.active) + 3 * k + np.arange(3)])
-            places = 2 * case.rows[:, np.newaxis] + np.arange(2)
-            v = case.own @ own_values[columns] + case.rest
-            v += np.einsum("nij,nj->ni", case.grid, shift[places])
-            squares += float((case.weight * v**2).sum())
-            count += v.size
-            known = np.einsum("nia,ab,nib->ni", case.own, own_cofactors[np.ix_(columns, columns)], case.own)
-            crossed = with_grid[columns][:, places]
-            known -= 2 * np.einsum("nia,anj,nij->ni", case.own, crossed, case.grid)
-            blocks = cofactors[places[:, :, np.newaxis], places[:, np.newaxis, :]]
-            known += np.einsum("nij,njk,nik->ni", case.grid, blocks, case.grid)
-            left = 1 / case.weight - known
-            checked = left * case.weight > 1e-6
-            of_cases.append(np.divide(v, np.sqrt(np.abs(left)), out=np.full(v.shape, np.nan), where=checked))
-        standardized.append(of_cases)
-    return standardized, squares, count
+    each: _Equations, back: Floats, steps: Floats, cofactors: Floats, shift: Floats
+) -> tuple[Floats, Floats]:
+    """Return the residuals (2 n,) of a calibration, and (n, 2) over their standard deviations."""
+    v = each.own @ steps + each.grid @ shift + each.rest
+    with_grid = back @ cofactors
+    known = ((each.own @ (each.inverse + with_grid @ back.T)) * each.own).sum(axis=1)
+    known += ((each.grid @ cofactors - 2 * each.own @ with_grid) * each.grid).sum(axis=1)
+    left = 1 / each.weight - known
+    checked = left * each.weight > 1e-6
+    w = np.divide(v, np.sqrt(np.abs(left)), out=np.full(v.shape, np.nan), where=checked)
+    return v, w.reshape(-1, 2)
 
 
 def _spread(active: Indices, values: Floats) -> Floats:
@@ -239,7 +212,7 @@ def _spread(active: Indices, values: Floats) -> Floats:
     return full
 
 
-def _covariance(reduced: Sequence[_Reduced], back: Sequence[Floats], cofactors: Floats) -> Floats:
+def _covariance(reduced: Sequence[_Equations], back: Sequence[Floats], cofactors: Floats) -> Floats:
     count = len(reduced)
     blocks = np.zeros((count, count, PARAMETERS, PARAMETERS))
     for i, first in enumerate(reduced):
