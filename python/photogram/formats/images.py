@@ -121,9 +121,9 @@ def is_rotation(matrix: Floats, tolerance: float = 1e-6) -> bool:
     return bool(apart < tolerance and np.linalg.det(matrix) > 0)
 
 
-def checked_rotation(place: Failing, matrix: Floats) -> Floats:
+def checked_rotation(place: Failing, matrix: Floats, tolerance: float = 1e-6) -> Floats:
     """Return a rotation matrix of a file, orthonormalised; reject other matrices."""
-    if not is_rotation(matrix):
+    if not is_rotation(matrix, tolerance):
         raise place.error(phrase("format.rotation"))
     found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
     return found

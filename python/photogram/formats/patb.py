@@ -11,7 +11,6 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.formats.cards import (
     END,
-    Card,
     angle_unit,
     cards,
     has_suffix,
@@ -20,7 +19,7 @@ from photogram.formats.cards import (
     to_radians,
 )
 from photogram.formats.format import Format
-from photogram.formats.images import is_rotation
+from photogram.formats.images import checked_rotation
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
@@ -95,20 +94,10 @@ def _orientation(path: Path, names: dict[str, str], block: ReducedBuilder, optio
                     raise head.place.error(phrase("format.end", name="the nine elements of the rotation"))
                 elements += lines[row].numbers(0, " ".join(["element"] * len(lines[row].words))).tolist()
                 row += 1
-            matrix = _rotation(head, elements)
+            if len(elements) != 9:
+                raise head.place.error(phrase("format.count", n=len(elements), required=9))
+            matrix = checked_rotation(head.place, np.array(elements).reshape(3, 3), 1e-4)
         block.pose(photo, centre, matrix, head.place)
-
-
-def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Return A, photo to object, orthonormalised from twelve digits."""
-    if len(elements) != 9:
-        raise card.place.error(phrase("format.count", n=len(elements), required=9))
-    matrix = np.array(elements).reshape(3, 3)
-    if not is_rotation(matrix, 1e-4):
-        raise card.place.error(phrase("format.rotation"))
-    u, _, vt = np.linalg.svd(matrix)
-    nearest: np.ndarray[tuple[int, int], np.dtype[np.float64]] = u @ vt
-    return nearest
 
 
 def _control(path: Path, names: dict[str, str], block: ReducedBuilder) -> None:

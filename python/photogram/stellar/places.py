@@ -16,6 +16,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.network.attitudes import Attitudes
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.pointing import pole_matrix, terrestrial
 from photogram.stellar.sky import Effects, Site
@@ -211,12 +212,7 @@ class InertialAttitude:
     @property
     def quaternion(self) -> Floats:
         """(4,) Hamilton quaternion w, x, y, z with w >= 0; camera = q icrs q*."""
-        vector = _photocore.rotation_vectors(self.matrix[None])[0]
-        angle = float(np.linalg.norm(vector))
-        # sin(angle / 2) / angle
-        factor = 0.5 * float(np.sinc(angle / (2 * np.pi)))
-        found = np.concatenate([[np.cos(0.5 * angle)], factor * vector])
-        return np.asarray(found if found[0] >= 0 else -found, float)
+        return Attitudes(self.matrix[None]).values("quaternion")[0]
 
     @property
     def quaternion_covariance(self) -> Floats:
