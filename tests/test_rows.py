@@ -26,15 +26,15 @@ def test_rows_hold_cells_and_places(tmp_path):
     assert (table.columns, table.head, table.path) == (("id", "x"), Place(path, 2, "ID,x"), path)
     assert [place.text for place in table.comments] == ["# a remark"]
     assert table.texts("id") == ["a, b", "c"]
-    assert np.array_equal(table.numbers("x"), [1.5, np.nan], equal_nan=True)
-    assert [table.place(row).record for row in (0, 1)] == [5, 6]
+    np.testing.assert_array_equal(table.numbers("x"), [1.5, np.nan])
+    assert [table.place(row).record for row in range(table.count)] == [5, 6]
 
 
 def read_numbers(path):
     """Read the column x of a table."""
     table = read_records(path)
     table.require("id", "x")
-    return table.given(("x",))
+    return table.given(["x"])
 
 
 @pytest.mark.parametrize(
@@ -62,9 +62,18 @@ def test_damaged_tables_name_file_and_record(tmp_path, text, record, words):
 
 def test_cells_may_be_missing_at_the_end_of_a_ragged_table(tmp_path):
     table = read_records(written(tmp_path, "id,x,y\n1,2\n3\n"), ragged=True)
-    assert np.array_equal(table.numbers("x"), [2.0, np.nan], equal_nan=True)
+    np.testing.assert_array_equal(table.numbers("x"), [2.0, np.nan])
     with pytest.raises(InputError, match=r"record 3: column x: must have a value"):
-        table.given(("x",))
+        table.given(["x"])
+
+
+def test_columns_of_integers(tmp_path):
+    table = read_records(written(tmp_path, "id,n,m\n1,7,\n2,,3\n3,1.5,\n"))
+    assert table.some([0, 1]).wholes("n", 0).tolist() == [7, 0]
+    with pytest.raises(InputError, match=r"record 3: column n: must have a value"):
+        table.some([0, 1]).wholes("n")
+    with pytest.raises(InputError, match=r"record 4: column n: must be an integer"):
+        table.wholes("n", 0)
 
 
 def test_a_limit_of_the_host_is_an_error_of_the_record():

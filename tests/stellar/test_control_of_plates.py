@@ -131,7 +131,7 @@ def test_apparent_places_as_a_command(tmp_path):
     table = read_records(out)
     stars = Catalogue.hipparcos().brighter(2.0)
     assert table.texts("star") == list(stars.ids)
-    assert np.array_equal(table.given(("ra_rad", "dec_rad")), apparent_places(stars, utc))
+    assert np.array_equal(table.given(["ra_rad", "dec_rad"]), apparent_places(stars, utc))
 
 
 def test_one_attitude_is_not_compared_with_others(plate):
