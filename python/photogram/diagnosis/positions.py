@@ -5,8 +5,7 @@
     a wrong lever arm                                           C + A (l + d)
     positions of another time                                   C + A l + tau dC/dt
 
-The likeliest errors of the catalogue (:mod:`photogram.results.hypotheses`) are proposals. N, s and d are free
-in one adjustment, tau is the estimate of the catalogue.
+The likeliest errors of the catalogue (:mod:`photogram.results.hypotheses`) are proposals with their estimates.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ EQUAL = 0.15  # Relative difference within which a lever arm is the given one wi
 COORDINATES = {"feet in heights": ([0, 1, 2], 2), "feet": ([0, 1, 2], 0), "X and Y exchanged": ([1, 0, 2], 3)}
 """Order of the axes, and first axis in feet."""
 NEARLY = 0.5  # Log odds of a proposal, as a part of the largest
-FREE = ("gnss-heights", "gnss-shift", "lever-arm")  # Tried if the block cannot be adjusted
 
 
 def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
@@ -87,54 +85,40 @@ def _coordinates(block: Block, given: list[Position]) -> Iterator[Proposal]:
 
 
 def _of_catalogue(block: Block, given: list[Position], adjusted: Adjuster) -> Iterator[Proposal]:
+    """Yield the likeliest errors of the catalogue, with their estimates."""
     first = adjusted.converged(block)
     errors = None if first is None else first.reliability_summary
     if first is None or errors is None:
-        likely = dict.fromkeys(FREE, 0.0)
-    else:
-        found = errors.hypotheses
-        # First-order odds of large errors are approximate; adjustments decide.
-        least = NEARLY * max((found.log_odds[row] for row in found.common()), default=math.inf)
-        rows = np.flatnonzero(found.log_odds[: len(found.sets)] >= least).tolist()
-        likely = {str(found.code[row]): float(found.estimate[row, 0]) for row in rows}
-    for code, size in likely.items():
-        if code in FREE:
-            yield from _free(block, given, code, adjusted)
-        elif code == "time-offset" and first is not None:
+        return
+    found, unit = errors.hypotheses, block.linear_unit
+    # First-order odds of large errors are approximate; adjustments decide.
+    least = NEARLY * max((found.log_odds[row] for row in found.common()), default=math.inf)
+    for row in np.flatnonzero(found.log_odds[: len(found.sets)] >= least).tolist():
+        error, code = found.sets[row], str(found.code[row])
+        value, k = np.array(error["estimate"]), len(error["estimate"])
+        sd = np.sqrt(np.diag(np.reshape(error["cofactors"], (k, k)))) if k else value
+        fields = {"vector": [f"{v:.3f} +- {s:.3f}" for v, s in zip(value, sd, strict=True)], "unit": unit}
+        if code in ("gnss-heights", "gnss-shift"):
+            shift = Shift("of all", value if k == 3 else [0.0, 0.0, value[-1]], sd=0.0)
+            meant = [replace(each, shift=shift) for each in given]
+            name = "geoid" if code == "gnss-heights" else "shift"
+            message = phrase(f"mistake.positions.{name}", height=float(value[-1]), **fields)
+        elif code == "lever-arm":
+            arm = np.median([arm_of(each) for each in given], axis=0)
+            meant = [replace(each, lever_arm=arm + value) for each in given]
+            fields["vector"] = [f"{v:.3f} +- {s:.3f}" for v, s in zip(arm + value, sd, strict=True)]
+            message = phrase(f"mistake.positions.{_code_of_arm(arm, arm + value)}", **fields)
+        elif code == "time-offset":
             facts = block_facts(block, first.photo_positions)
-            flown = dict(zip(block.photo_ids, facts["velocities"] * size, strict=True))
+            flown = dict(zip(block.photo_ids, facts["velocities"] * value, strict=True))
             meant = [
                 replace(each, position=np.asarray(each.position) - flown[each.photos[0]]) for each in given
             ]
-            message = phrase(f"mistake.positions.{'seconds' if facts['timed'] else 'steps'}", offset=size)
-            yield Proposal(code, message, partial(_with, positions=meant), parameters=1)
-
-
-def _free(block: Block, given: list[Position], code: str, adjusted: Adjuster) -> Iterator[Proposal]:
-    """Yield the proposal of a common height offset, shift or lever arm, free in an adjustment."""
-    arm = np.median([arm_of(each) for each in given], axis=0)
-    unknown: Shift | LeverArm
-    if code == "lever-arm":
-        unknown = LeverArm("of all", arm, sd=np.inf)
-        changed = [replace(each, lever_arm=unknown) for each in given]
-    else:
-        unknown = Shift("of all", sd=[0.0, 0.0, np.inf] if code == "gnss-heights" else np.inf)
-        changed = [replace(each, shift=unknown) for each in given]
-    result = adjusted.converged(_with(block, changed))
-    if result is None:
-        return
-    (found,) = [each for each in result.unknowns if each.given is unknown]
-    value, unit = np.asarray(found.position), block.linear_unit
-    sd = np.sqrt(np.maximum(np.diagonal(found.cofactors), 0))
-    if isinstance(unknown, LeverArm):
-        name, meant = _code_of_arm(arm, value), [replace(each, lever_arm=value) for each in given]
-    else:
-        name = "geoid" if code == "gnss-heights" else "shift"
-        fixed = Shift(unknown.name, value, sd=0.0)
-        meant = [replace(each, shift=fixed) for each in given]
-    parts = [f"{v:.3f} +- {s:.3f}" for v, s in zip(value, sd, strict=True)]
-    message = phrase(f"mistake.positions.{name}", vector=parts, height=float(value[2]), unit=unit)
-    yield Proposal(code, message, partial(_with, positions=meant), parameters=int((sd > 0).sum()))
+            name = "seconds" if facts["timed"] else "steps"
+            message = phrase(f"mistake.positions.{name}", offset=float(value[0]))
+        else:
+            continue
+        yield Proposal(code, message, partial(_with, positions=meant), parameters=k)
 
 
 def arm_of(position: Position) -> Floats:
