@@ -82,6 +82,8 @@ class ScannedPhoto:
     marks: list[str] = field(default_factory=list)
     readings: list[Floats] = field(default_factory=list)
     sd: list[Floats] = field(default_factory=list)
+    mirrored: bool = False
+    start: Floats | None = None  # Initial values of t1, t2 and theta, from the table or its marks
 
     @property
     def true(self) -> Floats:
@@ -235,11 +237,11 @@ SHORTEST = 4  # Smallest number of angles of a distortion table with a curve
 FEWEST = 4  # Smallest number of marks that detects names rotated by a quarter
 
 
-def scale_message(photo: ScannedPhoto, *, mirrored: bool) -> Phrase | None:
+def scale_message(photo: ScannedPhoto) -> Phrase | None:
     """Return an error of the scanner pitch."""
     if len(photo.marks) < 2:
         return None
-    *_, m = conformal(photo.places, photo.true, mirrored=mirrored)
+    *_, m = conformal(photo.places, photo.true, mirrored=photo.mirrored)
     if abs(m) <= SHRUNK or m <= -1.0:
         return None
     pitch = photo.machine.readings.pitch
@@ -268,10 +270,9 @@ def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats)
     return phrase("plain.beyond-distortion", farthest=float(farthest[0]), **fields)
 
 
-def mark_remarks(photos: Sequence[ScannedPhoto], found: Sequence[bool | None]) -> list[Phrase]:
-    """Return remarks on marks that are probably mistakes of the input."""
+def mark_remarks(photos: Sequence[ScannedPhoto], mirrored: Sequence[str]) -> list[Phrase]:
+    """Return remarks on marks, and photos that they show as mirrored, that are probably mistakes."""
     said: list[Phrase] = []
-    mirrored = [photo.name for photo, side in zip(photos, found, strict=True) if side]
     if len(mirrored) > max(1.0, len(photos) / 2):
         said.append(phrase("plain.mirrored-photos", n=len(mirrored), all=len(photos)))
     elif mirrored:

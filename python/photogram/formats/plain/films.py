@@ -153,10 +153,11 @@ class _Reader:
 
     def read(self, found: Scanned) -> None:
         """Add the scans and observations of all photos to the result."""
-        starts = self._starts()
-        self._tell_beyond([mirrored for mirrored, _ in starts])
-        for photo, (mirrored, start) in zip(self.photos, starts, strict=True):
-            film = self._film(photo, mirrored, start)
+        self._place_films()
+        self._tell_beyond()
+        starts = [self._start(photo) for photo in self.photos]
+        for photo, start in zip(self.photos, starts, strict=True):
+            film = self._film(photo, start)
             found.scans.append(Scan(photo.name, film))
             found.observations.extend(self._known(photo, film))
             if isinstance(film.pattern, Reseau):
@@ -177,57 +178,49 @@ class _Reader:
         machines = {id(each.machine): each.machine for each in self.photos}
         found.observations.extend(each.known for each in machines.values() if each.known is not None)
 
-    def _tell_beyond(self, sides: Sequence[bool]) -> None:
+    def _tell_beyond(self) -> None:
         """Report images beyond the distortion table of the certificate of their camera."""
         cameras = {each.name: each for each in self.cameras.cameras}
         for camera, own in self.cameras.certificates.items():
             places, sd = [np.zeros(0, dtype=complex)], [np.zeros(0)]
-            for photo, mirrored in zip(self.photos, sides, strict=True):
+            for photo in self.photos:
                 if photo.camera == camera and len(photo.marks) > 1:
-                    places.append(Lying(photo.places, mirrored).back(photo.true, photo.true_images))
+                    places.append(Lying(photo.places, photo.mirrored).back(photo.true, photo.true_images))
                     sd.append(photo.machine.readings.pitch * photo.image_sd)
             message = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
             if message:
                 self.tables.messages.append(Message(message, own.file))
 
-    def _starts(self) -> list[tuple[bool, Floats]]:
-        """Return the side of each photo, and initial values of t1, t2 and theta."""
+    def _place_films(self) -> None:
+        """Find the side of each photo, and initial values of t1, t2 and theta, from table and marks."""
         given = self.table.vectors(_START)
-        found: list[tuple[bool, Floats | None]] = []
         for photo in self.photos:
-            mirrored = side_of(self.tables, self.table, photo, self.photos)
-            if message := scale_message(photo, mirrored=mirrored):
+            photo.mirrored = side_of(self.tables, self.table, photo, self.photos)
+            if message := scale_message(photo):
                 raise ContradictionError.of(self.table.error(photo.row, message))
-            start: Floats | None = None if np.isnan(given[photo.row]).any() else given[photo.row]
-            if start is None and len(photo.marks) > 1:
-                start = np.array(conformal(photo.places, photo.true, mirrored=mirrored)[:3])
-            found.append((mirrored, start))
+            if not np.isnan(given[photo.row]).any():
+                photo.start = given[photo.row]
+            elif len(photo.marks) > 1:
+                photo.start = np.array(conformal(photo.places, photo.true, mirrored=photo.mirrored)[:3])
         # The camera frame of a stellar calibration is the one of the measured plate.
         stars = {each.name for each in self.cameras.cameras if each.image_y == "down"}
-        told = [
-            None if photo.camera in stars or photo.given_side is not None else side
-            for photo, (side, _) in zip(self.photos, found, strict=True)
-        ]
-        remarks = mark_remarks(self.photos, told)
+        found = [each for each in self.photos if each.camera not in stars and each.given_side is None]
+        remarks = mark_remarks(self.photos, [photo.name for photo in found if photo.mirrored])
         self.tables.messages.extend(Message(each, self.table.path) for each in remarks)
-        return [
-            (mirrored, self._neighbour(k, found) if start is None else start)
-            for k, (mirrored, start) in enumerate(found)
-        ]
 
-    def _neighbour(self, k: int, found: Sequence[tuple[bool, Floats | None]]) -> Floats:
-        """Return initial values of a photo of the same film and scanner."""
-        photo, mirrored = self.photos[k], found[k][0]
-        for other in sorted(range(len(found)), key=lambda j: abs(j - k)):
-            start = found[other][1]
-            same = self.photos[other].film == photo.film and self.photos[other].machine is photo.machine
-            if start is not None and same and found[other][0] == mirrored:
-                self.tables.remark("plain.film-start", photo=photo.name, other=self.photos[other].name)
-                return start
+    def _start(self, photo: ScannedPhoto) -> Floats:
+        """Return initial values of a photo, or of the nearest one on its film and scanner."""
+        if photo.start is not None:
+            return photo.start
+        for other in sorted(self.photos, key=lambda each: abs(each.row - photo.row)):
+            same = other.film == photo.film and other.machine is photo.machine
+            if other.start is not None and same and other.mirrored == photo.mirrored:
+                self.tables.remark("plain.film-start", photo=photo.name, other=other.name)
+                return other.start
         message = phrase("plain.no-film-start", photo=photo.name, columns=list(_START))
         raise self.table.error(photo.row, message)
 
-    def _film(self, photo: ScannedPhoto, mirrored: bool, start: Floats) -> Film:
+    def _film(self, photo: ScannedPhoto, start: Floats) -> Film:
         kind, machine = self.kinds[photo.film], photo.machine
         fixed = np.array(kind.sd_size) == 0
         roll = kind.roll if fixed[0] else None
@@ -246,7 +239,7 @@ class _Reader:
             roll=roll,
             curves=machine.curves,
             pattern=kind.pattern if kind.reseau is None else kind.reseau(photo.name),
-            mirrored=mirrored,
+            mirrored=photo.mirrored,
         )
 
     def fitted(self, scans: Sequence[Scan]) -> list[Scan]:
