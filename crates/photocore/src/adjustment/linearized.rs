@@ -14,11 +14,8 @@ use super::transformation::Transformation;
 use crate::Threads;
 use crate::normals::{
     Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, Layout, Prior,
-    SelectedInverse, SolveOptions,
+    SelectedInverse, SolveOptions, System,
 };
-
-/// Size of the largest factor that is copied for hypotheses before it is inverted, in bytes.
-const COPIED: usize = 64 << 20;
 
 /// Factored normal equations of a problem at given values, in the datum of the constrained unknowns or any other.
 #[derive(Debug, Clone)]
@@ -121,9 +118,9 @@ impl Linearized {
         })
     }
 
-    /// A copy of the factor for hypotheses; None if it is large, because forming the normal equations again takes time, but no memory.
-    pub(super) fn small_factor(&self) -> Option<(Factor, Prior)> {
-        (self.factor.bytes() <= COPIED).then(|| (self.factor.clone(), self.prior.clone()))
+    /// A copy of the factor for hypotheses, unless it is large.
+    pub(super) fn small_factor(&self, system: &System) -> Option<(Factor, Prior)> {
+        system.copies_factor().then(|| (self.factor.clone(), self.prior.clone()))
     }
 
     /// A factor at the values of a negligible step later.

@@ -368,7 +368,7 @@ impl<'a> Run<'a, '_> {
                 let mut between = between(&mut *self.watch, Phase::Invert, locals);
                 adjustment.joint = linearized.joint(problem, joint, memory, self.threads, &mut between)?;
             }
-            adjustment.factor = self.by_groups.and_then(|_| linearized.small_factor());
+            adjustment.factor = self.by_groups.and_then(|_| linearized.small_factor(&problem.system));
             let what = InvertOptions { by_groups: self.by_groups.is_some(), ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);
             adjustment.put(problem, linearized.invert(&equations, &what, self.threads, &mut between)?);

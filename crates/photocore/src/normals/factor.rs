@@ -308,11 +308,6 @@ impl Factor {
         self.eliminated = Vec::new();
     }
 
-    /// Memory of its panels in bytes.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.panels.values[..])
-    }
-
     /// Returns the retained unknowns that a solution moves, ascending: shares of at least one tenth of the largest. Unknowns are scaled by
     /// the precision from their own equations alone.
     pub fn moved(&self, system: &System, solution: &[f64]) -> Vec<usize> {

@@ -9,6 +9,8 @@ use super::workspace::Workspace;
 const BYTES: usize = size_of::<f64>();
 /// Bytes that do not depend on the size of the problem, including threads.
 const BASE: usize = 8 << 20;
+/// Size of the largest factor that is copied for hypotheses, in bytes.
+const COPIED: usize = 128 << 20;
 
 impl System {
     /// Estimates the maximum size of all phases in bytes, including the problem and its results: the factor, simultaneous fronts and
@@ -30,9 +32,20 @@ impl System {
         BASE + BYTES * (self.workspace.capacity(self.symbolic.values()) + most)
     }
 
-    /// Extra bytes for the leverage matrices of groups: computation and result.
+    /// Extra bytes for group tests and hypotheses: the leverage matrices of groups, their computation, and a copy of the factor.
     pub fn memory_of_groups(&self) -> usize {
-        2 * BYTES * self.layout.groups() * self.layout.rows().pow(2)
+        let copy = if self.copies_factor() { self.bytes_of_factor() } else { 0 };
+        2 * BYTES * self.layout.groups() * self.layout.rows().pow(2) + copy
+    }
+
+    /// Whether the factor is copied for hypotheses before it is inverted. If it is large, the normal equations are formed again, which takes
+    /// time, but no memory.
+    pub fn copies_factor(&self) -> bool {
+        self.bytes_of_factor() <= COPIED
+    }
+
+    fn bytes_of_factor(&self) -> usize {
+        BYTES * self.symbolic.values()
     }
 
     /// Releases the buffers for the next formation or inversion, if other code needs memory before.
