@@ -4,6 +4,7 @@
 use smallvec::SmallVec;
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use super::model::{Bundle, Owner};
 use super::problem::Assembled;
@@ -87,8 +88,8 @@ pub struct Suspects {
     row_starts: Vec<usize>,
     block_starts: Vec<usize>,
     deviations: Vec<f64>,
-    by_point: Lists,
-    by_photo: Lists,
+    by_point: OnceLock<Lists>,
+    by_photo: OnceLock<Lists>,
 }
 
 /// Groups in the order of some objects.
@@ -134,8 +135,10 @@ impl Suspects {
         let own = |suspect: &Suspect, row| {
             deviation(&problem.model, suspect, row, (&problem.observation_sd, &problem.sd))
         };
-        let deviations =
-            all.iter().flat_map(|suspect| suspect.rows.iter().map(|&row| own(suspect, row))).collect();
+        let mut deviations = Vec::with_capacity(all.iter().map(|suspect| suspect.rows.len()).sum());
+        for suspect in &all {
+            deviations.extend(suspect.rows.iter().map(|&row| own(suspect, row)));
+        }
         Self::of_rows(all, deviations)
     }
 
@@ -145,8 +148,8 @@ impl Suspects {
             row_starts: starts(sizes()),
             block_starts: starts(sizes().map(|size| size.pow(2))),
             deviations,
-            by_point: Lists::new(all.iter().map(|suspect| suspect.point)),
-            by_photo: Lists::new(all.iter().map(|suspect| suspect.photo)),
+            by_point: OnceLock::new(),
+            by_photo: OnceLock::new(),
             all,
         }
     }
@@ -186,17 +189,21 @@ impl Suspects {
 
     /// Returns the groups of a point: its images and its control.
     pub(super) fn on_point(&self, point: usize) -> &[usize] {
-        self.by_point.of(point)
+        self.by_point.get_or_init(|| Lists::new(self.all.iter().map(|suspect| suspect.point))).of(point)
     }
 
     /// Returns the groups of a photo: its images, its position and its attitude.
     pub(super) fn on_photo(&self, photo: usize) -> &[usize] {
-        self.by_photo.of(photo)
+        self.by_photo().of(photo)
+    }
+
+    fn by_photo(&self) -> &Lists {
+        self.by_photo.get_or_init(|| Lists::new(self.all.iter().map(|suspect| suspect.photo)))
     }
 
     /// Returns the number of photos with groups.
     pub(super) fn photo_count(&self) -> usize {
-        self.by_photo.starts.len() - 1
+        self.by_photo().starts.len() - 1
     }
 
     /// Returns the object of each group.
@@ -230,12 +237,14 @@ impl Suspects {
 }
 
 /// Returns the sums of sizes before each of them, and of all.
-fn starts(sizes: impl Iterator<Item = usize>) -> Vec<usize> {
-    let ends = sizes.scan(0, |sum, size| {
-        *sum += size;
-        Some(*sum)
-    });
-    std::iter::once(0).chain(ends).collect()
+fn starts(sizes: impl ExactSizeIterator<Item = usize>) -> Vec<usize> {
+    let (mut all, mut sum) = (Vec::with_capacity(sizes.len() + 1), 0);
+    all.push(sum);
+    for size in sizes {
+        sum += size;
+        all.push(sum);
+    }
+    all
 }
 
 /// Returns the standard deviation of a row of a group, given the standard deviations of equations and parameters.
@@ -293,17 +302,23 @@ fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) ->
     own.chain(shared).collect()
 }
 
+/// Place of an excluded image.
+const OUT: u32 = u32::MAX;
+
 /// Returns groups of the active ones among `count` images, in their order.
 fn images(assembled: &Assembled, count: usize) -> impl Iterator<Item = Suspect> {
     let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
     let groups = layout.groups();
-    let mut of_image = vec![None; count];
+    let mut of_image = vec![(OUT, OUT); count];
     for (point, images) in model.point_images.start.windows(2).enumerate() {
         (images[0]..images[1])
-            .for_each(|place| of_image[model.point_images.order[place]] = Some((place, point)));
+            .for_each(|place| of_image[model.point_images.order[place]] = (place as u32, point as u32));
     }
-    let suspect = move |(image, taken): (usize, Option<(usize, usize)>)| {
-        let (place, point) = taken?;
+    let suspect = move |(image, (place, point)): (usize, (u32, u32))| {
+        if place == OUT {
+            return None;
+        }
+        let (place, point) = (place as usize, point as usize);
         let first = layout.rows() * place;
         let home = match place.checked_sub(groups) {
             None => Home::Group { group: place, point },
@@ -314,7 +329,7 @@ fn images(assembled: &Assembled, count: usize) -> impl Iterator<Item = Suspect> 
             home,
             point: Some(assembled.points[point]),
             photo: Some(model.images[place].photo),
-            rows: (0..2).map(|k| (Row::Equation(first + k), k)).collect(),
+            rows: SmallVec::from_slice(&[(Row::Equation(first), 0), (Row::Equation(first + 1), 1)]),
         })
     };
     of_image.into_iter().enumerate().filter_map(suspect)
