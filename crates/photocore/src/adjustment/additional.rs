@@ -446,7 +446,9 @@ impl Linearized {
             }
         }
         let columns = rights.transpose();
-        let some = columns.as_slice().chunks((columns.nrows() * SOLVED).max(1)).collect();
+        // An even number of equal parts, so that two threads have the same work.
+        let together = count.div_ceil(count.div_ceil(SOLVED).next_multiple_of(2).max(1));
+        let some = columns.as_slice().chunks((columns.nrows() * together).max(1)).collect();
         let solve = |rights: &[f64]| self.factor.solve_reduced(layout, rights);
         let solved = threads.install(|| parallel::map_each(some, &solve)).concat();
         let effects = DMatrix::from_vec(columns.nrows(), count, solved);
@@ -502,7 +504,7 @@ impl Linearized {
 
 /// Local blocks that a thread takes at least.
 const AT_LEAST: usize = 32;
-/// Parameters that are solved for together, for any number of threads: the rounding of products depends on it.
+/// Largest number of parameters that are solved for together, for any number of threads: the rounding of products depends on it.
 const SOLVED: usize = 32;
 /// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
 const PARTS: usize = 64;
