@@ -441,6 +441,39 @@ def test_an_exchanged_principal_point_is_named():
     assert named.code == "hypothesis.camera-exchanged"
 
 
+def test_an_exchanged_principal_point_is_named_in_close_range():
+    """Second-order terms of 500 pixels are large, and a lens explains them too."""
+    rng = np.random.default_rng(11)
+    points, angles = rng.uniform(-0.7, 0.7, (60, 3)), np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    poses, xy = [], []
+    for angle, height in zip(angles, [1.2, 2.2] * 6, strict=True):
+        centre = np.array([3 * np.cos(angle), 3 * np.sin(angle), height])
+        back, right = centre / np.linalg.norm(centre), np.array([-np.sin(angle), np.cos(angle), 0.0])
+        m = np.array([right, np.cross(back, right), back])
+        u = (points - centre) @ m.T
+        xy.append([2000, 1500] + 3600 * u[:, :2] / u[:, 2:] * [-1, 1] + rng.normal(size=(60, 2)) * 0.5)
+        turned = np.arctan2(-m[2, 1], m[2, 2]), np.arcsin(m[2, 0]), np.arctan2(-m[1, 0], m[0, 0])
+        poses.append([*centre, *turned])
+    known = np.arange(60) < 8
+    block = Block(
+        photo_ids=[f"i{row}" for row in range(12)],
+        photo_positions=np.array(poses)[:, :3],
+        photo_attitudes=np.array(poses)[:, 3:],
+        point_ids=[f"p{row}" for row in range(60)],
+        point_positions=np.where(known[:, np.newaxis], points, np.nan),
+        point_sd=np.where(known, 2e-4, np.inf)[:, np.newaxis] * [1, 1, 1],
+        image_photos=np.repeat(np.arange(12), 60),
+        image_points=np.tile(np.arange(60), 12),
+        image_xy=np.vstack(xy),
+        image_sd=0.5,
+        cameras=[Camera("simple_pinhole", {"f": 3600, "cx": 1500, "cy": 2000})],
+    )
+    verdict = adjust(block).verdict
+    assert verdict.code == "common-error"
+    named = verdict.message.fields["errors"][0].fields["named"]
+    assert named.code == "hypothesis.camera-exchanged"
+
+
 def test_the_next_photo_is_a_time_offset_by_the_way_to_it():
     result = adjust(block_of("clean"))
     ways = np.diff(result.photo_positions, axis=0)

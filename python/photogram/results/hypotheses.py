@@ -21,7 +21,7 @@ from photogram.results.hypothesis_checks import Joint, set_with_checks, single_c
 from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
-from photogram.statistics.findings import ALTERNATIVES, NEARLY, Tested
+from photogram.statistics.findings import ALTERNATIVES, NEARLY, NEARLY_EXCHANGED, Tested
 from photogram.words import Phrase, phrase
 
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
@@ -248,7 +248,8 @@ class Hypotheses:
     def _is_whole(self, row: int, first: int) -> bool:
         """Whether a share is 1 and explains as much as the likeliest error."""
         is_one = abs(self.estimate[row, 0] - 1.0) < 3 * WHOLE
-        return bool(is_one and self.statistic[row] > NEARLY * self.statistic[first])
+        nearly = NEARLY_EXCHANGED if self.code[row] == "camera-exchanged" else NEARLY
+        return bool(is_one and self.statistic[row] > nearly * self.statistic[first])
 
     def _is_significant(self, row: int) -> bool:
         """Whether the test of a set rejects, and its error has a plausible size or explains nearly all.

@@ -17,7 +17,15 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import NEARLY, Agreement, Findings, Systematic, Tested, Text
+from photogram.statistics.findings import (
+    NEARLY,
+    NEARLY_EXCHANGED,
+    Agreement,
+    Findings,
+    Systematic,
+    Tested,
+    Text,
+)
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
@@ -39,6 +47,8 @@ SUSPECT = 0.01  # Significance level of check points that the verdict names
 MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 
 MISSING_LENS = "hypothesis.camera-radial"  # Code of an error that only a wider camera model removes
+
+EXCHANGED = "hypothesis.camera-exchanged"  # Code of an exchanged principal point
 
 GLOBAL = Phrase("test.global")  # Type of the test of all residuals together
 
@@ -238,7 +248,8 @@ class Evidence:
             return False
         # An error in common with fewer parameters explains the same residuals better, unless it is a lens.
         rivals = 0.0 if self.common_code == MISSING_LENS else 2 * self.found.odds
-        if fall < max(rivals + LENS_PARAMETERS * math.log(max(self.number, 2)), rivals / NEARLY):
+        part = NEARLY_EXCHANGED if self.common_code == EXCHANGED else NEARLY
+        if fall < max(rivals + LENS_PARAMETERS * math.log(max(self.number, 2)), rivals / part):
             return False
         too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
         return fall > EXPLAINED * too_much and single < SINGLE * too_much

@@ -275,6 +275,11 @@ MOST: Mapping[Text, float] = {
 ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
 
 NEARLY = 0.97  # Least ratio of decreases of the sum of squares that second-order terms of an error explain
+
+NEARLY_EXCHANGED = 0.75
+"""This ratio of an exchanged principal point: second-order terms of hundreds of pixels are large in close
+range, and a principal point or a lens with more parameters explains them too."""
+
 EVIDENCE = 2.0  # Difference of log likelihoods that decides: 1.92 at the ends of a 95 percent interval
 LARGEST_FACTOR = 30.0  # Largest plausible factor of the standard deviations of a type
 NOMINAL = 1.5  # Factor by which nominal standard deviations are too large at least
