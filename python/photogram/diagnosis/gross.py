@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.findings import Level, Section, section_of
 from photogram.diagnosis.robust import mad_sd
 from photogram.network.block import Block
@@ -51,63 +50,52 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
     section = section_of("gross")
     rays, bad = _bad_photos(Rays.of(block, unit=unit), section)
     sizes = rays.intersect().sizes
-    usual = _medians(block, sizes, rays.used)[block.image_photos]
+    usual = _medians(rays)[block.image_photos]
     points = np.zeros(len(block.point_ids), dtype=bool)
     points[block.image_points[rays.used & (sizes > MISSING * np.maximum(usual, block.image_sd.max()))]] = True
     return section, Suspects(bad, points, _control(rays.without(points[block.image_points]), section))
 
 
 def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
-    """Exclude the photo without which the others fit best, until none is conspicuous."""
-    block = rays.block
+    """Exclude the photo without which the others fit best, until none is conspicuous.
+
+    A bad photo affects the medians of its neighbours, in a small block of all photos. So a photo is compared
+    with the others after its removal.
+    """
+    block, unit, medians = rays.block, rays.unit, _medians(rays)
     bad = np.zeros(len(block.photo_ids), dtype=bool)
-    for step in range(MOST_PHOTOS + 1):
-        medians = _medians(block, rays.intersect().sizes, rays.used)
+    if (medians > 0).any():
+        usual = float(np.median(medians[medians > 0]))
+        section.figure("median residual of a photo", f"{usual:.4f} {unit}")
+    for _ in range(MOST_PHOTOS):
         known = np.flatnonzero(medians > 0)
-        if step == 0 and known.size:
-            usual = float(np.median(medians[known]))
-            section.figure("median residual of a photo", f"{usual:.4f} {rays.unit}")
-        if len(known) < 4 or step == MOST_PHOTOS:
+        if len(known) < 4:
             break
-        worst = _worst(rays, medians, known)
-        if worst is None:
+        doubtful = known[medians[known] > BAD_PHOTO * np.quantile(medians[known], 0.25)]
+        tried = []
+        for photo in doubtful[np.argsort(-medians[doubtful], kind="stable")][:CANDIDATES].tolist():
+            without = rays.without(block.image_photos == photo)
+            others = _medians(without)
+            logs = np.log(others[others > 0])
+            if len(logs) >= 3:
+                tried.append((float(logs.mean()), photo, logs, others, without))
+        if not tried:
             break
-        photo, usual, rays = worst
-        bad[photo] = True
-        name, size, unit = block.photo_ids[photo], float(medians[photo]), rays.unit
+        _, photo, logs, others, without = min(tried, key=lambda each: each[:2])
+        middle, size, name = float(np.median(logs)), float(medians[photo]), block.photo_ids[photo]
+        if np.log(size) - middle < max(np.log(BAD_PHOTO), BAD_PHOTO_SD * mad_sd(logs - middle)):
+            break
+        bad[photo], rays, medians, usual = True, without, others, float(np.exp(middle))
         fields = {"photo": name, "residual": size, "others": usual, "unit": unit}
         values = {f"median_residual_{unit}": size, "times_usual": size / usual}
         section.note("grave", "check.bad-photo.residuals", [name], [], values, **fields)
     return rays, bad
 
 
-def _worst(rays: Rays, medians: Floats, known: Indices) -> tuple[int, float, Rays] | None:
-    """Return the worst photo, and the median of the others and rays without it.
-
-    A bad photo affects the medians of its neighbours, in a small block of all photos. So the photo is
-    compared with the others after its removal.
-    """
-    block = rays.block
-    doubtful = known[medians[known] > BAD_PHOTO * np.quantile(medians[known], 0.25)]
-    tried = []
-    for photo in doubtful[np.argsort(-medians[doubtful], kind="stable")][:CANDIDATES].tolist():
-        without = rays.without(block.image_photos == photo)
-        others = _medians(block, without.intersect().sizes, without.used)
-        logs = np.log(others[others > 0])
-        if len(logs) >= 3:
-            tried.append((float(logs.mean()), photo, logs, without))
-    if not tried:
-        return None
-    _, photo, logs, without = min(tried, key=lambda each: each[:2])
-    middle = float(np.median(logs))
-    if np.log(medians[photo]) - middle < max(np.log(BAD_PHOTO), BAD_PHOTO_SD * mad_sd(logs - middle)):
-        return None
-    return photo, float(np.exp(middle)), without
-
-
-def _medians(block: Block, sizes: Floats, used: Bools) -> Floats:
+def _medians(rays: Rays) -> Floats:
     """(P,) median size of each photo's residuals; NaN with fewer than three."""
-    rows = np.flatnonzero(used & np.isfinite(sizes))
+    block, sizes = rays.block, rays.intersect().sizes
+    rows = np.flatnonzero(rays.used & np.isfinite(sizes))
     order = rows[np.lexsort((sizes[rows], block.image_photos[rows]))]
     photos, starts, counts = np.unique(block.image_photos[order], return_index=True, return_counts=True)
     medians = np.full(len(block.photo_ids), np.nan)
@@ -118,43 +106,34 @@ def _medians(block: Block, sizes: Floats, used: Bools) -> Floats:
 
 def _control(rays: Rays, section: Section) -> Bools:
     """Compare control with intersected positions; report and return (n,) conspicuous differences."""
-    block = rays.block
-    held = np.isfinite(block.point_sd)
-    met = rays.intersect().positions
-    control = np.flatnonzero(held.any(axis=1) & np.isfinite(met).all(axis=1))
-    if not control.size:
+    block, unit = rays.block, rays.block.linear_unit
+    held, met = np.isfinite(block.point_sd), rays.intersect().positions
+    wrong = np.zeros(len(block.point_ids), dtype=bool)
+    if not (held.any(axis=1) & np.isfinite(met).all(axis=1)).any():
         section.remark("check.remark.no-control")
-        return np.zeros(len(block.point_ids), dtype=bool)
-    given = np.where(held[control], block.point_positions[control], rays.axes.from_local(met[control]))
-    differences = np.where(held[control], met[control] - rays.axes.positions(given), np.nan)
+        return wrong
+    given = np.where(held, block.point_positions, rays.axes.from_local(met))
+    differences = np.where(held, met - rays.axes.positions(given), np.nan)
     for axis, name in enumerate(("east", "north", "up") if block.geographic else ("X", "Y", "Z")):
-        _control_component(block, control, differences[:, axis], name, section)
-    return np.isin(
-        block.point_ids, [*chain(*(each.points for each in section.findings if each.level == "grave"))]
-    )
-
-
-def _control_component(
-    block: Block, control: Indices, differences: Floats, name: str, section: Section
-) -> None:
-    """Report the control points whose difference in one component is conspicuous."""
-    known = np.flatnonzero(np.isfinite(differences))
-    if not known.size:
-        return
-    unit, middle = block.linear_unit, float(np.median(differences[known]))
-    spread = mad_sd(differences - middle)
-    section.figure(
-        f"control, intersected minus given, {name}",
-        f"median {middle:.3f} {unit}, spread {spread:.3f} {unit} ({len(known)} points)",
-    )
-    if len(known) < FEWEST_CONTROL or spread == 0:
-        return
-    # The spread of few points is uncertain.
-    sizes = np.abs(differences[known] - middle) / spread / (1 + FEWEST_CONTROL / len(known))
-    for row, size in zip(known.tolist(), sizes.tolist(), strict=True):
-        if size > CONTROL_LOOK:
-            point, difference = block.point_ids[control[row]], float(differences[row])
+        known = np.flatnonzero(np.isfinite(differences[:, axis]))
+        if not known.size:
+            continue
+        own = differences[known, axis]
+        middle = float(np.median(own))
+        spread = mad_sd(own - middle)
+        section.figure(
+            f"control, intersected minus given, {name}",
+            f"median {middle:.3f} {unit}, spread {spread:.3f} {unit} ({len(known)} points)",
+        )
+        if len(known) < FEWEST_CONTROL or spread == 0:
+            continue
+        # The spread of few points is uncertain.
+        sizes = np.abs(own - middle) / spread / (1 + FEWEST_CONTROL / len(known))
+        wrong[known[sizes > CONTROL_GRAVE]] = True
+        for row in np.flatnonzero(sizes > CONTROL_LOOK).tolist():
+            point, difference = block.point_ids[known[row]], float(own[row])
             fields = {"point": point, "axis": name, "difference": difference, "unit": unit}
-            level: Level = "grave" if size > CONTROL_GRAVE else "look"
+            level: Level = "grave" if sizes[row] > CONTROL_GRAVE else "look"
             values = {f"difference_{name}": difference}
             section.note(level, "check.control-difference", [], [point], values, **fields)
+    return wrong
