@@ -55,7 +55,9 @@ def explained(result: Result) -> list[Message]:
     """Return mistakes in data conventions that explain a failed or bad adjustment."""
     if result.loss is not None:
         return []
-    found = hints_at("data", result.block) if _bad(result) else []
+    variance = result.variance_of_unit_weight or 0.0
+    is_bad = not result.converged or variance > BAD**2
+    found = hints_at("data", result.block) if is_bad else []
     if result.WHOLE and not found and (not result.converged or is_suspected(result)):
         from photogram.diagnosis.mistakes import Adjuster
 
@@ -67,11 +69,6 @@ def remarks(result: Result) -> list[Message]:
     """Return hints on a good result: readout directions, clock offsets, fiducial marks."""
     is_special = result.converged and bool(result.unknowns or result.block.observations)
     return hints_at("fit", result) if is_special else []
-
-
-def _bad(result: Result) -> bool:
-    variance = result.variance_of_unit_weight
-    return not (result.converged and (variance is None or variance <= BAD**2))
 
 
 def diagnosis_of(result: Result) -> Diagnosis:

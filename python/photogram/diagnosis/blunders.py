@@ -18,8 +18,7 @@ from photogram.diagnosis.findings import Finding, Section, section_of
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.misfits import Misfits, exchanged, list_test_values
 from photogram.diagnosis.mistakes import Adjuster
-from photogram.diagnosis.robust import mad_sd
-from photogram.diagnosis.tested_values import FOUND, ROUNDING, outliers, sizes_of_tests, spread_of
+from photogram.diagnosis.tested_values import FOUND, ROUNDING, mad_sd, outliers, sizes_of_tests, spread_of
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block

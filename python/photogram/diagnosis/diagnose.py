@@ -159,12 +159,12 @@ def _checked(
     view = View.of(given)
     sets, upright, oriented, exact = orientation(view, words)
     sets.findings[:0] = lens
-    errors, suspects = gross(oriented.seen, oriented.unit)
+    errors, suspects = gross(oriented.seen, oriented.block.image_unit)
     if not intersect_only:
         start = oriented
         oriented = _sets(sets, oriented, suspects, adjusted)
         if oriented is not start:
-            errors, suspects = gross(oriented.seen, oriented.unit)
+            errors, suspects = gross(oriented.seen, oriented.block.image_unit)
     if suspects.photos.any():
         spare_explained(upright, oriented.seen, suspects.photos)
     edited = _edited(oriented, suspects, intersect_only, adjusted)

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.findings import Level, Section, section_of
-from photogram.diagnosis.robust import mad_sd
+from photogram.diagnosis.tested_values import mad_sd
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos

@@ -49,11 +49,6 @@ _SCALES = 60  # number of steps in between
 _EXPLAINED = 0.2  # e, largest remainder of a regression
 
 
-def turn_of(name: str) -> Floats:
-    """(2, 2) matrix V of a reflection or rotation."""
-    return np.array(TURNS[name], dtype=np.float64)
-
-
 def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
     """Return a block with V applied to the observations of (P,) photos: V' observed."""
     own = photos[block.image_photos][:, np.newaxis]
@@ -77,7 +72,7 @@ def turns(block: Block, photos: Bools) -> Iterator[Proposal]:
     """Yield reflections of the images of (P,) photos, and rotations of their kappa, which preserve lenses."""
     for name in TURNS:
         code, degrees = name, KAPPA.get(name)
-        change = partial(images_turned, photos=photos, turn=turn_of(name))
+        change = partial(images_turned, photos=photos, turn=np.array(TURNS[name], dtype=np.float64))
         if degrees is not None:
             if block.photo_to_ground and abs(degrees) < 180.0:
                 degrees, code = -degrees, name.translate(_OPPOSITE)

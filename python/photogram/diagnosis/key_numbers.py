@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from photogram.diagnosis.blunders import Edited
 from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, section_of, small_unit
-from photogram.diagnosis.robust import mad_sd
+from photogram.diagnosis.tested_values import mad_sd
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
 from photogram.results.result import Result

@@ -74,11 +74,11 @@ def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: 
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
     section.figure("rays that meet behind their camera", f"{behind} of {int(known.sum())}")
-    section.figure("median residual of intersection", f"{_median(met.sizes):.3f} {view.unit}")
+    section.figure("median residual of intersection", f"{_median(met.sizes):.3f} {view.block.image_unit}")
     if view.seen is not given:
         section.figure(
             "median residual with these explanations",
-            f"{_median(met_after.sizes):.3f} {view.unit}; the sections below hold with them",
+            f"{_median(met_after.sizes):.3f} {view.block.image_unit}; the sections below hold with them",
         )
     return section
 

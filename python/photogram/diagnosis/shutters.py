@@ -13,7 +13,6 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.moving_photos import Direction, Shutter
 from photogram.network.trajectories import Readout
-from photogram.results.fixed_tests import is_suspected
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -26,9 +25,6 @@ OTHER: dict[Direction, Direction] = {"down": "up", "up": "down", "right": "left"
 def readout_hints(block: Block, adjusted: Adjuster) -> list[Message]:
     """Try other rolling shutter readouts if the adjustment failed or fits badly."""
     if not any(each.shutter is not None for each in block.timed):
-        return []
-    first = adjusted.converged(block)
-    if first is not None and (first.loss or not is_suspected(first)):
         return []
     found = explain(block, _proposals(block), adjusted)
     return [Message(found.message())] if found is not None and found.is_certain else []

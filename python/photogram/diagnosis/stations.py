@@ -7,7 +7,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.findings import Level, Section, section_of
-from photogram.diagnosis.robust import MAD_TO_SD
+from photogram.diagnosis.tested_values import MAD_TO_SD
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.rays import local_axes

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from statistics import NormalDist
+
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.robust import mad_sd
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
@@ -17,6 +18,15 @@ TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 
 Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth. Its test
 value is still meaningful."""
+
+
+MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
+
+
+def mad_sd(values: Floats) -> float:
+    """Return the robust standard deviation about zero (MAD); NaN without values."""
+    finite = np.abs(values[np.isfinite(values)])
+    return MAD_TO_SD * float(np.median(finite)) if finite.size else float("nan")
 
 
 def spread_of(result: AdjustedNetwork) -> float:

@@ -45,11 +45,6 @@ class View:
         rows = np.flatnonzero(~mounted[block.image_photos])
         return cls(block, kept_images(plain.replace(mounts=()), rows))
 
-    @property
-    def unit(self) -> str:
-        """Unit of image coordinates."""
-        return self.block.image_unit
-
     def changed(self, change: Change) -> Self:
         """Return the view of the corrected block.
 
