@@ -117,25 +117,11 @@ def exchange(block: Block, pair: tuple[int, int]) -> Block:
 
 
 def _some_wrong(block: Block, adjusted: Adjuster) -> float:
-    """Return the cost of explaining the misfit by wrong points.
+    """Return the cost of explaining the misfit by wrong points; infinite with more than a third of them.
 
-    The cost is Omega of the other observations plus two terms. Each wrong point adds 2 ln(3 k), because it is
-    one of k. Each of its errors adds 2 ln(error / standard deviation).
-    """
-    found = without_outliers(block, adjusted)
-    if found is None:
-        return math.inf
-    result, _, tests = found
-    count = int(np.isfinite(block.point_sd).any(axis=1).sum())
-    sizes = np.log(np.maximum(np.nan_to_num(tests), 1.0)).sum()
-    return omega(result) + 2 * (len(tests) * math.log(3 * count) + float(sizes))
-
-
-def without_outliers(block: Block, adjusted: Adjuster) -> tuple[Result, Indices, Floats] | None:
-    """Adjust without the control point with the largest test value, until all others fit.
-
-    Returns the adjustment, the excluded points, and (k, 3) test values of these against their predictions;
-    None if more than a third fails.
+    The point with the largest test value is excluded until all others fit. The cost is Omega of the other
+    observations plus two terms. Each wrong point adds 2 ln(3 k), because it is one of k. Each of its errors
+    adds 2 ln(error / standard deviation), from its prediction.
     """
     points: Indices = np.empty(0, dtype=np.int64)
     count = int(np.isfinite(block.point_sd).any(axis=1).sum())
@@ -144,14 +130,16 @@ def without_outliers(block: Block, adjusted: Adjuster) -> tuple[Result, Indices,
         point_sd[points] = np.inf
         result = adjusted.converged(block.replace(point_sd=point_sd) if len(points) else block)
         if result is None:
-            return None
+            return math.inf
         if not outliers(result)["control"].any():
             errors = np.abs(block.point_positions[points] - result.point_positions[points])
             cofactors = np.diagonal(result.point_cofactors[points], axis1=1, axis2=2)
             deviations = spread_of(result) * np.sqrt(block.point_sd[points] ** 2 + cofactors)
-            return result, points, np.where(np.isfinite(block.point_sd[points]), errors / deviations, np.nan)
+            sizes = np.where(np.isfinite(block.point_sd[points]), errors / deviations, 1.0)
+            cost = len(points) * math.log(3 * count) + float(np.log(np.maximum(sizes, 1.0)).sum())
+            return omega(result) + 2 * cost
         points = np.append(points, np.argmax(sizes_of_tests(result)["control"].max(axis=1)))
-    return None
+    return math.inf
 
 
 def _scale(result: Result | None, block: Block) -> float:

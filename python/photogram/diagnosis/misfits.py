@@ -21,7 +21,8 @@ from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATIO
 from photogram.results.result import Result
 from photogram.results.snooping_log import Exchange, Removal
 from photogram.results.snooping_result import Snooped
-from photogram.show.quantity import Axis, Table, column
+from photogram.results.tables import Tests
+from photogram.show.quantity import Table
 from photogram.statistics.limits import normal_limit
 from photogram.words import Phrase, phrase
 
@@ -230,31 +231,14 @@ def list_test_values(result: Result, section: Section) -> None:
     """List test values beyond 3 after all removals, the largest ones, and their number."""
     values = sizes_of_tests(result)["image"]
     tested = int((values > 0).sum())
-    images, axes = np.nonzero(values > BLUNDER)
+    beyond = int((values > BLUNDER).sum())
     section.figure(
         "robust spread of the test values", f"{spread_of(result):.3f} (1 when the weights are right)"
     )
     section.figure(
         f"image coordinates beyond {BLUNDER:g} times the spread",
-        f"{len(images)} of {tested} tested ({0.0027 * tested:.0f} to be expected)",
+        f"{beyond} of {tested} tested ({0.0027 * tested:.0f} to be expected)",
     )
-    if not len(images):
-        return
-    block = result.block
-    unit, factor = small_unit(block.image_unit)
-    order = np.argsort(-values[images, axes], kind="stable")[:SHOWN]
-    rows, axis = images[order], axes[order]
-    residuals, redundancy = factor * result.residuals[rows, axis], result.redundancy[rows, axis]
-    photos, points = block.image_photos[rows].tolist(), block.image_points[rows].tolist()
-    small = (Axis.of("", unit),)
-    columns = [
-        column("photo", [block.photo_ids[photo] for photo in photos], "Photo", kind="name"),
-        column("point", [block.point_ids[point] for point in points], "Point", kind="name"),
-        column("axis", ["xy"[k] for k in axis], "Axis", kind="name"),
-        column("residual", residuals, "Residual", axes=small, kind="deviation", decimals=1),
-        column("redundancy", redundancy, "Redundancy", decimals=3),
-        column("test_value", values[rows, axis], "Test value", decimals=2),
-        column("error", residuals / redundancy, "Error", axes=small, kind="deviation", decimals=1),
-    ]
-    note = "The error is the gross error that would explain the residual."
-    section.parts.append(Table("", "Largest test values of the other observations", columns, note))
+    tests = Tests(result)
+    title = "Largest test values of the other observations"
+    section.parts.append(Table("", title, tests.columns(tests.largest(SHOWN))))
