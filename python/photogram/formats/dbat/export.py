@@ -169,7 +169,6 @@ def _control(lines: _Lines, content: DbatBuilder, options: ReadOptions) -> None:
 
 def _measurements(lines: _Lines, content: DbatBuilder) -> None:
     for card in lines.until_empty():
-        photo = _number(card, 0)
-        content.check_photo(photo, card.place)
         sd = card.numbers(4, "sx sy") if len(card.words) >= 6 else np.full(2, np.nan)
-        content.image(photo, _number(card, 1), *card.numbers(2, "x y"), sd=np.where(sd > 0, sd, np.nan))
+        (x, y), sd = card.numbers(2, "x y").tolist(), np.where(sd > 0, sd, np.nan)
+        content.image(_number(card, 0), _number(card, 1), x, y, card.place, sd=sd)

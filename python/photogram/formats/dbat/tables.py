@@ -74,11 +74,6 @@ class DbatBuilder(BlockBuilder):
         self.photo(number, camera, place)
         self.paths.append(path)
 
-    def check_photo(self, number: int, place: Failing) -> None:
-        """Reject a photo that was not added."""
-        if number not in self.photo_rows:
-            raise place.error(phrase("format.undefined", what="photo", name=str(number)))
-
     def dbat_project(self, options: ReadOptions) -> Project:
         """Return the project; user-defined standard deviations are in pixels."""
         if not self.image_keys:
@@ -179,7 +174,8 @@ def take_poses(table: ColumnTable, content: DbatBuilder, unit: str = "degrees") 
     matrices = Attitudes.of("omega_phi_kappa", angles).matrices
     poses = zip(whole_numbers(table, "id"), table.given(("x", "y", "z")), matrices, strict=True)
     for row, (number, centre, matrix) in enumerate(poses):
-        content.check_photo(number, table.at(row))
+        if number not in content.photo_rows:
+            raise table.error(row, phrase("format.undefined", what="photo", name=str(number)))
         content.pose(number, centre, matrix, table.at(row))
 
 
@@ -225,13 +221,11 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
 def take_images(table: ColumnTable, content: DbatBuilder, sd: float = math.nan) -> None:
     """Add observations; `sd` is their default standard deviation, pixels."""
     table.require("id", "im", "x", "y")
-    photos = whole_numbers(table, "im")
-    for row, number in enumerate(photos):
-        content.check_photo(number, table.at(row))
     own = _deviations(table, ("sx", "sy"), "sxy")
     own = np.where(np.isnan(own), sd, own)
     for row in np.argwhere(own == 0)[:, 0].tolist():
         positive(table.at(row), "the standard deviation", 0)
-    rows = zip(photos, whole_numbers(table, "id"), table.given(("x", "y")).tolist(), own, strict=True)
-    for photo, point, xy, deviations in rows:
-        content.image(photo, point, *xy, sd=deviations)
+    photos, points = whole_numbers(table, "im"), whole_numbers(table, "id")
+    rows = zip(photos, points, table.given(("x", "y")).tolist(), own, strict=True)
+    for row, (photo, point, (x, y), deviations) in enumerate(rows):
+        content.image(photo, point, x, y, table.at(row), sd=deviations)

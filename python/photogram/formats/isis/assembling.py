@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import filled_lines
@@ -22,7 +21,6 @@ from photogram.formats.isis.solving import observations_of, one_flight, solving
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import Place
-from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.geometry import Cartesian, Spheroid, lengths_of_units, local_frames
 from photogram.network.motion import about
@@ -32,56 +30,40 @@ from photogram.words import Phrase, option_sd, phrase
 _LOCAL = [1, 0, 2]  # Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius
 
 
-@dataclass(frozen=True, eq=False)
-class KnownPoints:
-    """Prior values of n points in the coordinates of a block.
-
-    `positions` and `sd` are (n, 3) as in blocks: weighted or fixed values, otherwise NaN, and their standard
-    deviations. `starts` are (n, 3) initial values; `controls` points with a full covariance matrix;
-    `messages` remarks on values that differ from the network.
-    """
-
-    positions: Floats
-    sd: Floats
-    starts: Floats
-    controls: list[Control]
-    messages: list[Message]
-
-
-def known_points(
-    network: ControlNetwork,
-    rows: Indices,
-    starts: Floats,
-    settings: Settings,
-    spheroid: Spheroid | None,
-    place: Place,
-) -> KnownPoints:
-    """Return the prior values of points from a network and the settings.
+def _add_points(
+    block: BlockBuilder, contents: PlanetaryContents, rows: Indices, spheroid: Spheroid | None
+) -> None:
+    """Add points with the prior values of a network and the settings.
 
     Free points have the standard deviations of the settings, and a fixed radius unless it is to be estimated.
     Constrained points have their own covariance matrix or single standard deviations; fixed points have 0.
-    `rows` are the points of the network in use, `starts` (n, 3) their initial X, Y, Z in metres. `spheroid`
-    is a sphere if latitude, longitude and radius are adjusted, None if X, Y, Z are.
+    `rows` are the points of the network in use. `spheroid` is a sphere if latitude, longitude and radius are
+    adjusted, None if X, Y, Z are.
     """
-    points = network.points
+    settings, points, starts = contents.settings, contents.network.points, contents.starts[rows]
+
+    def report(code: str, omitted: Indices) -> None:
+        if len(omitted):
+            names = [points.ids[row] for row in omitted.tolist()]
+            block.messages.append(Message.of(code, n=len(omitted), names=names))
+
     coordinates = Cartesian(spheroid).from_cartesian(starts)
     metres = 1.0 / lengths_of_units(coordinates, spheroid)  # Units of coordinates per metre
     order = _LOCAL if spheroid else [0, 1, 2]
-    given = settings.latitude_sigmas if spheroid else settings.rectangular_sigmas
-    sigmas = np.array([np.inf if each is None else each for each in given])[order]
+    single_sd = settings.latitude_sigmas if spheroid else settings.rectangular_sigmas
+    sigmas = np.array([np.inf if each is None else each for each in single_sd])[order]
     sd = np.broadcast_to(sigmas, coordinates.shape) * metres
     if spheroid and not settings.radius:
         sd[:, 2] = np.where(points.is_constrained[rows], sd[:, 2], 0.0)
     sd[points.is_fixed[rows]] = 0.0
-    known = KnownPoints(coordinates, sd, coordinates, [], [])
     own = np.flatnonzero(points.is_constrained[rows])
     covariances = full_matrices(points.apriori_covariance[rows[own]])
     given = np.isfinite(covariances).all(axis=(1, 2))
-    _report(known, "isis.no-covariance", points.ids, rows[own[~given]])
+    report("isis.no-covariance", rows[own[~given]])
     own, covariances = own[given], covariances[given]
     bad = np.flatnonzero(~(np.linalg.eigvalsh(covariances) > 0).all(axis=1))
     if len(bad):
-        raise place.error(phrase("isis.covariance", point=points.ids[rows[own[bad[0]]]]))
+        raise block.place.error(phrase("isis.covariance", point=points.ids[rows[own[bad[0]]]]))
     if spheroid:
         axes = local_frames(coordinates[own])
         covariances = axes @ covariances @ axes.transpose(0, 2, 1)
@@ -89,38 +71,20 @@ def known_points(
     whole = single.all(axis=1) | ~single.any(axis=1)
     for row, covariance in zip(own[whole], covariances[whole], strict=True):
         sd[row] = np.inf
-        known.controls.append(Control(points.ids[rows[row]], coordinates[row], covariance=covariance))
+        control = Control(points.ids[rows[row]], coordinates[row], covariance=covariance)
+        block.observations.append(control)
     deviations = np.sqrt(np.einsum("nkk->nk", covariances)) * metres[own]
     parts = np.flatnonzero(~whole)
     sd[own[parts]] = np.where(single[parts], deviations[parts], sd[own[parts]])
-    _report(known, "isis.single-coordinates", points.ids, rows[own[parts]])
-    return replace(known, positions=np.where(np.isfinite(sd), coordinates, np.nan))
+    report("isis.single-coordinates", rows[own[parts]])
+    positions = np.where(np.isfinite(sd), coordinates, np.nan)
+    names = [points.ids[row] for row in rows.tolist()]
+    block.points(names, coordinates, point_positions=positions, point_sd=sd)
 
 
 def full_matrices(packed: Floats) -> Floats:
     """Return (n, 3, 3) symmetric matrices of (n, 6) upper triangles, row by row."""
     return packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
-
-
-def _report(known: KnownPoints, code: str, ids: Sequence[str], rows: Indices) -> None:
-    if len(rows):
-        names = [ids[row] for row in rows.tolist()]
-        known.messages.append(Message.of(code, n=len(rows), names=names))
-
-
-def given_starts(network: ControlNetwork, rows: Indices, place: Place) -> Floats:
-    """Return (n, 3) X, Y, Z of points, preferably a-priori ones; NaN without.
-
-    They are required for fixed and constrained points.
-    """
-    points = network.points
-    apriori, adjusted = points.apriori[rows], points.adjusted[rows]
-    there = np.isfinite(apriori).all(axis=1, keepdims=True)
-    found: Floats = np.where(there, apriori, adjusted)
-    missing = ~np.isfinite(found).all(axis=1) & (points.is_fixed | points.is_constrained)[rows]
-    if missing.any():
-        raise place.error(phrase("isis.coordinates", point=points.ids[rows[np.argmax(missing)]]))
-    return found
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -211,9 +175,17 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
 
 
 def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Place) -> Floats:
-    """Return (n, 3) initial X, Y, Z: given, or mean ray intersections."""
-    starts = given_starts(network, seen.points, place)
-    unknown = np.asarray(np.isnan(starts).any(axis=1))
+    """Return (n, 3) initial X, Y, Z: preferably a-priori ones, adjusted ones, or mean ray intersections.
+
+    They are required for fixed and constrained points.
+    """
+    points = network.points
+    apriori, adjusted = points.apriori[seen.points], points.adjusted[seen.points]
+    starts: Floats = np.where(np.isfinite(apriori).all(axis=1, keepdims=True), apriori, adjusted)
+    unknown: Bools = np.asarray(~np.isfinite(starts).all(axis=1))
+    missing = unknown & (points.is_fixed | points.is_constrained)[seen.points]
+    if missing.any():
+        raise place.error(phrase("isis.coordinates", point=points.ids[seen.points[np.argmax(missing)]]))
     sums, counts = np.zeros_like(starts), np.zeros(len(starts))
     measures, asked = network.measures, np.flatnonzero(unknown[seen.image_points])
     groups = rows_of_each(measures.serial[seen.measures[asked]], len(measures.serials))
@@ -229,12 +201,10 @@ def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Pl
 
 
 def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) -> Project:
-    network, place, spheroid = contents.network, Place(contents.path), None
+    spheroid = None
     if contents.settings.axes == "latitudinal":
         a, b = contents.different[0].supported.isd.radii
         spheroid = Spheroid((2 * a + b) / 3, (2 * a + b) / 3)
-    starts = contents.starts[seen.points]
-    known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
     timed = [each for own in contents.different for each in own.supported.timed]
     # Approximate poses: of frames, and of the first lines of scanners.
     found = [
@@ -247,37 +217,27 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     axes = Cartesian(spheroid)
     centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
     matrices = axes.to_local(np.array([matrix for _, matrix in found]), centres)
-    remarks = [*contents.settings.remarks]
-    if contents.settings.rejects:
-        remarks.append(phrase("isis.rejection"))
     block = BlockBuilder(contents.path, TITLE)
-    block.messages += [*messages, *known.messages, *map(Message, remarks)]
-    cameras, of_photos = _cameras(contents)
-    for row, each in enumerate(cameras):
-        block.camera(each.supported.camera, pixel_mm=each.pitch, key=row)
+    block.messages += messages
+    of_photos = list[int]()
+    for image in contents.different:
+        isd = image.supported.isd
+        key = isd.platform, isd.sensor, isd.focal_length
+        if key not in block.camera_rows:
+            block.camera(image.supported.camera, pixel_mm=image.pitch, key=key)
+        of_photos += [block.camera_rows[key]] * len(image.supported.timed)
     block.photos([each.photo for each in timed], of_photos, centres, matrices)
-    points = [network.points.ids[row] for row in seen.points.tolist()]
-    block.points(points, known.starts, point_positions=known.positions, point_sd=known.sd)
+    _add_points(block, contents, seen.points, spheroid)
+    block.messages += map(Message, contents.settings.remarks)
+    if contents.settings.rejects:
+        block.messages.append(Message.of("isis.rejection"))
     block.images(seen.image_photos, seen.image_points, seen.xy, np.column_stack([seen.sd, seen.sd]))
-    block.observations += known.controls
     fields = {"number": PITCHES, "unit": "px", "option": option_sd("images")}
     block.lacks.append(Phrase("read.images", fields))
     details = {DETAILS: contents, "further inputs": [each.path for each in contents.different]}
-    return block.project(details=details, title=network.network_id or "", timed=timed, spheroid=spheroid)
-
-
-def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:
-    """Return an image of each camera, and the camera of each photo."""
-    known: dict[object, int] = {}
-    first: list[Image] = []
-    rows: list[int] = []
-    for each in contents.different:
-        isd = each.supported.isd
-        row = known.setdefault((isd.platform, isd.sensor, isd.focal_length), len(known))
-        if row == len(first):
-            first.append(each)
-        rows += [row] * len(each.supported.timed)
-    return first, np.array(rows)
+    return block.project(
+        details=details, title=contents.network.network_id or "", timed=timed, spheroid=spheroid
+    )
 
 
 def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[Message]:

@@ -232,41 +232,31 @@ def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
     def rejected(block: Block, **options: Any) -> Result:
         if not isinstance(block, Block):
             raise InputError(phrase("isis.rejection-poses"))
-        return _rejected(contents, block, lambda own: adjust(own, **options))
+        multiplier = contents.settings.multiplier
+        out = np.zeros(len(block.image_xy), dtype=bool)
+        for rounds in count(1):
+            sd = block.image_sd * np.where(out, FAINT, 1.0)[:, np.newaxis]
+            result = adjust(block.replace(image_sd=sd), **options)
+            if not result.converged:
+                return result
+            residuals = Outcome(contents, result).residuals
+            lengths = np.where(result.used_images, np.hypot(*residuals.T), np.nan)
+            limit = rejection_limit(lengths[~out], multiplier)
+            now = flagged(lengths, out, block.image_points, limit)
+            if (now == out).all():
+                break
+            out = now
+            if rounds == MOST_ROUNDS:
+                raise AdjustmentError(phrase("isis.rejection-rounds", n=rounds))
+        if out.any():
+            images = ("image_photos", "image_points", "image_xy", "image_sd")
+            kept = {name: getattr(block, name)[~out] for name in images}
+            result = adjust(block.replace(**kept), **options)
+        counts = {"n": int(out.sum()), "total": len(out), "rounds": rounds, "least": FEWEST}
+        remark = Message.of("isis.rejected", **counts, multiplier=multiplier, factor=NORMAL, limit=limit)
+        return replace(result, messages=[remark, *result.messages])
 
     return rejected
-
-
-def _rejected(contents: PlanetaryContents, block: Block, adjust: Callable[[Block], Result]) -> Result:
-    """Adjust the block without rejected measures, and report them in a remark."""
-    multiplier = contents.settings.multiplier
-    out = np.zeros(len(block.image_xy), dtype=bool)
-    for rounds in count(1):
-        result = adjust(block.replace(image_sd=block.image_sd * np.where(out, FAINT, 1.0)[:, np.newaxis]))
-        if not result.converged:
-            return result
-        residuals = Outcome(contents, result).residuals
-        lengths = np.where(result.used_images, np.hypot(*residuals.T), np.nan)
-        limit = rejection_limit(lengths[~out], multiplier)
-        now = flagged(lengths, out, block.image_points, limit)
-        if (now == out).all():
-            break
-        out = now
-        if rounds == MOST_ROUNDS:
-            raise AdjustmentError(phrase("isis.rejection-rounds", n=rounds))
-    kept = np.flatnonzero(~out)
-    if out.any():
-        result = adjust(
-            block.replace(
-                image_photos=block.image_photos[kept],
-                image_points=block.image_points[kept],
-                image_xy=block.image_xy[kept],
-                image_sd=block.image_sd[kept],
-            )
-        )
-    counts = {"n": int(out.sum()), "total": len(out), "rounds": rounds, "least": FEWEST}
-    remark = Message.of("isis.rejected", **counts, multiplier=multiplier, factor=NORMAL, limit=limit)
-    return replace(result, messages=[remark, *result.messages])
 
 
 def rejection_limit(lengths: Floats, multiplier: float) -> float:
