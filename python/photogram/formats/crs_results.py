@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 from photogram.arguments.arrays import natural_order
@@ -22,13 +19,14 @@ from photogram.network.observations import Control
 from photogram.results.footprints import metric_covariances
 from photogram.results.result import Result
 from photogram.show.page import Section, decimals_of
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Quantity, Table, chosen, column, frame, named
 from photogram.words import phrase
 
 __all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
+_METRES = tuple(Axis.of(axis, "m") for axis in _LOCAL)
 DEGREE = 180.0 / np.pi  # Degrees per radian
 MOST = 500  # Largest number of listed points; tables contain all
 
@@ -189,30 +187,23 @@ def placed(result: Result, crs: str = "") -> Placed:
 
 def placed_files(found: Placed) -> dict[str, bytes]:
     """Return CSV tables of a result in a system."""
-    block = found.result.block
-    ids = np.array(block.point_ids, dtype=object)
-    angles, deviations = (np.degrees(each) for each in found.angles())
-    tables: dict[str, dict[str, Any]] = {
-        "photos.csv": {
-            "photo": block.photo_ids,
-            **_positions(found.names, found.photos, found.photo_covariances),
-            **{f"{name}_deg": column for name, column in zip(_ANGLES, angles.T, strict=True)},
-            **{f"sd_{name}_deg": column for name, column in zip(_ANGLES, deviations.T, strict=True)},
-        },
-        "points.csv": {
-            "point": ids[found.rows],
-            "kind": found.result.point_kinds[found.rows],
-            "rays": found.result.point_rays[found.rows],
-            **_positions(found.names, found.points, found.point_covariances),
-        },
+    ids = np.array(found.result.block.point_ids, dtype=object)
+    degrees = tuple(Axis(name, "deg", suffix="_deg") for name in _ANGLES)
+    angles = zip(("", "sd"), map(np.degrees, found.angles()), strict=True)
+    tables: dict[str, list[Quantity]] = {
+        "photos.csv": [
+            column("photo", found.result.block.photo_ids),
+            *_positions(found, found.photos, found.photo_covariances),
+            *(Quantity(values, degrees, "deviation", name) for name, values in angles),
+        ],
+        "points.csv": _points(found),
     }
     for name, (rows, vectors) in (
         ("control.csv", found.control_differences()),
         ("check_points.csv", found.differences()),
     ):
         if len(rows):
-            columns = {f"d_{axis}": part for axis, part in zip(_LOCAL, vectors.T, strict=True)}
-            tables[name] = {"point": ids[rows], **columns}
+            tables[name] = [column("point", ids[rows]), Quantity(vectors, _METRES, "deviation", "d")]
     comments = [
         f"coordinates in {found.crs}: "
         + ", ".join(f"{name} {unit}" for name, unit in zip(found.names, found.units, strict=True)),
@@ -220,7 +211,7 @@ def placed_files(found: Placed) -> dict[str, bytes]:
         " along east, north and up of this system",
         f"datum: {found.result.datum}",
     ]
-    return {name: csv_text(columns, comments) for name, columns in tables.items()}
+    return {name: csv_text(frame(columns), comments) for name, columns in tables.items()}
 
 
 def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats, Floats]:
@@ -231,14 +222,31 @@ def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats,
     return degrees, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
 
 
-def _positions(names: Sequence[str], xyz: Floats, covariances: Floats) -> dict[str, Any]:
+def _points(found: Placed) -> list[Quantity]:
+    """Return the table of the used points."""
+    result = found.result
+    return [
+        column("point", np.array(result.block.point_ids, dtype=object)[found.rows], "Point", kind="name"),
+        column("kind", result.point_kinds[found.rows], "Kind", kind="name"),
+        column("rays", result.point_rays[found.rows]),
+        *_positions(found, found.points, found.point_covariances),
+    ]
+
+
+def _positions(found: Placed, xyz: Floats, covariances: Floats) -> list[Quantity]:
+    """Return positions with their standard deviations and covariances."""
     sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    decimals = decimals_of(sd)
     pairs = [(i, j) for i in range(3) for j in range(i + 1)]
-    return {
-        **dict(zip(names, xyz.T, strict=True)),
-        **{f"sd_{axis}": column for axis, column in zip(_LOCAL, sd.T, strict=True)},
-        **{f"c_{_LOCAL[i]}_{_LOCAL[j]}": covariances[:, i, j] for i, j in pairs},
-    }
+    columns = []
+    for name, unit, values in zip(found.names, found.units, xyz.T, strict=True):
+        axis, own = Axis.of(name.capitalize(), unit), 8 if unit == "deg" else decimals
+        columns.append(Quantity(values, (axis,), "deviation", name, head="{}", decimals=own))
+    return [
+        *columns,
+        Quantity(sd, _METRES, "deviation", "sd", head="sd {}", decimals=decimals),
+        *(column(f"c_{_LOCAL[i]}_{_LOCAL[j]}", covariances[:, i, j]) for i, j in pairs),
+    ]
 
 
 def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
@@ -269,32 +277,15 @@ def placed_section(found: Placed) -> Section:
     names, kinds = found.result.block.point_ids, found.result.point_kinds
     own = [k for k, row in enumerate(found.rows.tolist()) if kinds[row] != "pass"]
     own.sort(key=lambda k: natural_order(names[int(found.rows[k])]))
-    sd = np.sqrt(np.diagonal(found.point_covariances, axis1=1, axis2=2))
-    decimals = decimals_of(sd)
     rows, differences = found.rows[own[:MOST]], dict[int, Floats]()
     for given, steps in (found.differences(), found.control_differences()):
         differences |= zip(given.tolist(), steps, strict=True)
-    axes = [Axis.of(name.capitalize(), unit) for name, unit in zip(found.names, found.units, strict=True)]
-    local = tuple(Axis.of(axis, "m") for axis in _LOCAL)
-    columns = [
-        Quantity([names[row] for row in rows.tolist()], kind="name", head="Point"),
-        Quantity(kinds[rows], kind="name", head="Kind"),
-        *(
-            Quantity(values, (axis,), "deviation", head="{}", decimals=8 if axis.unit == "deg" else decimals)
-            for axis, values in zip(axes, found.points[own[:MOST]].T, strict=True)
-        ),
-        Quantity(sd[own[:MOST]], local, "deviation", head="sd {}", decimals=decimals),
-        Quantity(
-            np.array([differences[row] for row in rows.tolist()]),
-            local,
-            "deviation",
-            head="d {}",
-            decimals=decimals,
-        ),
-    ]
-    left = len(own) - len(rows)
+    columns = chosen(_points(found), np.array(own[:MOST], dtype=np.int64))
+    decimals = named(columns, "sd").decimals
+    steps = np.array([differences[row] for row in rows.tolist()])
+    columns.append(Quantity(steps, _METRES, "deviation", head="d {}", decimals=decimals))
     note = "d: adjusted minus given. Tables of all photos and points are in `in_crs`" + (
-        f"; {left} more there." if left else "."
+        f"; {len(own) - MOST} more there." if len(own) > MOST else "."
     )
     title = f"Control and check points in {found.crs}"
     return Section("in-crs", title, [Table("", title, columns, note)] if own else [])
