@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Hashable, Mapping, Sequence
 from pathlib import Path
 
@@ -54,7 +55,7 @@ def _project(model: Model, path: Path) -> Project:
     names, numbers, xy = [each.name for each in images], model.numbers, model.features["xy"]
     for each in model.cameras:
         block.camera(_camera(each), (each.width, each.height), key=each.number, place=each.place)
-    _check_model(model, names, block.camera_rows)
+    _check_model(model, block.camera_rows)
     table = np.array([each.pose for each in images]).reshape(-1, 7)
     translations = table[:, 4:]
     rotations, off = _rotations(table[:, :4], [each.place for each in images])
@@ -88,34 +89,32 @@ def _camera(camera: Camera) -> HouseCamera:
         return HouseCamera(model, values, name=str(camera.number), unit="px")
 
 
-def _check_model(model: Model, names: Sequence[str], cameras: Container[Hashable]) -> None:
+def _check_model(model: Model, cameras: Container[Hashable]) -> None:
     """Reject invalid names, cameras and numbers."""
+    known: set[str | int] = set()
     for image in model.images:
+        place = image.place
         if not image.name.strip() or not image.name.isprintable():
-            raise image.place.error(phrase("format.name", what="image", name=image.name))
+            raise place.error(phrase("format.name", what="image", name=image.name))
         if image.camera not in cameras:
-            raise image.place.error(phrase("format.undefined", what="camera", name=str(image.camera)))
-    places = [each.place for each in model.images]
-    places_of_features = np.repeat(np.arange(len(places)), model.counts)
-    translations = np.array([each.pose[4:] for each in model.images]).reshape(-1, 3)
-    for values, rows, own, what in (
-        (model.features["xy"], places_of_features, places, "a feature"),
-        (translations, None, places, "the translation"),
-        (model.points["xyz"], None, model.point_places, "the position"),
-    ):
-        finite = np.isfinite(values).all(axis=1)
-        if not finite.all():
-            row = int(np.argmin(finite))
-            raise own[row if rows is None else rows[row]].error(phrase("format.finite", name=what))
-    for what, keys, own in (
-        ("image", np.array(names, dtype=object), places),
-        ("image", model.numbers, places),
-        ("point", model.points["number"], model.point_places),
-    ):
-        _, first = np.unique(keys, return_index=True)
-        if len(first) < len(keys):
-            row = int(np.setdiff1d(np.arange(len(keys)), first)[0])
-            raise own[row].error(phrase("format.repeated", what=what, name=str(keys[row])))
+            raise place.error(phrase("format.undefined", what="camera", name=str(image.camera)))
+        for key in (image.name, image.number):
+            if key in known:
+                raise place.error(phrase("format.repeated", what="image", name=str(key)))
+            known.add(key)
+        if not all(map(math.isfinite, image.pose[4:])):
+            raise place.error(phrase("format.finite", name="the translation"))
+    finite = np.isfinite(model.features["xy"]).all(axis=1)
+    if not finite.all():
+        row = int(np.searchsorted(np.cumsum(model.counts), np.argmin(finite), side="right"))
+        raise model.images[row].place.error(phrase("format.finite", name="a feature"))
+    finite, numbers = np.isfinite(model.points["xyz"]).all(axis=1), model.points["number"]
+    if not finite.all():
+        raise model.point_places[int(np.argmin(finite))].error(phrase("format.finite", name="the position"))
+    _, first = np.unique(numbers, return_index=True)
+    if len(first) < len(numbers):
+        row = int(np.setdiff1d(np.arange(len(numbers)), first)[0])
+        raise model.point_places[row].error(phrase("format.repeated", what="point", name=str(numbers[row])))
 
 
 def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, Indices]:

@@ -66,8 +66,7 @@ def _positions(
     basis = Polynomial(count - 1, reference, scale, sd=sd)
     if settings.over_hermite:
         return basis, isd, np.zeros((3, count))
-    fit = fitted(own.times, own.places, min(settings.spk_degree, len(own.times) - 1))
-    fit = _of_degree(fit, max(settings.spk_solve_degree, count - 1))
+    fit = _fit(own.times, own.places, settings.spk_degree, max(settings.spk_solve_degree, count - 1))
     if len(own.times) > 1:
         times, places = fit.sampled(float(isd.position.times[0]), float(isd.position.times[-1]))
         isd = replace(isd, position=Positions(times, places, None, "lagrange"))
@@ -89,8 +88,7 @@ def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polyn
         sd[:, 2] = 0.0
     if settings.over_existing:
         return Polynomial(degree, reference, scale, sd=sd), isd, np.zeros((3, degree + 1))
-    fit = fitted(own.times, to_angles(own.matrices), min(settings.ck_degree, len(own.times) - 1))
-    fit = _of_degree(fit, degree)
+    fit = _fit(own.times, to_angles(own.matrices), settings.ck_degree, degree)
     value = fit.coefficients.T.copy()
     value[0] = 0.0
     middle = Turns(np.array([reference]), of_angles(fit.coefficients[:, :1].T), "linear")
@@ -98,12 +96,11 @@ def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polyn
     return basis, replace(isd, pointing=middle), fit.coefficients
 
 
-def _of_degree(fit: Polynomials, degree: int) -> Polynomials:
-    """Return polynomials of another degree, padded or truncated."""
-    own = np.zeros((3, degree + 1))
-    most = min(degree + 1, fit.coefficients.shape[1])
-    own[:, :most] = fit.coefficients[:, :most]
-    return fit._replace(coefficients=own)
+def _fit(times: Floats, values: Floats, fitted_degree: int, degree: int) -> Polynomials:
+    """Return fitted polynomials as polynomials of another degree, padded or truncated."""
+    fit = fitted(times, values, min(fitted_degree, len(times) - 1))
+    padded = np.pad(fit.coefficients, ((0, 0), (0, degree)))
+    return fit._replace(coefficients=padded[:, : degree + 1])
 
 
 def deviations(sigmas: Sequence[float | None], count: int, degree: int) -> Floats:
