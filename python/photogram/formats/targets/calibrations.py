@@ -51,6 +51,8 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
     corners, times = calibration.corners, dict[str, float]()
     if corners.times is not None and calibration.sync != "offset":
         times = dict(zip(corners.pictures, corners.times.tolist(), strict=True))
+    left, names = np.flatnonzero(~corners.use).tolist(), calibration.board.names
+    left_sd = corners.sd[left] * (calibration.sd0 or calibration.assumed)
     if calibration.sd0 is None:
         lacks.append(Phrase("read.corners", {"number": 1.0, "option": option_sd("images")}))
     return Project(
@@ -63,25 +65,17 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
         lacks=tuple(lacks),
         messages=tuple(calibration.messages),
         boards={"board": calibration.board.replace(shape=calibration.shape)},
-        unused=_unused(calibration),
+        unused=Unused(
+            photos=tuple(corners.pictures[row] for row in corners.picture[left].tolist()),
+            points=tuple(names[row] for row in corners.point[left].tolist()),
+            xy=corners.xy[left] + MIDDLE,
+            sd=np.column_stack([left_sd, left_sd]),
+        ),
         details={
             ASSUMED: calibration.sd0 is None,
             REGULARISED: calibration.regularise,
             TIMES: times,
         },
-    )
-
-
-def _unused(calibration: Start) -> Unused:
-    """Return omitted corners as observations from the first corner."""
-    corners, names = calibration.corners, calibration.board.names
-    rows = np.flatnonzero(~corners.use).tolist()
-    sd = corners.sd[rows] * (calibration.sd0 or calibration.assumed)
-    return Unused(
-        photos=tuple(corners.pictures[row] for row in corners.picture[rows].tolist()),
-        points=tuple(names[row] for row in corners.point[rows].tolist()),
-        xy=corners.xy[rows] + MIDDLE,
-        sd=np.column_stack([sd, sd]),
     )
 
 
@@ -170,8 +164,13 @@ def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> 
     place[pictures] = np.arange(len(pictures))
     seen, views = np.unique(stands[pictures], return_inverse=True)
     names = [block.photo_ids[row] for row in pictures.tolist()]
-    left = project.unused
-    picture, point, kept = _left_out(project, names, number)
+    left, places = project.unused, {name: row for row, name in enumerate(names)}
+    points = dict(zip(block.point_ids, number.tolist(), strict=True))
+    if strange := [name for name in left.points if name not in points]:
+        raise InputError(phrase("board-project.points", names=strange), file=project.path)
+    kept = [row for row, name in enumerate(left.photos) if name in places]
+    picture = np.array([places[left.photos[row]] for row in kept], dtype=np.int64)
+    point = np.array([points[left.points[row]] for row in kept], dtype=np.int64)
     used = np.arange(len(block.image_xy) + len(kept)) < len(block.image_xy)
     corners = Corners(
         pictures=names,
@@ -186,18 +185,6 @@ def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> 
         use=used,
     )
     return corners, seen
-
-
-def _left_out(project: Project, pictures: list[str], number: Indices) -> tuple[Indices, Indices, list[int]]:
-    """Return the omitted observations of some photos: photo, point, and row."""
-    left = project.unused
-    places = {name: row for row, name in enumerate(pictures)}
-    points = dict(zip(project.block.point_ids, number.tolist(), strict=True))
-    if strange := [name for name in left.points if name not in points]:
-        raise InputError(phrase("board-project.points", names=strange), file=project.path)
-    kept = [row for row, name in enumerate(left.photos) if name in places]
-    picture = np.array([places[left.photos[row]] for row in kept], dtype=np.int64)
-    return picture, np.array([points[left.points[row]] for row in kept], dtype=np.int64), kept
 
 
 def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:
