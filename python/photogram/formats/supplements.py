@@ -264,20 +264,6 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
     return table.some(rows).with_texts("photo", [names[row] for row in rows])
 
 
-def _present_rows(project: Project, table: ColumnTable) -> set[int]:
-    """Return rows of observations that the project already has."""
-    known = _image_rows(project.block)
-    pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
-    if not any(pair in known for pair in pairs):
-        return set()
-    there, given = to_corner(project), corner_of(table, None)
-    return {
-        row
-        for row, pair in enumerate(pairs)
-        if pair in known and np.abs(there[known[pair]] - given[row]).max() <= SAME
-    }
-
-
 def _with_list(project: Project, given: ControlList) -> Project:
     """Return a project with the image observations of a list of control points.
 
@@ -285,7 +271,12 @@ def _with_list(project: Project, given: ControlList) -> Project:
     observation.
     """
     table = _known_photos(project, given)
-    present, points = _present_rows(project, table), table.texts("point")
+    known, points = _image_rows(project.block), table.texts("point")
+    pairs = dict(enumerate(zip(table.texts("photo"), points, strict=True)))
+    present = {row for row, pair in pairs.items() if pair in known}
+    if present:
+        there, listed = to_corner(project), corner_of(table, None)
+        present = {row for row in present if np.abs(there[known[pairs[row]]] - listed[row]).max() <= SAME}
     other = project.tracks.intersection(given.control.texts("point")) - {points[row] for row in present}
     if other:
         new = {name: f"track {name}" for name in project.block.point_ids if name in other}

@@ -171,7 +171,8 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
         first = int(np.flatnonzero((rows == rows[second]) & (names.rows == names.rows[second]))[0])
         raise table.error(second, phrase("plain.image-twice", record=table.records[first]))
     keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
-    given, sd = _sd_is_given(tables, table), _image_sd(tables, table)
+    given = "images" in tables.settings.sd or any(name in table for name in _OF_IMAGES)
+    sd = _image_sd(tables, table, given=given)
     whole = Images(given, rows, names.rows, names.names, xy, sd)
     if keep is None:
         return whole
@@ -193,12 +194,12 @@ def _some(images: Images, which: Bools) -> Images:
     )
 
 
-def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
+def _image_sd(tables: Tables, table: ColumnTable, *, given: bool) -> Floats | None:
     pairs = (_OF_IMAGES[1:3], _OF_IMAGES[3:])
     own = [name for pair in pairs if pair[0] in table or pair[1] in table for name in pair]
     if "correlation" in table and table.numbers("correlation", 0.0).any():
         raise table.head.error(phrase("plain.correlation"))
-    if _sd_is_given(tables, table):
+    if given:
         found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
     elif "level" in table:
         found = np.ones((table.count, 2))
@@ -211,10 +212,6 @@ def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
         row = int(bad[0][0])
         raise table.error(row, phrase("plain.image-sd", value=found[row].tolist()))
     return found
-
-
-def _sd_is_given(tables: Tables, table: ColumnTable) -> bool:
-    return "images" in tables.settings.sd or any(name in table for name in _OF_IMAGES)
 
 
 def image_coordinates(

@@ -40,8 +40,18 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
         if name not in points:
             message = phrase("error.at", what="without", message=unknown_name("point", name, points))
             raise TomlFile(path).error(name, message, "statement")
-    if lengths := _lengths(tables, points):
-        found["lengths"] = lengths
+    table, lengths = tables.rows("lengths"), tables.records("lengths")
+    table.names("line")
+    for end in ENDS:
+        indices_of(table, end, points, "point")
+    sd = tables.deviations(table, "lengths", ("sd",))
+    table.check_given(np.where(np.isinf(sd), np.nan, sd), ("sd",), "lengths")
+    for row, cells in enumerate(lengths):
+        if cells["from"] == cells["to"]:
+            raise table.error(row, phrase("plain.same-ends", name=cells["from"]))
+        cells["sd"] = float(sd[row, 0])
+    if lengths:
+        found["lengths"] = tuple(lengths)
     if vegetated:
         found["vegetated"] = vegetated
     try:
@@ -50,20 +60,6 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
         # Each value was checked with its line: the combination is only rejected without lengths.
         raise TomlFile(path).error("standards", message_of(error), "statement") from None
     return found
-
-
-def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, Any], ...]:
-    table, found = tables.rows("lengths"), tables.records("lengths")
-    table.names("line")
-    for end in ENDS:
-        indices_of(table, end, points, "point")
-    sd = tables.deviations(table, "lengths", ("sd",))
-    table.check_given(np.where(np.isinf(sd), np.nan, sd), ("sd",), "lengths")
-    for row, cells in enumerate(found):
-        if cells["from"] == cells["to"]:
-            raise table.error(row, phrase("plain.same-ends", name=cells["from"]))
-        cells["sd"] = float(sd[row, 0])
-    return tuple(found)
 
 
 def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:

@@ -52,7 +52,12 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
             path = tables.settings.tables[there[0]]
             raise InputError(phrase("error.missing", name="trajectories.csv"), file=path)
         return {}
-    positions, corrections = _positions(tables), _Corrections(tables)
+    places, groups = tables.rows("trajectory_positions"), rows_of(tables, "trajectory_positions")
+    times = increasing(places, groups)
+    values = np.column_stack([places.given(AXES), places.vectors(VELOCITY)])
+    check_complete(places, values[:, 3:], phrase("plain.all-or-none", columns=list(VELOCITY)))
+    positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
+    corrections = _Corrections(tables)
     attitudes = _attitudes(tables, "trajectory_attitudes")
     bodies = _attitudes(tables, "body_rotations", tables.flip)
     found: dict[str, Trajectory] = {}
@@ -106,14 +111,6 @@ def _attitudes(tables: Tables, name: str, axes: Floats | None = None) -> dict[st
     if axes is not None:
         matrices = matrices @ axes
     return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
-
-
-def _positions(tables: Tables) -> dict[str, tuple[Floats, Floats]]:
-    """Return (k,) times, and (k, 6) positions and velocities, by trajectory."""
-    table, groups = tables.rows("trajectory_positions"), rows_of(tables, "trajectory_positions")
-    times, values = increasing(table, groups), np.column_stack([table.given(AXES), table.vectors(VELOCITY)])
-    check_complete(table, values[:, 3:], phrase("plain.all-or-none", columns=list(VELOCITY)))
-    return {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
 
 
 _KINDS: Mapping[str, type[Basis]] = {"polynomial": Polynomial, "spline": Spline}
