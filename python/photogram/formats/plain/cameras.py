@@ -173,12 +173,13 @@ def read_cameras(tables: Tables) -> Cameras:
         raise InputError(phrase("error.missing", name="cameras.csv"), file=tables.settings.path)
     if not table.count:
         raise table.head.error(phrase("error.empty-file", content="cameras"))
-    found, certificates = Cameras(), read_certificates(tables)
+    found, certificates, covariances = Cameras(), read_certificates(tables), read_covariances(tables)
     found.certificates.update(certificates)
     in_mm, records = [], tables.records("cameras")
     for row, cells in enumerate(records):
         line = _line_sensor(tables, table, row, cells)
-        own = _row(table, row, cells, behind_a_lens=line is not None)
+        correlated = bool(covariances.names("camera", cells["camera"]))
+        own = _row(table, row, cells, behind_a_lens=line is not None, is_correlated=correlated)
         size = None
         if {"width", "height"} <= cells.keys():
             size = image_size(table.at(row), cells["width"], cells["height"])
@@ -198,7 +199,6 @@ def read_cameras(tables: Tables) -> Cameras:
         found.weights_given.append("weights" in cells)
         found.lines.append(line)
         found.shutters.append(_shutter(tables, table, row, cells, camera, size))
-    covariances = read_covariances(tables)
     if both := [name for name in in_mm if covariances.names("camera", name)]:
         raise table.head.error(phrase("plain.mm-covariances", camera=both[0]))
     if in_mm:
@@ -240,7 +240,7 @@ def _of_camera(
             raise ContradictionError.of(table.error(row, message))
         tables.remark("plain.marks-only", table.path, camera=own.name)
         return None
-    if read_covariances(tables).names("camera", own.name):
+    if own.is_correlated:
         raise table.error(row, phrase("plain.certificate-covariance", camera=own.name))
     return certificate
 
@@ -253,9 +253,12 @@ class _Row(NamedTuple):
     values: dict[str, float]
     deviations: dict[str, float]
     cells: Mapping[str, Any]
+    is_correlated: bool  # Whether the table of covariances contains parameters
 
 
-def _row(table: ColumnTable, row: int, cells: Mapping[str, Any], *, behind_a_lens: bool) -> _Row:
+def _row(
+    table: ColumnTable, row: int, cells: Mapping[str, Any], *, behind_a_lens: bool, is_correlated: bool
+) -> _Row:
     """Return a row; the columns of a line sensor `behind_a_lens` are not parameters of the lens."""
     model = cells.get("model", "").lower()
     values = {column: value for column, value in cells.items() if column in _ALL}
@@ -268,7 +271,7 @@ def _row(table: ColumnTable, row: int, cells: Mapping[str, Any], *, behind_a_len
         if unknown := [column for column in OF_LINES if sd.get(column)]:
             raise table.cell_error(row, f"sd_{unknown[0]}", "plain.line-sd")
         values = {column: value for column, value in values.items() if column not in OF_LINES}
-    return _Row(cells["camera"], model, values, sd, cells)
+    return _Row(cells["camera"], model, values, sd, cells, is_correlated)
 
 
 def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Camera:
@@ -276,7 +279,7 @@ def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Ca
     from photogram.stellar.cameras import camera_from
 
     beside = given.model or given.values or given.deviations
-    if beside or read_covariances(tables).names("camera", given.name):
+    if beside or given.is_correlated:
         raise table.error(row, phrase("plain.calibrated-camera", camera=given.name))
     found = camera_from(table.path.parent / given.cells["calibration"], given.name)
     if (found.unit == "px") != (tables.settings.image == "px"):

@@ -82,7 +82,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     if options.cameras is not None:
         files = {**settings.tables, "cameras": options.cameras}
         tables = replace(tables, settings=replace(settings, tables=files))
-    cameras = read_cameras(tables)
+    cameras, covariances = read_cameras(tables), read_covariances(tables)
     trajectories = read_trajectories(tables)
     control = tables.read("control")
     # A frame without origin is defined by control, which is therefore transformed first.
@@ -96,7 +96,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     images = read_images(tables, photos)
     points = _points(tables, transform, images, given)
     known = np.where(np.isfinite(points.positions), points.positions, points.starts)
-    scanned = read_scanned(tables, images, known, photos, cameras, read_covariances(tables))
+    scanned = read_scanned(tables, images, known, photos, cameras, covariances)
     cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     source = ImageSource(tables, photos, cameras, np.asarray(photo_cameras), scanned.photos)
@@ -116,7 +116,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
     boards, bends, regularise = read_boards(tables)
     common = [*_unknowns(observations, block.mounts, timed), *(each.bend for each in bends)]
-    priors = read_covariances(tables).priors(common)
+    priors = covariances.priors(common)
     if trajectories and transform.frame != settings.frame:
         message = phrase("plain.trajectory-frame", frame=str(transform.frame))
         raise InputError(message, file=settings.path)
