@@ -302,6 +302,8 @@ def with_control(
     from photogram.formats.control_lists import read_control_list
     from photogram.formats.control_system import check_systems
 
+    listed = read_control_list(path, project)
+    crs = crs or (listed.crs if listed else "")
     settings = Settings(
         path,
         frame=project.frame,
@@ -311,16 +313,9 @@ def with_control(
         crs={"control": crs} if crs else {},
         columns={"control": columns},
     )
-    tables = Tables(settings, [], frozenset(project.block.point_ids))
-    listed_control = read_control_list(path, project)
-    if listed_control is None:
-        table = tables.read("control")
-        assert table is not None
-    else:
-        table = listed_control.control
-        settings = replace(settings, crs={"control": crs or listed_control.crs})
-        tables = Tables(settings, listed_control.messages)
-        project = _with_list(project, listed_control)
+    tables = Tables(settings, listed.messages if listed else [], frozenset(project.block.point_ids))
+    table = listed.control if listed else tables.rows("control")
+    project = _with_list(project, listed) if listed else project
     transform = Transform(settings, tables.messages)
     given = read_control(tables, table, transform)
     block = project.block
