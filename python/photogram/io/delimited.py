@@ -115,12 +115,15 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
         filled = [
             row for row, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENT)
         ]
-        first = next(
-            (row for row in filled[:TITLES] if _fits(Place(path, row + 1, lines[row]), columns, numbers)), 0
-        )
-        first = first or (filled[0] if filled else 0)
-        sample = Place(path, first + 1, lines[first])
-        return Place(path, first), tuple(columns), tuple(columns), _delimiter(sample)
+        places = [Place(path, row + 1, lines[row]) for row in filled[:TITLES] or [0]]
+        for place in places:
+            cells = _split(place, _delimiter(place))
+            if len(cells) == len(columns) and _fits(cells, columns, numbers):
+                break
+        else:
+            place = places[0]
+        assert place.record is not None
+        return Place(path, place.record - 1), tuple(columns), tuple(columns), _delimiter(place)
 
     return next(_read(path, header, numbers, None))
 
@@ -279,8 +282,13 @@ def _by_lines(
 ) -> tuple[list[list[str]], list[int]]:
     """Split the lines below a header into rows of equal width.
 
-    If rows have one cell more than the header, the first column may be unnamed; see `_shifted`.
+    If rows have one cell more than the header, the first column is unnamed if numbers fit their columns then.
     """
+
+    def is_shifted(cells: Sequence[str]) -> bool:
+        all_numbers = numbers and set(columns) <= set(numbers)
+        return _fits(cells, columns, numbers, 1) and (all_numbers or not _fits(cells, columns, numbers))
+
     rows, records = list[list[str]](), list[int]()
     width = len(columns)
     for record in range(head + 1, len(lines) + 1):
@@ -294,7 +302,7 @@ def _by_lines(
             # A delimiter at the end of every line produces an additional empty cell.
             if len(cells) == width + 1 and not cells[-1]:
                 cells.pop()
-            elif not rows and len(cells) == width + 1 and _shifted(cells, columns, numbers):
+            elif not rows and len(cells) == width + 1 and is_shifted(cells):
                 width += 1
             else:
                 raise place.error(phrase("error.cells", count=len(cells), columns=width))
@@ -303,23 +311,9 @@ def _by_lines(
     return rows, records
 
 
-def _fits(place: Place, columns: Sequence[str], numbers: Collection[str]) -> bool:
-    """Return whether a record fits the columns and their numbers."""
-    cells = _split(place, _delimiter(place))
-    return len(cells) == len(columns) and all(
-        _NUMBER.fullmatch(cell) is not None
-        for column, cell in zip(columns, cells, strict=True)
-        if column in numbers
-    )
-
-
-def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[str]) -> bool:
-    """Return whether numbers fit their columns if the first cell is unnamed."""
-    numeric = [k for k, column in enumerate(columns) if column in numbers]
-    as_is, shifted = (
-        all(_NUMBER.fullmatch(cells[k + step]) or not cells[k + step] for k in numeric) for step in (0, 1)
-    )
-    return shifted and (not as_is or len(numeric) == len(columns))
+def _fits(cells: Sequence[str], columns: Sequence[str], numbers: Collection[str], first: int = 0) -> bool:
+    """Return whether the cells from the `first` on are empty or numbers in the columns of numbers."""
+    return all(_NUMBER.fullmatch(cells[first + k]) for k, name in enumerate(columns) if name in numbers)
 
 
 def _regular(

@@ -89,7 +89,10 @@ class Guard:
     """
 
     def __init__(self, inputs: Iterable[Path], directories: Iterable[Path] = ()) -> None:
-        self._read = {_identity(status) for path in inputs if (status := _status(path))}
+        self._read: set[_Identity] = set()
+        for path in inputs:
+            with suppress(OSError, ValueError):
+                self._read.add(_identity(os.stat(path)))
         self._files: dict[object, Path] = {}
         self._above: set[str] = set()
         for path in directories:
@@ -136,13 +139,6 @@ def _above(place: str) -> Iterable[str]:
 
 def _identity(status: os.stat_result) -> _Identity:
     return status.st_dev, status.st_ino
-
-
-def _status(path: Path) -> os.stat_result | None:
-    try:
-        return os.stat(path)
-    except (OSError, ValueError):
-        return None
 
 
 class _File(io.FileIO):
