@@ -202,6 +202,8 @@ SECONDS_OF_WEEK = 604_800
 HEADER_LINES = 60
 _COMMENT = "%"
 _FLAGS = {1: 50, 2: 34, 5: 16}  # Quality of RTKLIB as the flag of DJI: fixed, float, single
+_GEODETIC = ("latitude", "longitude", "height", "Q", "ns", "sdn", "sde", "sdu")
+_GEOCENTRIC = ("x", "y", "z", "Q", "ns", "sdx", "sdy", "sdz", "sdxy", "sdyz", "sdzx")
 _WORDS = re.compile(r"[,;\s]+")
 _EPOCH = datetime(1980, 1, 6)
 
@@ -241,38 +243,32 @@ def _event(place: Place, head: Place, heights: str) -> Event:
     columns = head.text or ""
     if "e-baseline(" in columns:
         raise head.error(phrase("photos.baselines"))
-    geocentric = "x-ecef(" in columns
+    geocentric, minutes = "x-ecef(" in columns, "latitude(d'" in columns
+    names = _GEOCENTRIC if geocentric else _GEODETIC
     words = _WORDS.split((place.text or "").strip())
-    size = 3 if "latitude(d'" in columns else 1
-    least, names = 2 * size + 8, "latitude, longitude, height, Q, ns, sdn, sde, sdu"
+    if len(words) < 2 + len(names) + 4 * minutes:
+        raise place.error(phrase("format.words", n=len(words), required=f"date, time, {', '.join(names)}"))
+    time, words = words[:2], words[2:]
+    if minutes:
+        words = [repr(_degrees(words[:3], place)), repr(_degrees(words[3:6], place)), *words[6:]]
+    cells = dict(zip(names, words, strict=False))
+    quality = place.whole(cells.pop("Q"), "Q", highest=9)
+    first, second, third, _, *deviations = (place.number(word, name) for name, word in cells.items())
     if geocentric:
-        least, names = 13, "x, y, z, Q, ns, sdx, sdy, sdz, sdxy, sdyz, sdzx"
-    if len(words) < least:
-        raise place.error(phrase("format.words", n=len(words), required=f"date, time, {names}"))
-    count = 3 if geocentric else 2 * size + 1
-    *first, last = words[2 : 2 + count]
-    quality, _, *rest = words[2 + count :]
-    deviations = [place.number(word, "standard deviation") for word in rest[: 6 if geocentric else 3]]
-    if geocentric:
-        xyz = [place.number(word, "coordinate") for word in (*first, last)]
-        position, (east, north, up) = _geographic(xyz, deviations)
+        position, (east, north, up) = _geographic((first, second, third), deviations)
     else:
-        latitude, longitude = (_degrees(first[k : k + size], place) for k in (0, size))
-        position = longitude, latitude, place.number(last, "height")
-        north, east, up = deviations
-    return Event(
-        _seconds(words[:2], place),
-        Said(
-            SOURCE,
-            place,
-            ELLIPSOIDAL,
-            "" if geocentric else heights,
-            geographic_position(place, position),
-            usable_deviations(east, north, up),
-            rtk=True,
-            flag=_FLAGS.get(place.whole(quality, "Q", highest=9)),
-        ),
+        position, (north, east, up) = (second, first, third), deviations
+    said = Said(
+        SOURCE,
+        place,
+        ELLIPSOIDAL,
+        "" if geocentric else heights,
+        geographic_position(place, position),
+        usable_deviations(east, north, up),
+        rtk=True,
+        flag=_FLAGS.get(quality),
     )
+    return Event(_seconds(time, place), said)
 
 
 def _geographic(xyz: Sequence[float], deviations: Sequence[float]) -> tuple[Triple, Triple]:
