@@ -212,7 +212,7 @@ class InertialAttitude:
     @property
     def quaternion(self) -> Floats:
         """(4,) Hamilton quaternion w, x, y, z with w >= 0; camera = q icrs q*."""
-        return Attitudes(self.matrix[None]).values("quaternion")[0]
+        return np.asarray(Attitudes(self.matrix[None]).values("quaternion")[0], float)
 
     @property
     def quaternion_covariance(self) -> Floats:

@@ -176,10 +176,11 @@ def _equations(
         rest[readings] = (back @ misfit[..., np.newaxis])[..., 0]
         pointing = np.array(record.pointing_um) ** 2 / case.counts[:, np.newaxis]
         variance[readings] = record.random_um**2 + pointing
-    weight, own, grid = 1 / variance.ravel(), own.reshape(2 * len(own), -1), grid.reshape(2 * len(grid), -1)
-    weighted = (own * weight[:, np.newaxis]).T
-    inverse = _inverse(weighted @ own, record.name)
-    return _Equations(own, grid, rest.ravel(), weight, active, inverse, weighted @ grid)
+    weight, rows = 1 / variance.ravel(), 2 * len(rest)
+    of_unknowns, of_grid = own.reshape(rows, -1), grid.reshape(rows, -1)
+    weighted = (of_unknowns * weight[:, np.newaxis]).T
+    inverse = _inverse(weighted @ of_unknowns, record.name)
+    return _Equations(of_unknowns, of_grid, rest.ravel(), weight, active, inverse, weighted @ of_grid)
 
 
 def _inverse(normal: Floats, what: str) -> Floats:
