@@ -30,9 +30,9 @@ from photogram.stellar import (
     read_night,
     sidereal_time,
 )
+from photogram.stellar.identification import stars_near
 from photogram.stellar.night_file import inputs
 from photogram.stellar.pointing import axis_of, pole_matrix, terrestrial
-from photogram.stellar.sky_calibration import stars_near
 
 TRUTH = MAKER["CAMERA"].values
 
@@ -302,13 +302,11 @@ def test_nearest_images_are_those_of_all_distances(limit):
 def test_stars_near_are_all_in_the_frame(night, result):
     """Those of the field and some around it; all of them where the axis is level."""
     for exposure in result.exposures:
-        near = stars_near(exposure, result.camera, night.site, night.catalogue, night.frame, 0.0)
+        near = stars_near(exposure, result.camera, night.site, night, 0.0)
         assert set(exposure.stars[exposure.stars >= 0]) <= set(near)
         assert len(near) < 0.2 * len(night.catalogue.ids)
     level = replace(result.exposures[0], attitude=np.array([np.pi / 2, 0.0, 0.0]))
-    assert len(stars_near(level, result.camera, night.site, night.catalogue, night.frame, 0.0)) == len(
-        night.catalogue.ids
-    )
+    assert len(stars_near(level, result.camera, night.site, night, 0.0)) == len(night.catalogue.ids)
 
 
 def test_mean_errors_of_the_catalogue():

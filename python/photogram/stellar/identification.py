@@ -14,7 +14,8 @@ from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.matching import FEWEST, STRETCH, Match, Search, match
 from photogram.stellar.odds import ACCEPTED, DOUBTFUL, expected_false, log_odds, star_probabilities
 from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky_calibration import Exposure, project_sky, stars_near
+from photogram.stellar.sky import Site
+from photogram.stellar.sky_calibration import Exposure, project_sky
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase, phrase
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 _GRID = (24, 16)  # frame points for the search of the sky
 _LEAST = 0.02
+_SLACK = math.radians(2.0)
 STARS_OF_AN_ATTITUDE = 2
 _STARS_OF_FIRST_ATTITUDE = 3
 
@@ -84,6 +86,23 @@ def attitude_radius(night: Night) -> float:
     return float(night.camera.values[0]) * math.tan(night.attitude_error)
 
 
+def stars_near(exposure: Exposure, camera: SkyCamera, site: Site, night: Night, margin: float) -> Indices:
+    """Return the indices of catalogue stars around the field of an exposure.
+
+    `margin` is the largest error of the attitude, radians.
+    """
+    alpha, omega = exposure.attitude[:2]
+    if not math.cos(alpha) * math.cos(omega) > 0.02:
+        # At or below the horizon standard coordinates are undefined.
+        return np.arange(len(night.catalogue.ids))
+    axis = np.array([[math.tan(alpha), math.tan(omega) / math.cos(alpha)]])
+    ((ra, dec),) = site.places(axis, sidereal_time(site, exposure.utc, night.earth.dut1))
+    # Margin for distortion, and for precession over the years.
+    reach = 1.1 * camera.largest_angle(night.frame) + margin + _SLACK
+    centre = np.array([math.cos(dec) * math.cos(ra), math.cos(dec) * math.sin(ra), math.sin(dec)])
+    return np.flatnonzero(night.catalogue.directions @ centre >= math.cos(min(reach, math.pi)))
+
+
 @dataclass(frozen=True, eq=False)
 class Sighting:
     """Candidate stars of an exposure, and their odds."""
@@ -132,7 +151,7 @@ def identify(
         radius += stretch * max(frame)
     site = night.earth.site_of_date(night.site)
     time = sidereal_time(site, exposure.utc, dut1)
-    near = stars_near(exposure, camera, site, catalogue, frame, radius / camera.values[0], dut1)
+    near = stars_near(exposure, camera, site, night, radius / camera.values[0])
     places = apparent_places(catalogue.take(near), exposure.utc, site.effects)
     predicted = project_sky(camera, exposure.attitude, site, places, time)
     axis = None if night.roll_known else camera.values[2:4]
@@ -209,7 +228,7 @@ def identify_again(exposure: Exposure, night: Night, camera: SkyCamera, reach: f
     Named stars of images are unchanged.
     """
     frame, site, catalogue, dut1 = night.frame, night.site, night.catalogue, night.earth.dut1
-    near = stars_near(exposure, camera, site, catalogue, frame, 0.0, dut1)
+    near = stars_near(exposure, camera, site, night, 0.0)
     named = exposure.stars
     if named is not None:
         near = np.union1d(near, named[named >= 0])

@@ -32,7 +32,6 @@ from photogram.stellar.sky_cameras import SkyCamera, weight_of
 from photogram.words import Phrase, phrase
 
 _STILL = Earth()
-_SLACK = math.radians(2.0)
 _PER_IMAGE = 2000  # Memory per image, bytes
 
 
@@ -106,31 +105,6 @@ def project_sky(camera: SkyCamera, attitude: Floats, site: Site, places: Floats,
         straight = _photocore.plate_images(standard, attitude, ideal.common[:-4], camera.kind)
         pixels[np.linalg.norm(straight, axis=1) >= limit[0]] = np.nan
     return pixels
-
-
-def stars_near(
-    exposure: Exposure,
-    camera: SkyCamera,
-    site: Site,
-    catalogue: Catalogue,
-    frame: tuple[float, float],
-    margin: float,
-    dut1: float = 0.0,
-) -> Indices:
-    """Return the indices of catalogue stars around the field of an exposure.
-
-    `margin` is the largest error of the attitude, radians.
-    """
-    alpha, omega = exposure.attitude[:2]
-    if not math.cos(alpha) * math.cos(omega) > 0.02:
-        # At or below the horizon standard coordinates are undefined.
-        return np.arange(len(catalogue.ids))
-    axis = np.array([[math.tan(alpha), math.tan(omega) / math.cos(alpha)]])
-    ((ra, dec),) = site.places(axis, sidereal_time(site, exposure.utc, dut1))
-    # Margin for distortion, and for precession over the years.
-    reach = 1.1 * camera.largest_angle(frame) + margin + _SLACK
-    centre = np.array([math.cos(dec) * math.cos(ra), math.cos(dec) * math.sin(ra), math.sin(dec)])
-    return np.flatnonzero(catalogue.directions @ centre >= math.cos(min(reach, math.pi)))
 
 
 def calibrate_exposures(
