@@ -1,4 +1,7 @@
-"""Streaming XML reader that processes and discards named elements."""
+"""Streaming XML reader that processes and discards named elements.
+
+The parser is expat. lxml needs 0.7 of its time for BlocksExchange, but doubles the size of an installation.
+"""
 
 from __future__ import annotations
 
