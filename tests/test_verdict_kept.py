@@ -84,3 +84,12 @@ def test_the_adjustment_is_the_same_to_the_last_bit():
     plain, kept = adjust(block), adjust(block, covariance="verdict")
     for name in ("photo_cofactors", "point_cofactors", "redundancy", "standardized", "photo_positions"):
         np.testing.assert_array_equal(getattr(plain, name), getattr(kept, name))
+
+
+def test_verdicts_do_not_depend_on_threads(monkeypatch):
+    block = photogram.simulate(strips=2, photos_per_strip=5, points_per_photo=60, seed=4, blunders=2).block
+    documents = []
+    for sizes in (range(0), range(10**6)):
+        monkeypatch.setattr("photogram.results.findings.IN_PARALLEL", sizes)
+        documents.append(adjust(block).verdict.document())
+    assert documents[0] == documents[1]
