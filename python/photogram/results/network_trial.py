@@ -389,9 +389,10 @@ def block_facts(block: Block, places: Floats) -> Facts:
     facts: Facts = {"widths": [], "readouts": []}
     of_images = cameras[block.image_photos]
     low, high = (np.full((max(len(block.cameras), 1), 2), end) for end in (math.inf, -math.inf))
-    for axis in (0, 1):  # Faster than both together
-        np.minimum.at(low[:, axis], of_images, block.image_xy[:, axis])
-        np.maximum.at(high[:, axis], of_images, block.image_xy[:, axis])
+    runs = np.flatnonzero(np.diff(of_images, prepend=-1))  # of consecutive images of one camera
+    for axis, xy in enumerate(block.image_xy.T.copy()):
+        np.minimum.at(low[:, axis], of_images[runs], np.minimum.reduceat(xy, runs))
+        np.maximum.at(high[:, axis], of_images[runs], np.maximum.reduceat(xy, runs))
     for camera, (width, height) in enumerate((high - low).tolist()):
         facts["widths"].append(width if width > 0 else math.nan)
         digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0
