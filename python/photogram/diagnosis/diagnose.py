@@ -25,7 +25,7 @@ from photogram.diagnosis.gross import Suspects, gross
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel
 from photogram.diagnosis.mistakes import Adjuster
-from photogram.diagnosis.orientation import orientation, spare_explained
+from photogram.diagnosis.orientation import orientation
 from photogram.diagnosis.registry import at
 from photogram.diagnosis.residuals import residuals
 from photogram.diagnosis.stations import stations, two_ray_heights
@@ -157,7 +157,7 @@ def _checked(
             lens.append(terms.finding(mistake.kind))
             given = terms.best[0].change(given)
     view = View.of(given)
-    sets, upright, oriented, exact = orientation(view, words)
+    sets, sides, oriented, exact = orientation(view, words)
     sets.findings[:0] = lens
     errors, suspects = gross(oriented.seen, oriented.block.image_unit)
     if not intersect_only:
@@ -165,14 +165,18 @@ def _checked(
         oriented = _sets(sets, oriented, suspects, adjusted)
         if oriented is not start:
             errors, suspects = gross(oriented.seen, oriented.block.image_unit)
-    if suspects.photos.any():
-        spare_explained(upright, oriented.seen, suspects.photos)
     edited = _edited(oriented, suspects, intersect_only, adjusted)
     errors.findings = _judged(errors.findings, edited)
     if edited.first is not None and edited.last is not None:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
-    sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
+    sections = [
+        structure_section(block, edited.first, words),
+        sets,
+        sides(suspects.photos),
+        errors,
+        edited.section,
+    ]
     sections += _after_adjustment(oriented, edited, words)
     if edited.last is not None and edited.last.converged:
         sets.findings += half_pixel(edited.last)

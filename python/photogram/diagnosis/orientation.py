@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -22,10 +24,11 @@ MOST = 20  # Maximum number of explanations
 HALF_TURN, SENSE, SIGN = "c or kappa", "sense", "sign-of-principal-distance"
 
 
-def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]:
+def orientation(view: View, words: Words) -> tuple[Section, Callable[[Bools], Section], View, bool]:
     """Report mistakes in units, axes, angles and sides of cameras that explain the misfit, and correct them.
 
-    Returns the sections on conventions and on sides, the corrected view, and whether the correction is exact.
+    Returns the section on conventions, a function that returns the section on sides without (P,) bad photos,
+    the corrected view, and whether the correction is exact.
     """
     section = section_of("conventions")
     exact = True
@@ -55,27 +58,27 @@ def orientation(view: View, words: Words) -> tuple[Section, Section, View, bool]
         section.remark("check.remark.corrected")
     if not exact:
         section.remark("check.remark.approximate")
-    return section, _sides(blocks, view, explanations, words), view, exact
+    return section, partial(_sides, blocks or [view.seen, view.seen], view, explanations, words), view, exact
 
 
-def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: Words) -> Section:
+def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: Words, bad: Bools) -> Section:
     """Return the section on sides of cameras, with points above cameras and rays that do not meet."""
     section = section_of("sides")
-    given, whole = blocks or [view.seen, view.seen]
-    rays, after = Rays.of(given), Rays.of(view.seen)
+    good = ~bad[view.seen.image_photos]
+    rays, whole, after = (Rays.of(each, good) for each in (*blocks, view.seen))
     met, met_after = rays.intersect(), after.intersect()
     # A wrong sign or kappa of many photos explains nearly all points above cameras, which the guide requires.
     several = any(each.kind == "mirrored" and len(each.photos) > 1 for each in explanations)
-    gone = _above(rays if several else Rays.of(whole)).keys() - _above(after).keys()
+    gone = _above(rays if several else whole).keys() - _above(after).keys()
     section.findings += [each for name, each in _above(rays).items() if name not in gone] + explanations
-    cost = _mean(_costs(after, met_after))
+    cost = _mean(np.where(good, _costs(after, met_after), np.nan))
     if cost > SUSPICIOUS:
         section.note("grave", "check.rays-do-not-meet", [], [], {"cost": cost}, sense=words.sense)
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
     section.figure("rays that meet behind their camera", f"{behind} of {int(known.sum())}")
     section.figure("median residual of intersection", f"{_median(met.sizes):.3f} {view.block.image_unit}")
-    if view.seen is not given:
+    if view.seen is not blocks[0]:
         section.figure(
             "median residual with these explanations",
             f"{_median(met_after.sizes):.3f} {view.block.image_unit}; the sections below hold with them",
@@ -122,18 +125,6 @@ def _above(rays: Rays) -> dict[str, Finding]:
         )
         findings[name] = finding("grave", message, [photo], [name], values)
     return findings
-
-
-def spare_explained(section: Section, block: Block, photos: Bools) -> None:
-    """Remove findings explained by bad photos: points above a camera, divergent rays."""
-    rays = Rays.of(block).without(photos[block.image_photos])
-    above, cost = _above(rays), _mean(np.where(rays.used, _costs(rays, rays.intersect()), np.nan))
-    section.findings = [
-        each
-        for each in section.findings
-        if (each.kind != "rays-do-not-meet" or cost > SUSPICIOUS)
-        and (each.kind != "control-above-camera" or above.keys() >= {*each.points})
-    ]
 
 
 def _costs(rays: Rays, met: Intersection) -> Floats:
