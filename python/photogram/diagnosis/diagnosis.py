@@ -26,6 +26,7 @@ CONVENTIONS = frozenset(
         "sense-of-rotation",
         "convention",
         "lens",
+        "common-error",
         "control-set",
         "control-system",
         "observed-positions",

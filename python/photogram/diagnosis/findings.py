@@ -132,13 +132,6 @@ def note_all(section: Section, kind: str, level: Level, messages: Sequence[Messa
         section.findings.append(Finding(kind, level, str(each), phrase=own))
 
 
-def likely(causes: Sequence[Phrase], effect: Phrase) -> Phrase:
-    """Return the message that one of some mistakes explains a misfit."""
-    if len(causes) == 1:
-        return phrase("mistake.likely", cause=causes[0], effect=effect)
-    return phrase("mistake.one-of", causes=list(causes), effect=effect)
-
-
 def note_verdict(section: Section, verdict: Verdict) -> None:
     """Insert the verdict at the top of a section without grave findings."""
     if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):

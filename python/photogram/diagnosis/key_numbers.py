@@ -25,7 +25,11 @@ def key_numbers(edited: Edited, words: Words) -> Section:
         level: Level = "grave" if edited.asked else "look"
         section.note(level, "check.no-adjustment", reason=edited.reason)
         return section
-    _statuses(first, last, section)
+    section.figure("status", f"{last.status} after {len(last.iterations)} iterations")
+    if not last.converged:
+        section.note("grave", "check.not-converged.last", status=last.status)
+    elif not first.converged:
+        section.note("look", "check.not-converged.first", status=first.status)
     rows = [("as it is", first)] if first is last else [("as it is", first), ("without what is named", last)]
     for name, result in rows:
         variance = result.variance_of_unit_weight
@@ -50,14 +54,6 @@ def _squares(last: Result, words: Words, section: Section) -> None:
     section.figure(f"{title}, initial", f"{initial:.4g}")
     for number, value in enumerate(after, 1):
         section.figure(f"{title}, iteration {number}", f"{value:.4g}")
-
-
-def _statuses(first: Result, last: Result, section: Section) -> None:
-    section.figure("status", f"{last.status} after {len(last.iterations)} iterations")
-    if not last.converged:
-        section.note("grave", "check.not-converged.last", status=last.status)
-    elif not first.converged:
-        section.note("look", "check.not-converged.first", status=first.status)
 
 
 def _variance(result: Result, section: Section) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Self
 
 from photogram.adjustment.adjustment import adjust
-from photogram.diagnosis.findings import Finding, Level, finding, likely
+from photogram.diagnosis.findings import Finding, Level, finding
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -97,7 +97,10 @@ class Explained:
     def message(self, of: str = "residuals") -> Phrase:
         """Return the message on the mistake; `of` are the residuals that it explains."""
         effect = phrase(f"mistake.{of}", times=self.judged.fall)
-        return likely([each.message for each in self.best], effect)
+        causes = [each.message for each in self.best]
+        if len(causes) == 1:
+            return phrase("mistake.likely", cause=causes[0], effect=effect)
+        return phrase("mistake.one-of", causes=causes, effect=effect)
 
     def finding(self, kind: str, of: str = "residuals") -> Finding:
         """Return the finding on the mistake; see :meth:`message`."""
