@@ -20,8 +20,7 @@ from control_networks import (
 
 from message_codes import refused
 from photogram import InputError
-from photogram.formats.isis import binary_network, network_text
-from photogram.formats.isis.network import ControlMeasures, ControlPoints
+from photogram.formats.isis import ControlMeasures, ControlPoints, binary_network, network_text
 from photogram.io.pvl import Group
 
 
