@@ -109,9 +109,9 @@ class Element:
             raise self.error(phrase("format.member", name=name))
         return self._number(self.attributes[name])
 
-    def numbers(self, count: int) -> Floats:
-        """Return the text as a number of numbers."""
-        words = self.text.split()
+    def numbers(self, count: int, separator: str | None = None) -> Floats:
+        """Return the text as a number of numbers, between blanks or a separator."""
+        words = [word.strip() for word in self.text.split(separator)]
         if len(words) != count:
             raise self.error(phrase("format.count", n=len(words), required=count))
         return np.array([self._number(word) for word in words])

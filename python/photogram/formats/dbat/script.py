@@ -172,17 +172,9 @@ def _cameras(parent: Element, content: DbatBuilder) -> None:
         raise parent.error(phrase("format.missing", what="a camera"))
 
 
-def _numbers(element: Element, name: str, count: int) -> list[float]:
-    own = element.need(name)
-    words = [word.strip() for word in own.text.split(",")]
-    if len(words) != count:
-        raise own.error(phrase("format.count", n=len(words), required=count))
-    return [own.place.number(word) for word in words]
-
-
 def _sensor(element: Element, number: str, messages: list[Message]) -> tuple[Camera, Size, float]:
     one_word(element, "unit", element.word("unit", "mm"), ["mm"])
-    width, height = _numbers(element, "image", 2)
+    width, height = element.need("image").numbers(2, ",")
     size = image_size(element.need("image"), width, height)
     sides = _sides(element, size)
     model = element.whole("model") if element.child("model") else PLAIN
@@ -242,7 +234,7 @@ def _principal_point(
     if element.word("pp", "default") == "default":
         messages.append(Message(phrase("dbat.middle", camera=element.word("name", "camera")), element.file))
         return middle
-    px, py = _numbers(element, "pp", 2)
+    px, py = element.need("pp").numbers(2, ",").tolist()
     if py < 0:
         # Before version 0.9, DBAT wrote y up, and the terms with the other sign.
         if any(terms.values()):
