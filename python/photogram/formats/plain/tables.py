@@ -222,10 +222,9 @@ class Tables:
                 return table.words(name, column.words, "", optional=not required)
             case "flag":
                 return table.flags(name).tolist()
-            case "ref" if required:
-                known = self.names_in(column.field)
-                indices_of(table, name, dict(zip(known, range(len(known)), strict=True)), name)
             case "ref":
+                if required:
+                    table.names(name)
                 named_of(table, name, dict.fromkeys(self.names_in(column.field)), name)
         if column.kind in TEXTS:
             texts = table.texts(name)
@@ -247,10 +246,6 @@ class Tables:
     def names_in(self, name: str) -> list[str]:
         """Return the different names in the first column of a table."""
         return list(dict.fromkeys(self.rows(name).texts(TABLES[name].columns[0])))
-
-    def words(self, name: str, column: str) -> list[Any]:
-        """Return a column of declared words in a table; empty cells have the default."""
-        return self.rows(name).words(column, TABLES[name].words[column])
 
     def remark(self, code: str, path: Path | None = None, /, **fields: Any) -> None:
         """Add a remark, optionally on a file."""
