@@ -292,14 +292,11 @@ class ColumnTable:
 
     def flags(self, column: str) -> Bools:
         """Return (rows,) a column of true or false; empty cells are true."""
-        values = np.ones(self.count, dtype=bool)
-        if column in self.columns:
-            for row, cell in enumerate(self.texts(column)):
-                word = cell.lower()
-                if word and word not in TRUE | FALSE:
-                    raise self.cell_error(row, column, "error.flag", value=cell)
-                values[row] = not word or word in TRUE
-        return values
+        cells = self.texts(column)
+        for row, cell in enumerate(cells):
+            if cell and cell.lower() not in TRUE | FALSE:
+                raise self.cell_error(row, column, "error.flag", value=cell)
+        return np.array([cell.lower() not in FALSE for cell in cells], dtype=bool)
 
 
 def _all_apart(names: Sequence[str]) -> bool:
