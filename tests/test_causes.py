@@ -130,3 +130,23 @@ def test_too_small_standard_deviations_of_positions_are_named_before_single_posi
     (wrong,) = found.message.fields["types"]
     # The first step of the estimation: wrong positions are also in the residuals of images.
     assert 4 < wrong.fields["factor"] < 10
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_check_points_decide_which_control_point_is_wrong(seed):
+    simulated = simulate(strips=3, photos_per_strip=6, seed=seed)
+    block, check_sd = simulated.block, 0.1
+    # Without check points, the heights of four control points have one redundant number together.
+    wrong = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[0]
+    positions, checks = block.point_positions.copy(), np.isfinite(block.point_check_sd).all(axis=1)
+    errors = np.random.default_rng(seed).normal(scale=check_sd, size=(np.count_nonzero(checks), 3))
+    positions[checks] = simulated.truth.point_positions[checks] + errors
+    positions[wrong, 2] += 4.0
+    given = np.full_like(positions, np.nan)
+    given[checks] = check_sd
+    result = adjust(block.replace(point_positions=positions, point_check_sd=given))
+    assert result.verdict.exit == 4
+    table = result.hypotheses()
+    first = table.iloc[table["log_odds"].argmax()]
+    assert first["hypothesis"] == f"Z of control point {block.point_ids[wrong]}"
+    assert float(first["estimate"]) == pytest.approx(4.0, abs=1.5)

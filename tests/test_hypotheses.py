@@ -505,7 +505,8 @@ def test_check_points_name_the_control_point_that_residuals_do_not_show():
     positions[chosen[2], 2] += 5.0
     found = adjust(block.replace(point_sd=sd, point_positions=positions)).verdict
     assert (found.code, found.exit) == ("check-points", 4)
-    assert found.message.fields["errors"][0].fields["point"] == block.point_ids[chosen[2]]
+    height = found.message.fields["errors"][0].fields["named"]
+    assert height.fields["named"].fields["point"] == block.point_ids[chosen[2]]
     assert block.point_ids[chosen[2]] in found.headline
 
 

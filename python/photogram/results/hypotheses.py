@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.hypothesis_checks import Joint, set_with_checks, single_checks, single_with_checks
+from photogram.results.hypothesis_checks import Joint, single_checks, with_checks
 from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
@@ -283,12 +283,16 @@ class Hypotheses:
         """Return rows of single errors that are as likely as a common error, one of each group."""
         if not common:
             return []
+        likely = self._likely(common[0])
+        return [row for row in likely if row >= len(self.sets) and self.probability[row] < DETECTION[0]]
+
+    def _likely(self, first: int) -> list[int]:
+        """Return rows of errors that are as likely as this one, the most likely first, one of each group."""
         odds = np.nan_to_num(self.log_odds, nan=-math.inf)
-        likely = np.flatnonzero(odds > odds[common[0]] - math.log(ALTERNATIVES))
-        likely = likely[(likely >= len(self.sets)) & (self.probability[likely] < DETECTION[0])]
+        likely = np.flatnonzero(odds > odds[first] - math.log(ALTERNATIVES))
         likely = likely[np.argsort(-odds[likely], kind="stable")]
-        first = np.unique(self.group[likely], return_index=True)[1]
-        return [int(row) for row in likely[np.sort(first)]]
+        groups = np.where(self.group < 0, -1 - np.arange(len(odds)), self.group)[likely]
+        return likely[np.sort(np.unique(groups, return_index=True)[1])].tolist()
 
     def _size(self, row: int) -> str:
         """Return the estimate of a set with its standard deviation; the largest of several."""
@@ -300,12 +304,19 @@ class Hypotheses:
 
     def of_checks(self) -> list[Phrase]:
         """Return single errors that explain differences of check points best, the most likely first."""
-        odds, n = np.nan_to_num(self.log_odds, nan=-math.inf), math.log(ALTERNATIVES)
-        first = int(odds.argmax()) if len(odds) else -1
-        if first < len(self.sets) or not self.by_checks[first] > n or self.probability[first] > DETECTION[0]:
+        first = int(np.nan_to_num(self.log_odds, nan=-math.inf).argmax()) if len(self.log_odds) else -1
+        if first < len(self.sets) or self.probability[first] > DETECTION[0]:
             return []
-        likely = np.flatnonzero(odds > odds[first] - n)
-        return [self.name(row) for row in likely[np.argsort(-odds[likely], kind="stable")].tolist()]
+        if not self.by_checks[first] > math.log(ALTERNATIVES):
+            return []
+        return [self._estimated(row) for row in self._likely(first)]
+
+    def _estimated(self, row: int) -> Phrase:
+        """Return the name of an error, with the estimate of a single component."""
+        if np.count_nonzero(~np.isnan(self.estimate[row])) > 1:
+            return self.name(row)
+        size = f"{self.estimate[row, 0]:.3g}{self._unit(row)}"
+        return phrase("common.error", named=self.name(row), size=size)
 
     @property
     def common_is_harmful(self) -> bool:
@@ -428,15 +439,11 @@ def hypotheses(
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
     groups = _groups(suspects, found["group"], found["index"])
     for row, (*sizes, changes) in found["effects"].items():
-        of_checks, of_points = np.split(changes, [checks])
-        effects[row] = Effect(of_points, *sizes)
-        if not known or joint is None:
-            continue
-        group = int(groups[row])
-        if group >= 0:
-            single_with_checks(found, row, trial.deviations[suspects.rows(group)], of_checks, joint)
-        elif set_with_checks(found, row, checks, joint):
-            relative.add(row)
+        effects[row] = Effect(changes[checks:], *sizes)
+    if known and joint is not None:
+        for row, own in [*enumerate(found["sets"]), *found["groups"].items()]:
+            if row in effects and with_checks(found, row, own, checks, joint):
+                relative.add(row)
     statistic, estimate = found["statistic"], found["estimate"]
     kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
     numbers = Counter(kinds)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import MutableMapping
+from typing import Any
 
 import numpy as np
 
@@ -28,15 +30,16 @@ def single_checks(joint: Joint) -> tuple[Floats, Floats]:
     return np.array(found), np.array([len(own) for own in points], dtype=float)
 
 
-def set_with_checks(found: Facts, row: int, checks: int, joint: Joint) -> bool:
-    """Test a set with check points as further observations; return whether only these test it.
+def with_checks(found: Facts, row: int, own: MutableMapping[str, Any], checks: int, joint: Joint) -> bool:
+    """Test a set or a group with check points as further observations; return whether only these test it.
 
     Differences D of check points with the covariance C are independent of the residuals. If the parameters
-    change them by G, D adds G' C^-1 D to the score and G' C^-1 G to the redundancy.
+    change them by G, D adds G' C^-1 D to the score s and G' C^-1 G to the redundancy R. The components of a
+    group, in the next rows, have T = s_k^2 / R_kk.
     """
-    own, (flat, differences, inverse) = found["sets"][row], joint
+    flat, differences, inverse = joint
     hidden = bool(found["rank"][row] == 0)
-    k = len(own["parameters"])
+    k = len(own["estimate"])
     g = np.reshape(own["at_checks"], (-1, 3, k))[:checks].reshape(-1, k)[flat]
     if not np.isfinite(g).all() or not g.any():
         return False
@@ -49,31 +52,21 @@ def set_with_checks(found: Facts, row: int, checks: int, joint: Joint) -> bool:
         score += own_part @ own["estimate"]
     cofactors = np.linalg.pinv(redundancy, hermitian=True, rcond=SINGULAR)
     estimate = cofactors @ score
-    statistic = float(score @ estimate)
+    _take_over(found, row, float(score @ estimate), estimate, len(flat))
+    if row < len(found["sets"]):
+        own["estimate"], own["cofactors"] = estimate.tolist(), cofactors.ravel().tolist()
+        return hidden
+    for part, (value, own_redundancy) in enumerate(zip(score, redundancy.diagonal(), strict=True), 1):
+        if k > 1 and own_redundancy > 0:
+            error = value / own_redundancy
+            _take_over(found, row + part, float(value * error), np.array([error]), len(flat))
+    return False
+
+
+def _take_over(found: Facts, row: int, statistic: float, estimate: Floats, count: int) -> None:
+    """Replace the test and the estimate of a row that `count` differences of check points test as well."""
+    k = len(estimate)
     found["statistic"][row], found["rank"][row] = statistic, k
-    found["estimate"][row, :k], found["observations"][row] = estimate, found["observations"][row] + len(flat)
+    found["estimate"][row, :k] = estimate
     found["probability"][row] = math.exp(float(log_chi_square(statistic, float(k))))
-    own["estimate"], own["cofactors"] = estimate.tolist(), cofactors.ravel().tolist()
-    return hidden
-
-
-def single_with_checks(found: Facts, row: int, sd: Floats, changes: Floats, joint: Joint) -> None:
-    """Test a group with check points as further observations, along its least detectable direction.
-
-    This direction d is an eigenvector of R in unit weight. Check points have the `changes` G by an error d.
-    """
-    flat, differences, inverse = joint
-    g, d = changes.ravel()[flat], found["mdb"][row, : len(sd)]
-    if len(d) != len(sd) or not np.isfinite(g).all() or not g.any():
-        return
-    weighted = inverse @ g
-    redundancy, score, before = float(g @ weighted), float(weighted @ differences), 0.0
-    if np.isfinite(d).all():
-        estimate = found["estimate"][row, : len(sd)]
-        own, part = found["noncentrality"][row], found["redundancy"][row] * float(d @ (estimate / sd**2))
-        redundancy, score, before = redundancy + own, score + part, part**2 / own
-    statistic = float(np.nan_to_num(found["statistic"][row])) - before + score**2 / redundancy
-    rank = max(found["rank"][row] + np.isnan(d[0]), 1)
-    found["statistic"][row], found["rank"][row] = statistic, rank
-    found["probability"][row] = math.exp(float(log_chi_square(statistic, float(rank))))
-    found["observations"][row] += len(flat)
+    found["observations"][row] += count

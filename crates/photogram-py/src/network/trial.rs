@@ -82,8 +82,7 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
         }
     }
     columns.set_item("effects", effects)?;
-    all.truncate(sets);
-    let of_set = |own: Hypothesis| -> PyResult<Bound<'_, PyDict>> {
+    let facts = |own: Hypothesis| -> PyResult<Bound<'_, PyDict>> {
         let row = PyDict::new(py);
         row.set_item("parameters", own.parameters)?;
         row.set_item("plausible", own.plausible)?;
@@ -93,7 +92,12 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
         row.set_item("at_checks", PyArray1::from_vec(py, own.at_checks))?;
         Ok(row)
     };
-    columns.set_item("sets", all.into_iter().map(of_set).collect::<PyResult<Vec<_>>>()?)?;
+    let groups = PyDict::new(py);
+    for (row, own) in all.drain(sets..).enumerate().filter(|(_, own)| !own.at_checks.is_empty()) {
+        groups.set_item(sets + row, facts(own)?)?;
+    }
+    columns.set_item("groups", groups)?;
+    columns.set_item("sets", all.into_iter().map(facts).collect::<PyResult<Vec<_>>>()?)?;
     columns.set_item("correlations", PyArray1::from_vec(py, correlations).reshape([sets, sets])?)?;
     Ok(columns)
 }

@@ -131,10 +131,11 @@ impl<'a> Catalogue<'a> {
         self.causes.push(Cause { code, set, parameters, plausible, columns: vec![columns.to_vec()] });
     }
 
-    /// Adds an error of some observations as a parameter.
-    pub fn add_single(&mut self, error: &[(EquationOf, f64)]) {
+    /// Adds an error of some observations as a parameter; its column.
+    pub fn add_single(&mut self, error: &[(EquationOf, f64)]) -> usize {
         self.add_to(self.count, error);
         self.count += 1;
+        self.count - 1
     }
 
     /// Adds partials of observations, in unit weight, by a parameter.

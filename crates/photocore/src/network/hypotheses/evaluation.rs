@@ -54,10 +54,15 @@ impl Trial {
         let worst = worst(&singles, facts);
 
         let mut catalogue = catalogue(self, found, facts);
-        worst.iter().for_each(|&k| catalogue.add_single(&singles[k].error));
+        // Check points can distinguish errors of components that residuals cannot.
+        let by_component = !facts.check_weights.is_empty();
+        let mut add = |&k: &usize| singles[k].add(&mut catalogue, by_component);
+        let shares: Vec<Vec<(usize, f64)>> = worst.iter().map(&mut add).collect();
         let sums = linearized.additional(problem, &catalogue, threads);
-        let of_sets = sums.score.len() - worst.len();
-        let at_checks = sample.at_checks(&catalogue, &sums.effects, of_sets, threads);
+        let count = sums.score.len();
+        let of_sets = shares.iter().flatten().map(|own| own.0).min().unwrap_or(count);
+        let compared = if by_component { count } else { of_sets };
+        let at_checks = sample.at_checks(&catalogue, &sums.effects, compared, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
             let sees = |own: &(usize, f64)| sums.squares[(own.0, own.0)] > 0.0;
@@ -66,7 +71,7 @@ impl Trial {
             if seen.is_empty() {
                 continue;
             }
-            let own = cause.directions(sums.score.len(), &seen);
+            let own = cause.directions(count, &seen);
             let plausible: Vec<f64> = seen.iter().filter_map(|&k| cause.plausible.get(k).copied()).collect();
             let judged = Judged::new(
                 &own.tr_mul(&sums.score),
@@ -77,7 +82,7 @@ impl Trial {
             );
             errors.push(match &judged.error {
                 Some(error) => &own * DVector::from_column_slice(error),
-                None => DVector::zeros(sums.score.len()),
+                None => DVector::zeros(count),
             });
             all.push(Hypothesis {
                 code: cause.code,
@@ -87,14 +92,19 @@ impl Trial {
                 plausible,
                 judged,
                 effect: None,
-                at_checks: (&at_checks * own.rows(0, of_sets)).transpose().as_slice().to_vec(),
+                at_checks: (at_checks.columns(0, of_sets) * own.rows(0, of_sets)).transpose().as_slice().to_vec(),
             });
             columns.push(own);
         }
-        let (sets, count) = (all.len(), sums.score.len());
-        // The last parameters are errors of unit size.
-        let unit = |column: usize| DVector::from_fn(count, |k, _| f64::from(u8::from(k == column)));
-        errors.extend((count - worst.len()..count).map(unit));
+        let sets = all.len();
+        for (&k, own) in worst.iter().zip(&shares) {
+            let mut error = DVector::zeros(count);
+            own.iter().for_each(|&(column, share)| error[column] = share);
+            errors.push(error);
+            if by_component {
+                singles[k].compare(&at_checks.select_columns(own.iter().map(|own| &own.0)));
+            }
+        }
         let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
         let effect = |error: usize| {
             let single = error.checked_sub(sets).map(|k| &singles[worst[k]]);

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::super::group_tests::Tested;
 use super::super::suspects::{Home, Row, Subject, Suspect};
 use super::super::trial::Trial;
+use super::catalogue::Catalogue;
 use super::facts::Facts;
 use super::hypothesis::{About, Hypothesis};
 use super::judged::{Criteria, Judged};
@@ -25,6 +26,26 @@ pub(super) struct Single<'a> {
     pub suspect: &'a Suspect,
     /// The error whose effect is reported: equations of unit weight with their shares.
     pub error: Vec<(EquationOf, f64)>,
+    /// Errors of unit weight in the units of the observations, by column.
+    units: DMatrix<f64>,
+}
+
+impl Single<'_> {
+    /// Adds the error to a catalogue, or an error of each component: their columns, with the shares of the error.
+    pub fn add(&self, catalogue: &mut Catalogue<'_>, by_component: bool) -> Vec<(usize, f64)> {
+        if !by_component {
+            return vec![(catalogue.add_single(&self.error), 1.0)];
+        }
+        let mut add = |&(equation, share)| (catalogue.add_single(&[(equation, 1.0)]), share);
+        self.error.iter().map(&mut add).collect()
+    }
+
+    /// Takes over changes of the check points by errors of unit weight of each component.
+    pub fn compare(&mut self, changes: &DMatrix<f64>) {
+        let back = self.units.clone().try_inverse();
+        let changes = back.filter(|own| own.nrows() == changes.ncols()).map(|own| changes * own);
+        self.hypothesis.at_checks = changes.map_or(vec![], |own| own.transpose().as_slice().to_vec());
+    }
 }
 
 /// The errors of groups.
@@ -106,7 +127,7 @@ impl Trial {
                 effect: None,
                 at_checks: vec![],
             };
-            Single { hypothesis, suspect, error }
+            Single { hypothesis, suspect, error, units }
         };
         sets.into_iter().map(of).collect()
     }
