@@ -1,8 +1,9 @@
 //! Results common to all solutions.
 
-use photocore::adjustment::{Adjustment, Iteration, Status};
+use photocore::adjustment::{Adjustment, Iteration, Seconds, Status};
+use photocore::normals::Ordering;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
@@ -23,31 +24,24 @@ pub fn status_name(status: Status) -> &'static str {
 
 /// Returns the predicted multiply-adds of a factorization for each tried ordering; NaN if the network is too large for the ordering.
 pub fn predictions<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    for (ordering, operations) in &adjustment.effort.predictions {
-        dict.set_item(ordering.name(), operations.unwrap_or(f64::NAN))?;
-    }
-    Ok(dict)
+    let predictions = adjustment.effort.predictions.iter();
+    let row =
+        |(ordering, operations): &(Ordering, Option<f64>)| (ordering.name(), operations.unwrap_or(f64::NAN));
+    predictions.map(row).into_py_dict(py)
 }
 
 /// Returns the predicted multiply-adds of each phase.
 pub fn operations<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
     let operations = adjustment.effort.operations;
-    let dict = PyDict::new(py);
-    dict.set_item("reduction", operations.reduction)?;
-    dict.set_item("factor", operations.factor)?;
-    dict.set_item("inverse", operations.inverse)?;
-    Ok(dict)
+    let phases =
+        [("reduction", operations.reduction), ("factor", operations.factor), ("inverse", operations.inverse)];
+    phases.into_py_dict(py)
 }
 
 /// Returns the seconds spent in each phase.
 pub fn seconds<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
-    let seconds = adjustment.effort.seconds;
-    let dict = PyDict::new(py);
-    dict.set_item("form", seconds.form)?;
-    dict.set_item("factor", seconds.factor)?;
-    dict.set_item("solve", seconds.solve)?;
-    dict.set_item("invert", seconds.invert)?;
-    dict.set_item("cofactors", seconds.cofactors)?;
-    Ok(dict)
+    let Seconds { form, factor, solve, invert, cofactors } = adjustment.effort.seconds;
+    let phases =
+        [("form", form), ("factor", factor), ("solve", solve), ("invert", invert), ("cofactors", cofactors)];
+    phases.into_py_dict(py)
 }

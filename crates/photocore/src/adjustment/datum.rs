@@ -76,13 +76,6 @@ pub struct Adjusted<'a> {
     pub loss: Option<Loss>,
 }
 
-/// Requested datum of an adjustment, and the values from which its carriers move least.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct DatumTarget<'a> {
-    pub datum: &'a Datum,
-    pub reference: &'a [f64],
-}
-
 /// Matrices for the datum transformation of a partitioned network: columns over all unknowns, one after the other.
 #[derive(Debug)]
 pub struct DatumColumns {

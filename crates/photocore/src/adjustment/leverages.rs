@@ -64,7 +64,7 @@ impl RowCofactors {
 }
 
 impl Leverages {
-    /// Moves the results of [`super::adjust_by_groups`] out of an adjustment, at its final values; None if it did not store them.
+    /// Moves the data that [`super::Requests::by_groups`] requests out of an adjustment, at its final values; None if it did not store them.
     pub fn of(adjustment: &mut Adjustment, values: &[f64]) -> Option<Self> {
         let (selected, cofactors) = (adjustment.selected.take()?, adjustment.cofactors.take()?);
         let residuals = std::mem::take(&mut adjustment.residuals);

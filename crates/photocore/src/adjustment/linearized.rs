@@ -214,18 +214,6 @@ impl Linearized {
         self.factor.reduced_corrections(layout)
     }
 
-    /// Returns the cofactors of all pairs of retained unknowns, in the order of the layout, row by row; zero for fixed or constrained ones.
-    pub fn reduced_cofactors(&self, problem: &AnyProblem<'_>) -> Vec<f64> {
-        let layout = problem.layout();
-        let (first, count) = (layout.all_locals().end, layout.unknowns() - layout.all_locals().end);
-        let mut rights = vec![0.0; count * count];
-        for k in 0..count {
-            // Fixed and constrained unknowns have decoupled normal equations with unit weight.
-            rights[k * (count + 1)] = f64::from(u8::from(self.is_free(problem, first + k)));
-        }
-        self.factor.solve_reduced(layout, &rights)
-    }
-
     /// Whether an unknown is neither fixed nor constrained.
     pub(super) fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
         problem.sd[unknown] != 0.0 && !self.held.contains(&unknown)
@@ -268,8 +256,12 @@ impl Linearized {
         Ok(matrix)
     }
 
-    /// Computes the cofactors of all pairs of some unknowns; None if they need more memory than allowed.
-    pub(super) fn joint(
+    /// Computes the cofactors of all pairs of some unknowns, row by row; None if they need more memory than allowed. The cofactors of fixed or
+    /// constrained unknowns are zero.
+    ///
+    /// # Errors
+    /// Interruption or lack of memory.
+    pub fn joint(
         &self,
         problem: &AnyProblem<'_>,
         unknowns: &[usize],
@@ -306,6 +298,49 @@ impl Linearized {
     ) -> Result<Vec<f64>, AdjustError> {
         let options = SolveOptions { rights: Some(rights), ..SolveOptions::default() };
         self.solve(&self.equations(problem, threads), &options, threads, between)
+    }
+
+    /// Computes R z for columns z over the equations of [`Problem::equations`], one after the other: the residuals caused by errors z, in
+    /// standard deviations. Bitwise identical for any number of threads; independent of the datum.
+    ///
+    /// # Errors
+    /// Interruption or lack of memory.
+    pub fn project(
+        &self,
+        problem: &AnyProblem<'_>,
+        mut columns: Vec<f64>,
+        threads: &Threads,
+        between: Between<'_>,
+    ) -> Result<Vec<f64>, AdjustError> {
+        let (equations, terms) = (self.equations(problem, threads), problem.terms(&self.values));
+        let (height, unknowns) = (problem.equations().max(1), problem.layout().unknowns().max(1));
+        let count = columns.len() / height;
+        let mut rights = equations.transposed(threads, count, |row, z| {
+            z.iter_mut().zip(columns.chunks_exact(height)).for_each(|(z, column)| *z = column[row.number]);
+        });
+        equations.each_prior(&terms, 0..problem.sd.len(), |_, row| {
+            for (right, z) in rights.chunks_exact_mut(unknowns).zip(columns.chunks_exact(height)) {
+                row.taken().for_each(|(unknown, value)| right[unknown] += value * z[row.number]);
+            }
+        });
+        let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
+        let solutions = self.solve(&equations, &options, threads, between)?;
+        drop(rights);
+        let solutions: Vec<&[f64]> = solutions.chunks_exact(unknowns).collect();
+        let changes = equations.times(threads, &terms, &solutions);
+        for (row, changes) in changes.chunks_exact(count.max(1)).enumerate() {
+            for (column, change) in columns.chunks_exact_mut(height).zip(changes) {
+                column[row] -= change;
+            }
+        }
+        Ok(columns)
+    }
+
+    /// Returns a flag per equation of [`Problem::equations`]: for unknowns, whether they are weighted and not constrained.
+    pub fn is_equation(&self, problem: &AnyProblem<'_>) -> Vec<bool> {
+        let mut found = vec![true; problem.observation_sd.len()];
+        found.extend((0..problem.sd.len()).map(|i| problem.is_weighted(i) && !self.held.contains(&i)));
+        found
     }
 
     /// Computes the step of all unknowns, or solves for the right-hand sides in the options.

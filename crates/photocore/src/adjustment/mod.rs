@@ -77,7 +77,6 @@ mod observation_rows;
 mod options;
 mod part;
 mod problem;
-mod projection;
 mod result;
 mod run;
 mod secants;
@@ -112,7 +111,7 @@ pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
 #[doc(hidden)]
 pub use run::go_on;
-pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum};
+pub use run::{Requests, Watch, adjust, adjust_with};
 pub(crate) use statistics::weighted;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use terms::Terms;

@@ -165,6 +165,11 @@ impl<M: ?Sized> Problem<M> {
         self.system.layout()
     }
 
+    /// Number of equations: rows of groups and of ties, then one per unknown as an observation of itself, which is empty unless weighted.
+    pub fn equations(&self) -> usize {
+        self.observation_sd.len() + self.sd.len()
+    }
+
     /// Returns a flag per unknown: whether it is fixed or in `held`.
     pub(super) fn fixed(&self, held: &[usize]) -> Vec<bool> {
         let mut fixed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();

@@ -76,7 +76,7 @@ pub struct Adjustment {
     pub(super) selected: Option<SelectedInverse>,
     /// The factor before it was inverted, if tests of groups will follow and it is small.
     pub(super) factor: Option<(Factor, Prior)>,
-    /// Cofactors of all pairs of the requested unknowns, row by row (see [`super::adjust_by_groups`]).
+    /// Cofactors of all pairs of the requested unknowns, row by row (see [`super::Requests::by_groups`]).
     pub joint: Option<Vec<f64>>,
     /// Reason for missing cofactors, if they were requested.
     pub undetermined: Option<AdjustError>,

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use super::datum::{Adjusted, Basis, Datum, DatumTarget, moved};
+use super::datum::{Adjusted, Basis, Datum, moved};
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
 use super::loss::Reweighting;
@@ -44,60 +44,39 @@ pub fn adjust(
     threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, None, threads, watch, None)
+    adjust_with(problem, options, Requests::default(), threads, watch)
 }
 
-/// Adjusts a free network in a given datum: it is transformed before the last formation, which then also provides the cofactors. If this
-/// succeeds, [`Adjustment::lost`] is set. Otherwise cofactors are missing, and the caller must call [`Adjustment::take_to`].
-///
-/// * `reference`: the values from which the carriers move least, usually the initial values.
+/// Further results of an adjustment.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Requests<'a> {
+    /// Datum of a free network, and the values from which its carriers move least, usually the initial values. The network is transformed
+    /// before the last formation, which then also provides the cofactors. If this succeeds, [`Adjustment::lost`] is set. Otherwise cofactors
+    /// are missing, and the caller must call [`Adjustment::take_to`].
+    pub datum: Option<(&'a Datum, &'a [f64])>,
+    /// Data for tests of groups of observations, which [`Leverages::of`] uses: unknowns with mutual cofactors ([`Adjustment::joint`]),
+    /// computed from the last factor, and the maximum size of these in bytes, above which they are omitted (None for unlimited).
+    ///
+    /// [`Leverages::of`]: super::Leverages::of
+    pub by_groups: Option<(&'a [usize], Option<usize>)>,
+}
+
+/// Adjusts as [`adjust`], with further results.
 ///
 /// # Errors
 /// As for [`adjust`].
-pub fn adjust_in_datum(
+pub fn adjust_with(
     problem: &AnyProblem<'_>,
     options: &Options,
-    datum: &Datum,
-    reference: &[f64],
+    requests: Requests<'_>,
     threads: &Threads,
     watch: Watch<'_>,
-) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, Some(DatumTarget { datum, reference }), threads, watch, None)
-}
-
-/// Adjusts, and stores the data for tests of groups of observations, which [`Leverages::of`] uses.
-///
-/// * `joint`: unknowns with mutual cofactors ([`Adjustment::joint`]), computed from the last factor;
-/// * `memory`: maximum size of these cofactors in bytes, above which they are omitted (None for unlimited).
-///
-/// # Errors
-/// As for [`adjust`].
-///
-/// [`Leverages::of`]: super::Leverages::of
-pub fn adjust_by_groups(
-    problem: &AnyProblem<'_>,
-    options: &Options,
-    (joint, memory): (&[usize], Option<usize>),
-    threads: &Threads,
-    watch: Watch<'_>,
-) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, None, threads, watch, Some((joint, memory)))
-}
-
-fn adjusted(
-    problem: &AnyProblem<'_>,
-    options: &Options,
-    target: Option<DatumTarget<'_>>,
-    threads: &Threads,
-    watch: Watch<'_>,
-    by_groups: Option<(&[usize], Option<usize>)>,
 ) -> Result<Adjustment, AdjustError> {
     problem.check_lengths(&problem.initial)?;
     let mut run = Run {
         problem,
         options,
-        by_groups,
-        target,
+        requests,
         is_near: false,
         has_moved: false,
         threads,
@@ -199,10 +178,7 @@ impl<'a> End<'a> {
 pub(super) struct Run<'a, 'w> {
     pub problem: &'a AnyProblem<'a>,
     pub options: &'a Options,
-    /// Options for tests of groups: unknowns with mutual cofactors, and the maximum size of these in bytes.
-    by_groups: Option<(&'a [usize], Option<usize>)>,
-    /// Requested datum.
-    target: Option<DatumTarget<'a>>,
+    requests: Requests<'a>,
     /// Whether the next formation is expected to be the last, if a datum is requested.
     is_near: bool,
     /// Whether the network was transformed during the iterations.
@@ -298,12 +274,13 @@ impl<'a> Run<'a, '_> {
         let before = self.iterations.last().filter(|before| full(before) && full(last));
         let next = before.map(|before| last.largest_change.powi(3) / before.largest_change.powi(2));
         let unknowns = self.problem.layout().unknowns();
-        self.is_near = self.target.is_some() && next.is_some_and(|next| leaves_cofactors(next, unknowns));
+        self.is_near =
+            self.requests.datum.is_some() && next.is_some_and(|next| leaves_cofactors(next, unknowns));
     }
 
     /// Transforms the values to the requested datum if possible. Also returns the values before the transformation.
     fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<Basis>, Option<Vec<f64>>) {
-        let Some(DatumTarget { datum, reference }) = self.target else { return (unknowns, None, None) };
+        let Some((datum, reference)) = self.requests.datum else { return (unknowns, None, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
         match moved(self.problem, adjusted, datum, reference, self.threads) {
             Ok((there, basis)) => {
@@ -357,19 +334,20 @@ impl<'a> Run<'a, '_> {
             self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, reached)?;
         }
         drop(end.unknowns);
-        let asked = options.covariance && (self.target.is_none() || is_at_target);
+        let asked = options.covariance && (self.requests.datum.is_none() || is_at_target);
         if let Some(Iterate { equations, mut linearized, .. }) = end.state.filter(|_| asked) {
             let locals = problem.layout().locals();
             {
                 let mut between = between(&mut *self.watch, Phase::Solve, locals);
                 linearized.take_to_datum(&equations, self.threads, &mut between)?;
             }
-            if let Some((joint, memory)) = self.by_groups.filter(|(joint, _)| !joint.is_empty()) {
+            if let Some((joint, memory)) = self.requests.by_groups.filter(|(joint, _)| !joint.is_empty()) {
                 let mut between = between(&mut *self.watch, Phase::Invert, locals);
                 adjustment.joint = linearized.joint(problem, joint, memory, self.threads, &mut between)?;
             }
-            adjustment.factor = self.by_groups.and_then(|_| linearized.small_factor(&problem.system));
-            let what = InvertOptions { by_groups: self.by_groups.is_some(), ..InvertOptions::default() };
+            adjustment.factor = self.requests.by_groups.and_then(|_| linearized.small_factor(&problem.system));
+            let what =
+                InvertOptions { by_groups: self.requests.by_groups.is_some(), ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);
             adjustment.put(problem, linearized.invert(&equations, &what, self.threads, &mut between)?);
             adjustment.redundancy_excess = options.loss.is_none().then(|| adjustment.excess());

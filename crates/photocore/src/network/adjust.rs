@@ -11,7 +11,7 @@ use super::screens::{Begin, Ended, Screening};
 use super::solution::{Joint, Solution};
 use super::trial::Converged;
 use crate::Threads;
-use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
+use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Requests, Watch};
 use crate::sorting::sort_by;
 
 /// An adjustment to be run: initial state, threads, progress function and datum.
@@ -142,6 +142,8 @@ impl<'a> NetworkAdjustment<'a> {
         let (problem, mut own) = (&assembled.problem, self.options.adjustment);
         own.max_iterations = own.max_iterations.saturating_sub(done);
         let plain = own.covariance && own.loss.is_none();
+        let in_datum;
+        let mut requests = Requests::default();
         match self.datum {
             // The adjustment runs in the requested datum. Exceptions: weights of a loss are known only at the end; trajectories follow a
             // transformation only approximately, so that steps after it would not be short.
@@ -150,21 +152,19 @@ impl<'a> NetworkAdjustment<'a> {
                     && matches!(own.method, Method::Damped(_))
                     && problem.model.mounts.trajectories().is_empty() =>
             {
-                let (datum, reference) = assembled.datum(inner);
-                return adjustment::adjust_in_datum(problem, &own, &datum, &reference, threads, watch);
+                in_datum = assembled.datum(inner);
+                requests.datum = Some((&in_datum.0, &in_datum.1));
             }
             Some(_) => own.covariance = false,
             None => {}
         }
         let by_groups = self.datum.is_none() && plain && !matches!(own.method, Method::Full(_));
-        match joint.filter(|_| by_groups && assembled.may_keep(&self.options)) {
-            Some(points) => {
-                let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
-                let joint: Vec<usize> = points.iter().flat_map(unknowns).collect();
-                adjustment::adjust_by_groups(problem, &own, (&joint, self.options.memory), threads, watch)
-            }
-            None => adjustment::adjust(problem, &own, threads, watch),
-        }
+        let joint = joint.filter(|_| by_groups && assembled.may_keep(&self.options)).map(|points| {
+            let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
+            points.iter().flat_map(unknowns).collect::<Vec<usize>>()
+        });
+        requests.by_groups = joint.as_deref().map(|joint| (joint, self.options.memory));
+        adjustment::adjust_with(problem, &own, requests, threads, watch)
     }
 
     /// Returns the solution in the requested datum.

@@ -191,7 +191,7 @@ impl Network {
         let tied: Result<Vec<TiedObservation>, NetworkError> =
             parallel::map(observations.len(), TOGETHER, tied).into_iter().collect();
         let mut tied = tied?;
-        tied.sort_by_key(TiedObservation::local);
+        tied.sort_by_cached_key(TiedObservation::local);
         Ok(tied)
     }
 }

@@ -10,7 +10,7 @@ use super::input::{Network, Options, State};
 use super::problem::Assembled;
 use super::suspects::{self, Home, Row, Subject, Suspect, Suspects};
 use crate::Threads;
-use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Terms, Watch};
+use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Requests, Status, Stop, Terms, Watch};
 use crate::geometry::PoseNumbers;
 
 /// Repeated adjustments of a network without some of its observations.
@@ -188,8 +188,8 @@ impl Trial {
         let method = self.method(tolerance);
         let options = adjustment::Options { method, covariance: true, loss: None, ..self.options };
         let failed = |error| NetworkError::new(error, &self.assembled);
-        let adjusted =
-            adjustment::adjust_by_groups(&self.assembled.problem, &options, (&[], None), threads, watch);
+        let requests = Requests { by_groups: Some((&[], None)), ..Requests::default() };
+        let adjusted = adjustment::adjust_with(&self.assembled.problem, &options, requests, threads, watch);
         let mut adjusted = adjusted.map_err(failed)?;
         let values = std::mem::take(&mut adjusted.unknowns);
         let Some(found) = Leverages::of(&mut adjusted, &values) else {

@@ -38,7 +38,8 @@ impl Calibration {
             let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
             let values = adjusted.unknowns.clone();
             let normal = Linearized::form(&problem, None, values, vec![], threads, &mut between);
-            whole = of_parameters(&normal.map_err(|error| self.named(&problem, error, threads))?, &problem);
+            let normal = normal.map_err(|error| self.named(&problem, error, threads))?;
+            whole = self.of_parameters(&normal, &problem, threads)?;
         }
         Solution::new(self, options, &problem, adjusted, whole)
     }
@@ -170,6 +171,22 @@ impl Calibration {
         })
     }
 
+    /// Returns the natural logarithm of the determinant of the normal equations reduced to the parameters, and the full cofactor matrix of
+    /// the parameters. None if some parameters are undetermined.
+    pub(super) fn of_parameters(
+        &self,
+        normal: &Linearized,
+        problem: &Problem<StarImages<'_>>,
+        threads: &Threads,
+    ) -> Result<Option<(f64, Vec<f64>)>, StellarError> {
+        let Some(log_determinant) = normal.log_determinant() else { return Ok(None) };
+        let parameters: Vec<usize> =
+            (problem.layout().all_locals().end..problem.layout().unknowns()).collect();
+        let cofactors = normal.joint(problem, &parameters, None, threads, &mut go_on);
+        let cofactors = cofactors.map_err(|error| self.named(problem, error, threads))?;
+        Ok(cofactors.map(|cofactors| (log_determinant, cofactors)))
+    }
+
     fn layout(&self, model: &StarImages<'_>) -> Result<Layout, LayoutError> {
         let retained = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
         let (count, common) = (model.images.len(), self.pointings.len() as u32);
@@ -179,15 +196,6 @@ impl Calibration {
             .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())?
             .with_pairs((0..common).map(|pointing| [pointing, common]).collect())
     }
-}
-
-/// Returns the natural logarithm of the determinant of the normal equations reduced to the parameters, and the full cofactor matrix of the
-/// parameters. None if some parameters are undetermined.
-pub(super) fn of_parameters(
-    normal: &Linearized,
-    problem: &Problem<StarImages<'_>>,
-) -> Option<(f64, Vec<f64>)> {
-    normal.log_determinant().map(|log_determinant| (log_determinant, normal.reduced_cofactors(problem)))
 }
 
 /// Returns the parameters among unknowns.

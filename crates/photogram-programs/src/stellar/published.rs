@@ -3,7 +3,7 @@
 //! Distortion is evaluated at the undistorted measured image, so that discrepancies refer to the undistorted plate. The partials neglect
 //! the change of refraction with direction.
 
-use super::adjust::{of_parameters, parameters_of};
+use super::adjust::parameters_of;
 use super::model::{Partials, Rows, Sight, Tolerances};
 use super::{Attitude, COMMON, Calibration, Camera, StellarError};
 use photocore::Threads;
@@ -53,7 +53,8 @@ impl Calibration {
             let combinations = normal.undetermined_unknowns(layout).into_iter();
             StellarError::Undetermined(combinations.map(|each| parameters_of(&problem, each)).collect())
         };
-        let (log_determinant, cofactors) = of_parameters(&normal, &problem).ok_or_else(undetermined)?;
+        let found = self.of_parameters(&normal, &problem, threads)?;
+        let (log_determinant, cofactors) = found.ok_or_else(undetermined)?;
         Ok(Correction {
             parameters: normal.reduced_corrections(layout),
             cofactors,
