@@ -19,7 +19,7 @@ from moving_blocks import (
     rolling,
     scanned,
 )
-from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
+from photogram import AdjustmentError, Attitudes, adjust, diagnose
 from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
 from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.mistakes import Adjuster

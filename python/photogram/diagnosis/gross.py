@@ -53,6 +53,8 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
     usual = _medians(rays)[block.image_photos]
     points = np.zeros(len(block.point_ids), dtype=bool)
     points[block.image_points[rays.used & (sizes > MISSING * np.maximum(usual, block.image_sd.max()))]] = True
+    # Data snooping cannot reinstate two rays that are both excluded.
+    points &= np.bincount(block.image_points, minlength=len(points)) > 2
     return section, Suspects(bad, points, _control(rays.without(points[block.image_points]), section))
 
 
