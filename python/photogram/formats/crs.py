@@ -48,28 +48,19 @@ def _transformer(source: str, target: str) -> Any:
     import pyproj
 
     first, second = _system(source), _system(target)
-    try:
-        return pyproj.Transformer.from_crs(
-            first, second, always_xy=True, only_best=True, allow_ballpark=False
-        )
-    except pyproj.exceptions.ProjError as error:
-        raise _no_transformation(source, target, error) from None
-
-
-def _no_transformation(source: str, target: str, error: Exception) -> InputError:
-    compound = _system(source).is_compound or _system(target).is_compound
-    fields = {"source": source, "target": target, "reason": str(error)}
-    return InputError(phrase("crs.transformation", **fields, hint=[phrase("crs.grid")] if compound else []))
+    return pyproj.Transformer.from_crs(first, second, always_xy=True, only_best=True, allow_ballpark=False)
 
 
 def _transformed(source: str, target: str, xyz: Floats) -> Floats:
     import pyproj
 
-    transformer = _transformer(source, target)
     try:
-        found = np.column_stack(transformer.transform(*xyz.T, errcheck=True))
+        found = np.column_stack(_transformer(source, target).transform(*xyz.T, errcheck=True))
     except pyproj.exceptions.ProjError as error:
-        raise _no_transformation(source, target, error) from None
+        compound = _system(source).is_compound or _system(target).is_compound
+        fields = {"source": source, "target": target, "reason": str(error)}
+        hint = [phrase("crs.grid")] if compound else []
+        raise InputError(phrase("crs.transformation", **fields, hint=hint)) from None
     if not np.isfinite(found).all():
         row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
         raise InputError(phrase("crs.outside", position=xyz[row].tolist(), source=source, target=target))
@@ -84,11 +75,7 @@ def geocentric(crs: str, xyz: Floats) -> Floats:
     local = enu_origin(crs)
     if local is not None:
         return _geocentric_of(local) + xyz @ east_north_up(local)
-    system = _system(crs)
-    if len(system.axis_info) == 2:
-        # A two-dimensional system receives ellipsoidal heights of its three-dimensional counterpart.
-        return _transformed(_with_heights(crs), GEOCENTRIC, xyz + _geoid(crs))
-    return _transformed(crs, GEOCENTRIC, xyz + _geoid(crs))
+    return _transformed(_with_heights(crs), GEOCENTRIC, xyz + _geoid(crs))
 
 
 def _geoid(crs: str) -> Floats:
@@ -111,7 +98,9 @@ def without_geoid(crs: str) -> str:
 
 @cache
 def _with_heights(crs: str) -> str:
-    return str(_system(crs).to_3d().to_wkt())
+    """Return a system; a two-dimensional one receives ellipsoidal heights."""
+    system = _system(crs)
+    return str(system.to_3d().to_wkt()) if len(system.axis_info) == 2 else crs
 
 
 def enu_origin(crs: str) -> tuple[float, float, float] | None:
@@ -222,8 +211,7 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     if (local := enu_origin(crs)) is not None:
         found: Floats = (earth - _geocentric_of(local)) @ east_north_up(local).T
     else:
-        target = _with_heights(crs) if len(_system(crs).axis_info) == 2 else crs
-        found = _transformed(GEOCENTRIC, target, earth) - _geoid(crs)
+        found = _transformed(GEOCENTRIC, _with_heights(crs), earth) - _geoid(crs)
     turns: Floats = _axes(crs, found, earth) @ own.transpose(0, 2, 1)
     return found, turns
 
