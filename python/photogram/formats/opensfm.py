@@ -255,18 +255,13 @@ def write(project: Project) -> Mapping[str, bytes]:
             for row in np.flatnonzero(placed).tolist()
         },
     }
-    if project.frame.origin is not None and _placed_frame(project):
-        model["reference_lla"] = dict(
-            zip(("latitude", "longitude", "altitude"), project.frame.origin, strict=True)
-        )
+    frame = project.frame
+    if frame.kind == "topocentric" and frame.origin is not None:
+        names = ("latitude", "longitude", "altitude")
+        model["reference_lla"] = dict(zip(names, frame.origin, strict=True))
     files = {MODEL: to_json([model]), TRACKS: _tracks_file(project, sizes, which, set(rows.tolist()))}
     control = _control(project)
     return {**files, **({CONTROL: control} if control else {})}
-
-
-def _placed_frame(project: Project) -> bool:
-    """Return whether the frame is georeferenced."""
-    return project.frame.kind == "topocentric" and project.frame.origin is not None
 
 
 def _control(project: Project) -> bytes:
@@ -276,7 +271,7 @@ def _control(project: Project) -> bytes:
     """
     known = known_points(project)
     own = np.flatnonzero(np.isfinite(known.positions).all(axis=1)).tolist()
-    if not own or not _placed_frame(project):
+    if not own or project.frame.kind != "topocentric" or project.frame.origin is None:
         return b""
     from photogram.formats.crs import GEOGRAPHIC, from_frame
 
