@@ -19,7 +19,7 @@ from photogram.formats.dbat.tables import DbatBuilder, sensor_of
 from photogram.formats.project import Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.files import read_beginning, read_lines
-from photogram.io.places import Place, at_place
+from photogram.io.places import Place, at_place, image_size
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
@@ -95,10 +95,7 @@ def _number(card: Card, index: int) -> int:
 def _size(card: Card) -> Size:
     if len(card.words) < 4:
         raise card.place.error(phrase("dbat.size"))
-    width, height = (_number(card, k) for k in (2, 3))
-    if not (0 < width < 2**31 and 0 < height < 2**31):
-        raise card.place.error(phrase("format.size", width=width, height=height))
-    return width, height
+    return image_size(card.place, _number(card, 2), _number(card, 3))
 
 
 def _sensor(card: Card, first: int, name: str, size: Size) -> tuple[Camera, Size, float]:
