@@ -307,21 +307,21 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
         column for column in read if column not in ("", "point") and isinstance(table.cells[column], list)
     ]
     for column in named or texts:
-        roles = [_role(cell, columns) for cell in table.texts(column)]
+        found = [_role(cell, columns) for cell in table.texts(column)]
         own, meaning = headings[column], column_of(headings[column])
         sure = column == ROLE and (ROLE in columns.headings or not _PLAIN_ROLES.isdisjoint(words_of(own)))
-        if meaning in _FLAGS and not any(roles):
+        if meaning in _FLAGS and not any(found):
             words[column] = [_flag(table, column, row, meaning) for row in range(table.count)]
         # Other types describe something else; columns without a heading of roles contain "check".
-        elif (sure or any(roles)) and (named or "check" in roles):
-            words[column] = roles
+        elif (sure or any(found)) and (named or "check" in found):
+            words[column] = found
     if len(words) > 1:
         several = [headings[column] for column in words]
         raise table.head.error(phrase("columns.several-roles", names=several))
     if not words:
         return table.renamed({ROLE: headings[ROLE]}) if ROLE in table and headings[ROLE] != ROLE else table
-    ((column, found),) = words.items()
-    uses = _settled_roles(table, column, found)
+    ((column, own_roles),) = words.items()
+    uses = _settled_roles(table, column, own_roles)
     if headings[column] != ROLE:
         counts = [f"{uses.count(role)} {role}" for role in ROLES if role in uses]
         roles = phrase("columns.roles-read", heading=headings[column], counts=counts)

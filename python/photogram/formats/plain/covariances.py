@@ -162,7 +162,8 @@ def covariance_tables(
         {"kind": kind, "name": name, "first": components[i], "second": components[j]}
         | {"covariance": float(matrix[i, j])}
         for kind, name, components, matrix in (*joined, *more)
-        for i, j in zip(*np.tril_indices(len(components)), strict=True)
+        for i in range(len(components))
+        for j in range(i + 1)
         if i == j or matrix[i, j]
     )
     return {"covariances": columns_of_records(rows)}

@@ -186,9 +186,9 @@ def _unknowns(
     """Return the shared parameters that may have covariances."""
     found = [one for own in dict.fromkeys(observations.column("unknowns")) for one in own if one is not None]
     found += of_records(observations)
-    found += [each.sensor for each in (*mounts, *timed) if each.sensor is not None]
+    found += [each.sensor for each in mounts]
     for each in timed:
-        found += each.scalars
+        found += [*([] if each.sensor is None else [each.sensor]), *each.scalars]
         if each.trajectory is not None:
             found += [one for own in each.trajectory.coefficients for one in own]
     return found

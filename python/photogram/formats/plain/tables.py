@@ -221,7 +221,7 @@ class Tables:
             case "word":
                 return table.words(name, column.words, "", optional=not required)
             case "flag":
-                return table.flags(name).tolist()
+                return [bool(each) for each in table.flags(name)]
             case "ref":
                 if required:
                     table.names(name)
