@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 from photogram.arguments.arrays import value_field
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
@@ -41,7 +41,7 @@ class Tree:
         return self.error(phrase("error.missing", name=key))
 
     def _member(self, key: str, value: Any) -> Self:
-        return replace(self, value=value, path=f"{self.path}/{key}")
+        return type(self)(value, self.file, f"{self.path}/{key}")
 
     def _element(self, number: int, value: Any) -> Self:
         return self._member(str(number), value)
