@@ -463,7 +463,9 @@ def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
         every = result.reliability_summary.hypotheses
         for code, statistic in zip(every.code.tolist(), every.statistic.tolist(), strict=True):
             largest[code] = max(largest[code], statistic)
-        return first == true or largest[true] > largest[first] - 2 * math.log(20)
+        # Without observed positions, bent control is the bending of the network.
+        same = true in (first, first.removeprefix("control-"))
+        return same or largest[true] > largest[first] - 2 * math.log(20)
     if code == "gross-errors" and hypothesis.startswith("control-point"):
         return f"control point {point}" in str(fields["suspects"][0])
     if hypothesis.partition(" ")[0] in ("observation", "position", "image", "control-point"):

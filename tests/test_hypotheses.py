@@ -474,6 +474,16 @@ def test_an_exchanged_principal_point_is_named_in_close_range():
     assert named.code == "hypothesis.camera-exchanged"
 
 
+def test_bent_control_is_named_if_positions_contradict_it():
+    block = block_of("clean")
+    control, places = np.isfinite(block.point_sd).all(axis=1), block.point_positions.copy()
+    plan = places[control, :2] - places[control, :2].mean(axis=0)
+    places[control, 2] += 2.0 * (plan[:, 0] / np.abs(plan[:, 0]).max()) ** 2
+    verdict = adjust(block.replace(point_positions=places)).verdict
+    named = verdict.message.fields["errors"][0].fields["named"]
+    assert named.code == "hypothesis.control-bending"
+
+
 def test_the_next_photo_is_a_time_offset_by_the_way_to_it():
     result = adjust(block_of("clean"))
     ways = np.diff(result.photo_positions, axis=0)

@@ -65,7 +65,12 @@ DATUM = frozenset(
 Then sizes that these do not detect are graded, whatever their plausible size, unless check points exist:
 their differences show the error of the datum."""
 
-UNGRADED = frozenset({"attitude", "camera", "unknown", "bending", "camera-f-strip", "camera-f-half"})
+UNGRADED = frozenset(
+    {
+        *("attitude", "camera", "unknown", "bending", "control-bending"),
+        *("camera-f-strip", "camera-f-half"),
+    }
+)
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
 whose causes (terms of distortion) are hypotheses of their own; principal distances of a strip or a flight,
 which few cameras change."""

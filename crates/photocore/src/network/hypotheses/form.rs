@@ -30,12 +30,20 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, points: &[(usize, usize)]) {
     let half = |axis: usize| places.iter().map(|own| own.2[axis].abs()).fold(0.0, f64::max);
     if places.len() >= FEWEST && half(0) > 0.0 && half(1) > 0.0 {
         let halves = [half(0), half(1)];
-        let columns = catalogue.add(("bending", None), &["x2", "y2"], &[]);
-        for (seen, first, place) in &places {
-            for axis in 0..2 {
-                let height = (place[axis] / halves[axis]).powi(2);
-                catalogue.displace(*seen, first + 2, columns[axis], height);
+        let mut bend = |code, places: &[(Seen, usize, Vector3<f64>)]| {
+            let columns = catalogue.add((code, None), &["x2", "y2"], &[]);
+            for (seen, first, place) in places {
+                for axis in 0..2 {
+                    let height = (place[axis] / halves[axis]).powi(2);
+                    catalogue.displace(*seen, first + 2, columns[axis], height);
+                }
             }
+        };
+        bend("bending", &places);
+        // Control behind the positions, which may contradict it.
+        let of_control = &places[places.len() - points.len()..];
+        if (FEWEST..places.len()).contains(&of_control.len()) {
+            bend("control-bending", of_control);
         }
     }
 }
