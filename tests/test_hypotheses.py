@@ -78,7 +78,7 @@ def case(request):
         times=[],
         position_sets=[],
         control_sets=[],
-        readouts=[[0.0, 1 / camera["height"], -0.5]],
+        readouts=[[[0.0, 1 / camera["height"], -0.5]]],
         widths=[float(camera["width"])],
         checks=[],
         centre=[0.0, 0.0, 0.0],

@@ -1418,7 +1418,7 @@ class NetworkTrial:
         times: list[float],
         position_sets: list[int],
         control_sets: list[int | None],
-        readouts: list[list[float] | None],
+        readouts: list[list[list[float]]],
         widths: list[float],
         checks: list[int],
         centre: list[float] | None,
@@ -1439,7 +1439,8 @@ class NetworkTrial:
         position_sets, control_sets
             The set (strip, file) of the position of each photo, and of each control point; empty for none.
         readouts
-            For each camera a, b, c: the line x, y is read at a x + b y + c of the readout time, -1/2 to 1/2.
+            For each camera a, b, c if rows are read one after the other, and if columns are: image coordinates
+            x, y have the time a x + b y + c within the readout, -1/2 to 1/2.
         widths
             Width of the image of each camera in its unit; NaN if unknown.
         checks

@@ -46,7 +46,7 @@ MAX_UNCHECKED = 0.01  # share of image coordinates without a check from which mo
 MIN_REDUNDANCY = 0.2  # redundancy number of control below which more control is recommended
 REMEDIES = {
     **dict.fromkeys(("time-offset", "lever-arm", "gnss-drift", "boresight", "camera-point"), "strips"),
-    **dict.fromkeys(("camera-f", "camera-term", "readout-time"), "heights"),
+    **dict.fromkeys(("camera-f", "camera-term", "readout-time", "readout-time-columns"), "heights"),
 }
 """Observations that detect errors of these types; other types need points."""
 SHARE = (Axis("", "", small="percent", factor=100.0),)

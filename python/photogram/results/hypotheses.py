@@ -32,6 +32,7 @@ RARE = 0.1  # Plausible errors of a set that may remain undetected
 OF_CAMERAS = frozenset(
     {
         *("camera-f", "camera-f-single", "camera-point", "camera-term", "readout-time"),
+        "readout-time-columns",
         *("camera-affinity", "camera-radial", "camera-exchanged"),
     }
 )
@@ -68,12 +69,12 @@ their differences show the error of the datum."""
 UNGRADED = frozenset(
     {
         *("attitude", "camera", "unknown", "bending", "control-bending"),
-        *("camera-f-strip", "camera-f-half"),
+        *("camera-f-strip", "camera-f-half", "readout-time-columns"),
     }
 )
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
 whose causes (terms of distortion) are hypotheses of their own; principal distances of a strip or a flight,
-which few cameras change."""
+and a readout by columns, which few cameras have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +176,7 @@ class Hypotheses:
             **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
             **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
             **dict.fromkeys(("camera-affinity", "camera-radial", "distance-scale", *SHARES), ""),
-            **dict.fromkeys(("time-offset", "readout-time"), self.times),
+            **dict.fromkeys(("time-offset", "readout-time", "readout-time-columns"), self.times),
         }
         return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()
 
@@ -230,9 +231,10 @@ class Hypotheses:
 
     def _assumption(self, code: str) -> Phrase:
         """Return the source of the datum, with the error of its heights that check points detect."""
-        row = int(np.flatnonzero(self.code == code)[0])
-        if row not in self.relative:
+        rows = [row for row in np.flatnonzero(self.code == code).tolist() if row in self.relative]
+        if not rows:  # Also of control without heights
             return phrase(f"datum.{code}")
+        row = rows[0]
         size = DETECTED * math.sqrt(self.sets[row]["cofactors"][0])
         return phrase(f"datum.{code}.checks", size=f"{size:.2g}{self._unit(row)}")
 

@@ -393,11 +393,10 @@ def block_facts(block: Block, places: Floats) -> Facts:
     for axis, xy in enumerate(block.image_xy.T.copy()):
         np.minimum.at(low[:, axis], of_images[runs], np.minimum.reduceat(xy, runs))
         np.maximum.at(high[:, axis], of_images[runs], np.maximum.reduceat(xy, runs))
-    for camera, (width, height) in enumerate((high - low).tolist()):
+    for start, (width, height) in zip(low.tolist(), (high - low).tolist(), strict=True):
         facts["widths"].append(width if width > 0 else math.nan)
-        digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0
-        middle = float(low[camera, 1] + high[camera, 1]) / 2
-        facts["readouts"].append([0.0, 1 / height, -middle / height] if digital else None)
+        rows, columns = [0.0, 1 / height, -start[1] / height - 0.5], [1 / width, 0.0, -start[0] / width - 0.5]
+        facts["readouts"].append([rows, columns] if width > 0 and height > 0 else [])
     if block.geographic:
         return facts
     seconds = np.full(count, math.nan)

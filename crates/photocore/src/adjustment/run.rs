@@ -345,7 +345,8 @@ impl<'a> Run<'a, '_> {
                 let mut between = between(&mut *self.watch, Phase::Invert, locals);
                 adjustment.joint = linearized.joint(problem, joint, memory, self.threads, &mut between)?;
             }
-            adjustment.factor = self.requests.by_groups.and_then(|_| linearized.small_factor(&problem.system));
+            adjustment.factor =
+                self.requests.by_groups.and_then(|_| linearized.small_factor(&problem.system));
             let what =
                 InvertOptions { by_groups: self.requests.by_groups.is_some(), ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);

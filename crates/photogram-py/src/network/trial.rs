@@ -215,7 +215,7 @@ impl NetworkTrial {
         times: Vec<f64>,
         position_sets: Vec<Option<usize>>,
         control_sets: Vec<Option<usize>>,
-        readouts: Vec<Option<[f64; 3]>>,
+        readouts: Vec<Vec<[f64; 3]>>,
         widths: Vec<f64>,
         checks: Vec<usize>,
         centre: Option<[f64; 3]>,

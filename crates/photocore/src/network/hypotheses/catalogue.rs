@@ -73,11 +73,10 @@ pub(super) struct Catalogue<'a> {
     single: HashMap<EquationOf, Vec<(usize, f64)>>,
     /// Parameters of the camera of each photo, and their columns.
     pub(super) cameras: Vec<Vec<(usize, usize)>>,
-    /// Column of the readout time of the camera of each photo.
-    pub(super) shutters: Vec<Option<usize>>,
+    /// Columns of the readout times of the camera of each photo, with the times of image coordinates.
+    pub(super) shutters: Vec<Vec<(usize, [f64; 3])>>,
     /// Deformations of the images of each photo.
     pub(super) deformations: Vec<Option<Deformations>>,
-    pub(super) camera_of_photo: &'a [usize],
 }
 
 impl<'a> Catalogue<'a> {
@@ -98,9 +97,8 @@ impl<'a> Catalogue<'a> {
             fixed: HashMap::new(),
             single: HashMap::new(),
             cameras: vec![vec![]; photos],
-            shutters: vec![None; photos],
+            shutters: vec![vec![]; photos],
             deformations: vec![None; photos],
-            camera_of_photo: &trial.camera_of_photo,
         }
     }
 
@@ -234,7 +232,7 @@ impl AdditionalParameters for Catalogue<'_> {
     fn locals(&self) -> Option<Vec<usize>> {
         let cameras = self.cameras.iter().any(|own| !own.is_empty());
         let deformed = self.deformations.iter().any(Option::is_some);
-        if cameras || deformed || !self.fixed.is_empty() || self.shutters.iter().any(Option::is_some) {
+        if cameras || deformed || !self.fixed.is_empty() || self.shutters.iter().any(|own| !own.is_empty()) {
             return None;
         }
         let single = self.single.keys().filter_map(|of| match *of {

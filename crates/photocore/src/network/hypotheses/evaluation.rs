@@ -92,7 +92,10 @@ impl Trial {
                 plausible,
                 judged,
                 effect: None,
-                at_checks: (at_checks.columns(0, of_sets) * own.rows(0, of_sets)).transpose().as_slice().to_vec(),
+                at_checks: (at_checks.columns(0, of_sets) * own.rows(0, of_sets))
+                    .transpose()
+                    .as_slice()
+                    .to_vec(),
             });
             columns.push(own);
         }

@@ -13,8 +13,9 @@ pub struct Facts {
     pub position_sets: Vec<Option<usize>>,
     /// Set of control (file, standard deviation, day) of each point.
     pub control_sets: Vec<Option<usize>>,
-    /// For each camera the time of image coordinates x, y within the readout of the whole image, from -1/2 to 1/2: a x + b y + c.
-    pub readouts: Vec<Option<[f64; 3]>>,
+    /// For each camera the time of image coordinates x, y within the readout of the whole image, from -1/2 to 1/2: a x + b y + c, if rows
+    /// are read one after the other, and if columns are; fewer if impossible.
+    pub readouts: Vec<Vec<[f64; 3]>>,
     /// Width of the image of each camera, in its unit; NaN if unknown.
     pub widths: Vec<f64>,
     /// Check points, and other points whose changes are reported.

@@ -6,21 +6,26 @@ use crate::adjustment::Equation;
 
 /// Plausible readout time of a whole image, in units of time of the velocities.
 const READOUT: f64 = 0.1;
+/// Codes of the errors of a readout by rows, and by columns.
+const CODES: [&str; 2] = ["readout-time", "readout-time-columns"];
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     let facts = catalogue.facts;
     let moves = |photo: usize| {
         facts.velocities.get(photo).is_some_and(|velocity| velocity.iter().all(|value| value.is_finite()))
     };
-    for (camera, _) in facts.readouts.iter().enumerate().filter(|(_, readout)| readout.is_some()) {
+    for (camera, lines) in facts.readouts.iter().enumerate().filter(|(_, lines)| !lines.is_empty()) {
         let photos: Vec<usize> = (0..catalogue.bundle.cameras.len())
             .filter(|&photo| trial.camera_of_photo[photo] == camera && moves(photo))
             .collect();
         if photos.is_empty() {
             continue;
         }
-        let column = catalogue.add(("readout-time", Some(camera)), &["readout"], &[READOUT])[0];
-        photos.into_iter().for_each(|photo| catalogue.shutters[photo] = Some(column));
+        let add = |(code, &line): (&&'static str, &[f64; 3])| {
+            (catalogue.add((*code, Some(camera)), &["readout"], &[READOUT])[0], line)
+        };
+        let columns: Vec<(usize, [f64; 3])> = CODES.iter().zip(lines).map(add).collect();
+        photos.into_iter().for_each(|photo| catalogue.shutters[photo].clone_from(&columns));
     }
 }
 
@@ -34,13 +39,14 @@ impl Catalogue<'_> {
     ) {
         let observed = &self.bundle.images[image];
         let photo = observed.photo;
-        let Some(column) = self.shutters[photo] else { return };
-        let camera = self.camera_of_photo[photo];
-        let Some([a, b, c]) = self.facts.readouts[camera] else { return };
-        let time = a * observed.xy[0] + b * observed.xy[1] + c;
+        if self.shutters[photo].is_empty() {
+            return;
+        }
         let (first, velocity) = (self.bundle.of_block(photo).start, self.facts.velocities[photo]);
         let own = equation.coefficients().filter(|own| (first..first + 3).contains(&own.0));
         let change: f64 = own.map(|(unknown, value)| value * velocity[unknown - first]).sum();
-        put(partials, column, change * time);
+        for &(column, [a, b, c]) in &self.shutters[photo] {
+            put(partials, column, change * (a * observed.xy[0] + b * observed.xy[1] + c));
+        }
     }
 }
