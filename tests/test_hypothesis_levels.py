@@ -80,7 +80,9 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
             control_sets=[row % 2 for row in range(len(block.point_ids))],
             checks=[],
             velocities=np.array(GOLDEN["velocity"])[:photos],
-            readouts=[[[0.0, 1 / GOLDEN["camera"]["height"], -0.5], [1 / GOLDEN["camera"]["width"], 0.0, -0.5]]],
+            readouts=[
+                [[0.0, 1 / GOLDEN["camera"]["height"], -0.5], [1 / GOLDEN["camera"]["width"], 0.0, -0.5]]
+            ],
             widths=[float(GOLDEN["camera"]["width"])],
             centre=[0.0, 0.0, 0.0],
             estimated=None if known else (omega, freedom),

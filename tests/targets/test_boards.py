@@ -98,7 +98,11 @@ def test_board_toml(tmp_path):
     ("text", "record", "said"),
     [
         ("columns = 9\nrow = 6\n", 2, "error.unknown.close kind=key name=row close=rows"),
-        ("columns = 9.5\nrows = 6\nspacing = 1\n", 1, "error.at what=columns message=error.whole-range value=9.5"),
+        (
+            "columns = 9.5\nrows = 6\nspacing = 1\n",
+            1,
+            "error.at what=columns message=error.whole-range value=9.5",
+        ),
         (
             "columns = 9\nrows = 6\nspacing = 'wide'\n",
             3,

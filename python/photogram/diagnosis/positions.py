@@ -5,7 +5,8 @@
     a wrong lever arm                                           C + A (l + d)
     positions of another time                                   C + A l + tau dC/dt
 
-The likeliest errors of the catalogue (:mod:`photogram.results.hypotheses`) are proposals with their estimates.
+The likeliest errors of the catalogue (:mod:`photogram.results.hypotheses`) are proposals, with their
+estimates.
 """
 
 from __future__ import annotations
