@@ -1439,8 +1439,8 @@ class NetworkTrial:
         position_sets, control_sets
             The set (strip, file) of the position of each photo, and of each control point; empty for none.
         readouts
-            For each camera a, b, c if rows are read one after the other, and if columns are: x, y have the time
-            a x + b y + c within the readout, -1/2 to 1/2.
+            For each camera a, b, c if rows are read one after the other, and if columns are. The time of x, y
+            within the readout is a x + b y + c, -1/2 to 1/2.
         widths
             Width of the image of each camera in its unit; NaN if unknown.
         checks

@@ -299,7 +299,8 @@ class Hypotheses:
         likely = np.flatnonzero(odds > odds[first] - math.log(ALTERNATIVES))
         likely = likely[np.argsort(-odds[likely], kind="stable")]
         groups = np.where(self.group < 0, -1 - np.arange(len(odds)), self.group)[likely]
-        return likely[np.sort(np.unique(groups, return_index=True)[1])].tolist()
+        once = np.sort(np.unique(groups, return_index=True)[1])
+        return [int(row) for row in likely[once]]
 
     def _size(self, row: int) -> str:
         """Return the estimate of a set with its standard deviation; the largest of several."""

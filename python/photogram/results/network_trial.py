@@ -393,10 +393,12 @@ def block_facts(block: Block, places: Floats) -> Facts:
     for axis, xy in enumerate(block.image_xy.T.copy()):
         np.minimum.at(low[:, axis], of_images[runs], np.minimum.reduceat(xy, runs))
         np.maximum.at(high[:, axis], of_images[runs], np.maximum.reduceat(xy, runs))
-    for start, (width, height) in zip(low.tolist(), (high - low).tolist(), strict=True):
+    for (left, top), (width, height) in zip(low.tolist(), (high - low).tolist(), strict=True):
         facts["widths"].append(width if width > 0 else math.nan)
-        rows, columns = [0.0, 1 / height, -start[1] / height - 0.5], [1 / width, 0.0, -start[0] / width - 0.5]
-        facts["readouts"].append([rows, columns] if width > 0 and height > 0 else [])
+        lines = []
+        if width > 0 and height > 0:
+            lines = [[0.0, 1 / height, -top / height - 0.5], [1 / width, 0.0, -left / width - 0.5]]
+        facts["readouts"].append(lines)
     if block.geographic:
         return facts
     seconds = np.full(count, math.nan)

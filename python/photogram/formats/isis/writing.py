@@ -32,8 +32,9 @@ from photogram.formats.isis.network import (
 )
 from photogram.formats.isis.outcome import Image, Outcome, contents_of
 from photogram.formats.project import Project
-from photogram.io.json import Tree, read_json
+from photogram.io.json import read_json
 from photogram.io.pvl import Group, Value, label_text
+from photogram.io.tree import Tree
 from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.result import Result
 from photogram.results.trajectories import AdjustedTrajectory
