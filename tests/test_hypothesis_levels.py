@@ -19,7 +19,7 @@ CATALOGUE = frozenset(
         *("control-rotation", "gnss-heights", "gnss-shift", "gnss-set", "gnss-drift", "time-offset"),
         *("lever-arm", "boresight", "camera-f", "camera-point", "camera-term", "readout-time", "scale"),
         *("bending", "observation", "gnss-next", "gnss-previous", "camera-affinity", "camera-f-strip"),
-        *("camera-f-half", "camera-exchanged", "control-bending"),
+        *("camera-f-half", "camera-exchanged", "control-bending", "readout-time-columns"),
     }
 )
 """Codes of all hypotheses that the golden network with observed attitudes permits."""

@@ -32,16 +32,20 @@ SCANNED = ("pushbroom_strips", "three_line", "planetary_pair", "jitter")
 # A rolling shutter taken for a global one
 
 
-@pytest.mark.parametrize("direction", ["down", "up"])
-def test_a_rolling_shutter(direction):
+@pytest.mark.parametrize("millimetres", [False, True])
+@pytest.mark.parametrize(
+    ("direction", "code"),
+    [("down", "readout-time"), ("up", "readout-time"), ("right", "readout-time-columns")],
+)
+def test_a_rolling_shutter(direction, code, millimetres):
     """What its residuals were blamed for was the lens."""
-    block = flown_frames(direction=direction)
+    block = flown_frames(direction=direction, millimetres=millimetres)
     verdict = adjust(block).verdict
     assert (verdict.code, verdict.exit) == ("common-error", 4)
-    assert "hypothesis.readout-time" in nested_codes(verdict.message)
+    assert f"hypothesis.{code}" in nested_codes(verdict.message)
     (found,) = diagnose(block).grave
     assert found.kind == "common-error"
-    assert "hypothesis.readout-time" in nested_codes(found)
+    assert f"hypothesis.{code}" in nested_codes(found)
 
 
 # What is given of a shutter

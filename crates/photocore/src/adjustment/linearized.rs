@@ -119,8 +119,8 @@ impl Linearized {
     }
 
     /// A copy of the factor for hypotheses, unless it is large.
-    pub(super) fn small_factor(&self, system: &System) -> Option<(Factor, Prior)> {
-        system.copies_factor().then(|| (self.factor.clone(), self.prior.clone()))
+    pub(super) fn small_factor(&self, system: &System, threads: &Threads) -> Option<(Factor, Prior)> {
+        system.copies_factor().then(|| (threads.install(|| self.factor.clone()), self.prior.clone()))
     }
 
     /// A factor at the values of a negligible step later.

@@ -346,7 +346,7 @@ impl<'a> Run<'a, '_> {
                 adjustment.joint = linearized.joint(problem, joint, memory, self.threads, &mut between)?;
             }
             adjustment.factor =
-                self.requests.by_groups.and_then(|_| linearized.small_factor(&problem.system));
+                self.requests.by_groups.and_then(|_| linearized.small_factor(&problem.system, self.threads));
             let what =
                 InvertOptions { by_groups: self.requests.by_groups.is_some(), ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);

@@ -8,14 +8,27 @@ use faer::Mat;
 
 use super::layout::LayoutError;
 use super::symbolic::Symbolic;
-use crate::parallel::lock;
+use crate::parallel::{each_chunk, lock};
+
+/// Number of values that a thread copies at once.
+const COPIED: usize = 1 << 18;
 
 /// Lower triangle of a symmetric matrix in the pattern of a factor: one column-major panel per supernode. The strict upper triangle of the
 /// eliminated blocks in a panel is undefined.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Panels {
     pub symbolic: Arc<Symbolic>,
     pub values: Vec<f64>,
+}
+
+impl Clone for Panels {
+    /// Copies the values by all threads of the pool.
+    fn clone(&self) -> Self {
+        let mut values = vec![0.0; self.values.len()];
+        let copy = |k: usize, own: &mut [f64]| own.copy_from_slice(&self.values[k * COPIED..][..own.len()]);
+        each_chunk(&mut values, COPIED, &copy);
+        Self { symbolic: Arc::clone(&self.symbolic), values }
+    }
 }
 
 impl Panels {
