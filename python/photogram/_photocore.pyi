@@ -992,7 +992,7 @@ def is_chord(chord: float, change: float) -> bool:
     """Return whether to take a chord of this length after a full step with this change."""
 
 def step_rules() -> dict[str, float]:
-    """Return the constants of the step rules for one process, by name; see `adjustment/damped.rs`."""
+    """Return the constants of the step rules for one process, by name; see `adjustment/steps.rs`."""
 
 @final
 class Node:

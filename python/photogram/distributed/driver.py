@@ -1,6 +1,6 @@
 """Iterations of a partitioned adjustment: up the tree, down the tree, and step control.
 
-Steps and rules are the same as in one process (`crates/photocore/src/adjustment/damped.rs`). Full steps are
+Steps and rules are the same as in one process (`crates/photocore/src/adjustment/steps.rs`). Full steps are
 tried first; a step that raises the sum of squares is undone and damped. The length of steps or their rate of
 decrease indicates the last one. All decisions use sums over the nodes, added in the order of their numbers.
 """

@@ -6,8 +6,10 @@
 //!
 //! * A chord N_k^-1 A^T l, with A and l formed at the new values, converges as fast as the next full step. It only needs normal matrices of
 //!   the local blocks, but not a new factor (Kelley 1995, "Iterative Methods for Linear and Nonlinear Equations", chapter 5).
-//! * If S is as large as N along a combination of unknowns, steps oscillate across the solution; Anderson acceleration ([`super::secants`])
-//!   combines several steps.
+//! * If S is as large as N along a combination of unknowns, steps oscillate across the solution. An example is a spline lens whose distortion
+//!   is nearly equivalent to attitudes. Anderson acceleration combines several steps (Anderson 1965; Walker and Ni 2011, "Anderson
+//!   acceleration for fixed-point iterations"). Two successive steps, the first applied as s, have the difference d = -N^-1 (N + S) s. With
+//!   coefficients c that minimise p - sum c d in the metric of N, the accelerated step is p - sum c (s + d).
 //! * Chains of chords with one factor are accelerated in the same way. With N = L L^T, a chord p is computed from y = L^-1 A^T l, and
 //!   y^T y' equals p^T N p', so that no pass over the observations is required.
 //! * Steps of a trust region have a second-order term (Transtrum and Sethna 2012, "Improvements to the Levenberg-Marquardt algorithm for
@@ -18,16 +20,16 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-use super::damped::ROUNDING;
 use super::equations::ObservationEquations;
 use super::options::{History, Iteration, NEGLIGIBLE, Phase, Stop};
+use super::problem::Evaluated;
 use super::result::AdjustError;
 use super::run::{Iterate, Run, between};
-use super::secants::Secants;
 use super::statistics::weighted;
-use crate::normals::{Chord, dot};
+use super::steps::{BENDS, Control, ROUNDING};
+use crate::normals::{Chord, SolveOptions, dot};
 
 /// Minimum ratio of two successive step lengths for acceleration, which continues for all later steps.
 const SLOW: f64 = 0.5;
@@ -45,29 +47,48 @@ const MOST_CHORDS: usize = 40;
 /// Number of chords, and the ratio that their lengths must fall below; otherwise new normal equations are more effective.
 const LONG: usize = 10;
 const FALL: f64 = 0.5;
+/// Number of fractions of a full step along a valley, each half of its predecessor,
+const VALLEY_PARTS: usize = 4;
+/// damping of the steps back to the floor of the valley, which restrains only weakly determined combinations,
+const HOLDING: f64 = 1e-6;
+/// and maximum number of these steps per fraction.
+const BACK: usize = 3;
+/// Minimum ratio of actual to predicted decrease for an accepted fraction. With a poor prediction, the standard deviation of the combination
+/// is not a measure of the step.
+const GAIN: f64 = 0.5;
 /// Fraction h of the step at which residuals are compared with their linearization.
 const PART: f64 = 0.1;
+/// Relative singular value below which differences are linearly dependent.
+const ALIKE: f64 = 1e-6;
 
-/// Full step after acceleration.
-pub(super) struct Accelerated<'s> {
+/// Step after acceleration.
+pub(super) struct Accelerated<'s, 'a> {
     /// The step, accelerated or shortened if useful, with its record.
     pub step: Cow<'s, [f64]>,
     pub iteration: Iteration,
-    /// Values after the step and its chords.
+    /// Values after the step and its chords or second-order term,
     pub values: Vec<f64>,
+    /// and the model there with its objective, if evaluated.
+    pub evaluated: Option<(Box<dyn Evaluated + 'a>, f64)>,
     /// Whether the step makes too many groups leave the layout.
     pub outgrown: bool,
+    /// Ratio of the second-order term to the step, if computed.
+    pub bend: Option<f64>,
 }
 
 impl<'a> Run<'a, '_> {
-    /// Accelerates a step, and follows it by chords that lower the sum of squares `best`.
+    /// Accelerates a step. A full step is followed by chords that lower the sum of squares; a damped one receives its second-order term.
     pub(super) fn accelerated<'s>(
         &mut self,
         state: &Iterate<'a>,
         step: &'s [f64],
         iteration: Iteration,
-        (best, stop): (f64, Stop),
-    ) -> Result<Accelerated<'s>, AdjustError> {
+        predicted: f64,
+        control: &Control,
+    ) -> Result<Accelerated<'s, 'a>, AdjustError> {
+        if control.bends {
+            return self.bent(state, step, iteration, predicted);
+        }
         let followed = self.is_followed(state, &iteration);
         let corrected = self.corrected(state, step, &iteration, followed);
         let (step, iteration) = match corrected {
@@ -77,21 +98,81 @@ impl<'a> Run<'a, '_> {
         let ahead = self.problem.advanced(state.values(), &step);
         let outgrown = self.is_outgrown(&iteration, followed, &ahead);
         let values = if followed && !outgrown {
-            let found = self.followed(state, ahead.clone(), (best, stop))?;
+            let found = self.followed(state, ahead.clone(), (control.best, control.stop))?;
             self.chord = found.as_ref().map(|&(_, length)| length);
             found.map_or(ahead, |(values, _)| values)
         } else {
             self.stepped(state, ahead, &iteration)?
         };
-        Ok(Accelerated { step, iteration, values, outgrown })
+        Ok(Accelerated { step, iteration, values, evaluated: None, outgrown, bend: None })
+    }
+
+    /// Adds the second-order term to a damped step in a curved valley; returns the plain step if that gains more.
+    fn bent<'s>(
+        &mut self,
+        state: &Iterate<'a>,
+        step: &'s [f64],
+        iteration: Iteration,
+        predicted: f64,
+    ) -> Result<Accelerated<'s, 'a>, AdjustError> {
+        let (term, square) = self.second_order(state, step)?;
+        let along: Vec<f64> = step.iter().zip(&term).map(|(v, a)| v + 0.5 * a).collect();
+        let (mut values, mut evaluated) = self.tried(state, &along);
+        let gain = (iteration.sum_of_squares - evaluated.1) / predicted;
+        if gain.is_nan() || gain < BENDS {
+            let plain = self.tried(state, step);
+            if evaluated.1.is_nan() || plain.1.1 <= evaluated.1 {
+                (values, evaluated) = plain;
+            }
+        }
+        let bend = Some(square.max(0.0).sqrt() / iteration.largest_change);
+        let (step, evaluated) = (Cow::Borrowed(step), Some(evaluated));
+        Ok(Accelerated { step, iteration, values, evaluated, outgrown: false, bend })
+    }
+
+    /// Follows a failed full step along a valley: a fraction of the step, then steps back to the floor with a damping that preserves the
+    /// combination. Returns the values and the sum of squares there; None if all fractions fail.
+    ///
+    /// Example: principal distance and flying height of a flat block. Their change leaves the residuals unchanged if points and attitudes
+    /// follow it along a curve. Steps with arbitrary damping would cross the valley repeatedly and creep.
+    pub(super) fn along_valley(
+        &mut self,
+        unknowns: &[f64],
+        step: &[f64],
+        &Iteration { largest_change: change, sum_of_squares: best, .. }: &Iteration,
+    ) -> Result<Option<(Vec<f64>, f64)>, AdjustError> {
+        let mut part = 1.0;
+        for _ in 0..VALLEY_PARTS {
+            let own: Vec<f64> = step.iter().map(|value| part * value).collect();
+            let mut values = self.problem.advanced(unknowns, &own);
+            let predicted = part * (2.0 - part) * change * change;
+            for _ in 0..BACK {
+                let state = self.form(values, HOLDING)?;
+                let sum = state.linearized.sum_of_squares;
+                if !(sum.is_finite() && state.linearized.factor.deficient_locals.is_empty()) {
+                    break;
+                }
+                let Some(step) = self.step(&state)? else { break };
+                values = self.problem.advanced(&state.recycle(), &step);
+                let sum = self.objective(&values);
+                if best - sum >= GAIN * predicted {
+                    return Ok(Some((values, sum)));
+                }
+            }
+            part /= 2.0;
+        }
+        Ok(None)
+    }
+
+    /// Returns the values after a step, with the model there and its objective.
+    fn tried(&self, state: &Iterate<'a>, step: &[f64]) -> (Vec<f64>, (Box<dyn Evaluated + 'a>, f64)) {
+        let values = self.problem.advanced(state.values(), step);
+        let evaluated = self.evaluated(&values);
+        (values, evaluated)
     }
 
     /// Returns the second-order term a of a step, and a^T (N + damping) a. The few ties are regarded as linear.
-    pub(super) fn second_order(
-        &mut self,
-        state: &Iterate<'a>,
-        step: &[f64],
-    ) -> Result<(Vec<f64>, f64), AdjustError> {
+    fn second_order(&mut self, state: &Iterate<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
         let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
         let (equations, layout) = (&state.equations, self.problem.layout());
@@ -103,7 +184,7 @@ impl<'a> Run<'a, '_> {
                 false => 0.0,
             };
         });
-        let term = self.solve_again(state, &right)?;
+        let term = self.solved(state, SolveOptions { rights: Some(&right), ..SolveOptions::default() })?;
         let square = right.iter().zip(&term).map(|(right, value)| right * value).sum();
         Ok((term, square))
     }
@@ -145,7 +226,7 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Whether a step is hardly shorter than its predecessor.
-    pub(super) fn is_slow(&self, step: &Iteration) -> bool {
+    fn is_slow(&self, step: &Iteration) -> bool {
         self.iterations.last().is_some_and(|former| step.largest_change >= SLOW * former.largest_change)
     }
 
@@ -344,4 +425,59 @@ fn falls(lengths: &[f64]) -> bool {
 /// Returns the elementwise difference.
 fn minus(to: &[f64], from: &[f64]) -> Vec<f64> {
     to.iter().zip(from).map(|(to, from)| to - from).collect()
+}
+
+/// History of full steps for Anderson acceleration.
+#[derive(Debug, Default)]
+pub(super) struct Secants {
+    /// Last step from the equations, and the values before it.
+    pub last: Option<(Vec<f64>, Vec<f64>)>,
+    /// Applied steps, each with the resulting change of the step; empty during fast convergence.
+    pub pairs: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Secants {
+    /// Stores a full step and the values before it.
+    pub fn remember(&mut self, step: Vec<f64>, before: Vec<f64>) {
+        self.last = Some((step, before));
+    }
+
+    /// Whether steps are accelerated.
+    pub fn correct(&self) -> bool {
+        !self.pairs.is_empty()
+    }
+
+    /// Stores an applied step and the resulting change of the step; at most `most` pairs are stored.
+    pub fn keep(&mut self, taken: Vec<f64>, difference: Vec<f64>, most: usize) {
+        self.pairs.drain(..(self.pairs.len() + 1).saturating_sub(most));
+        self.pairs.push((taken, difference));
+    }
+
+    /// Returns the accelerated step: a linear combination of [`Secants::all`].
+    pub fn corrected(&self, step: &[f64], shares: &DVector<f64>) -> Vec<f64> {
+        let mut own = vec![0.0; step.len()];
+        for (each, share) in self.all(step).into_iter().zip(shares) {
+            own.iter_mut().zip(each).for_each(|(sum, value)| *sum += share * value);
+        }
+        own
+    }
+
+    /// Returns the step, the differences and the applied steps.
+    pub fn all<'s>(&'s self, step: &'s [f64]) -> Vec<&'s [f64]> {
+        let differences = self.pairs.iter().map(|(_, difference)| &difference[..]);
+        let taken = self.pairs.iter().map(|(taken, _)| &taken[..]);
+        std::iter::once(step).chain(differences).chain(taken).collect()
+    }
+
+    /// Returns the coefficients of the accelerated step in [`Secants::all`], from the products of these vectors.
+    pub fn shares(&self, products: &DMatrix<f64>) -> Option<DVector<f64>> {
+        let count = self.pairs.len();
+        let scale = DVector::from_fn(count, |i, _| products[(i + 1, i + 1)].sqrt().recip());
+        let unit = DMatrix::from_fn(count, count, |i, j| products[(i + 1, j + 1)] * scale[i] * scale[j]);
+        let right = DVector::from_fn(count, |i, _| -products[(i + 1, 0)] * scale[i]);
+        let found = unit.svd(true, true).solve(&right, ALIKE).ok()?.component_mul(&scale);
+        let shares = std::iter::once(1.0).chain(found.iter().chain(&found).copied());
+        let shares = DVector::from_iterator(2 * count + 1, shares);
+        shares.iter().all(|share| share.is_finite()).then_some(shares)
+    }
 }

@@ -4,6 +4,9 @@
 
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+use smallvec::SmallVec;
+
 use super::loss::Reweighting;
 use super::problem::{AnyProblem, Evaluated};
 use super::terms::Terms;
@@ -271,6 +274,41 @@ impl<'a> ObservationEquations<'a> {
         rights
     }
 
+    /// Returns the products u^T N v of all pairs of steps, with priors in N.
+    pub fn products(&self, threads: &Threads, prior: &Prior, steps: &[&[f64]]) -> DMatrix<f64> {
+        let zeros = || DMatrix::<f64>::zeros(steps.len(), steps.len());
+        let add = |sum: &mut DMatrix<f64>, weight: f64, u: &[f64], v: &[f64]| {
+            for (j, v) in v.iter().enumerate() {
+                sum.column_mut(j).iter_mut().zip(u).for_each(|(sum, u)| *sum += weight * u * v);
+            }
+        };
+        // Stored by unknown.
+        let unknowns = 0..steps.first().map_or(0, |step| step.len());
+        let turned: Vec<f64> = unknowns.flat_map(|k| steps.iter().map(move |step| step[k])).collect();
+        let of_unknown = |unknown: usize| &turned[unknown * steps.len()..][..steps.len()];
+        let changes = |taken: &mut dyn Iterator<Item = (usize, f64)>| {
+            let mut changes = SmallVec::<[f64; 16]>::from_elem(0.0, steps.len());
+            taken.for_each(|(k, a)| {
+                changes.iter_mut().zip(of_unknown(k)).for_each(|(sum, change)| *sum += a * change);
+            });
+            changes
+        };
+        let observed = self.fold_rows(threads, zeros, |sum, row| {
+            let own = changes(&mut row.taken());
+            add(sum, 1.0, &own, &own);
+        });
+        let mut sum = observed.into_iter().fold(zeros(), |sum, part| sum + part);
+        for (unknown, &weight) in prior.weight.iter().enumerate().filter(|&(_, &weight)| weight != 0.0) {
+            let own = of_unknown(unknown);
+            add(&mut sum, weight, own, own);
+        }
+        for &(i, j, weight) in &prior.between {
+            let (own, other) = (of_unknown(i), of_unknown(j));
+            add(&mut sum, weight, own, other);
+            add(&mut sum, weight, other, own);
+        }
+        sum
+    }
     /// Returns the decrease of the weighted sum of squares of equations and priors by a step: sum of Ax (2 l - Ax).
     pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
         let add = |sum: &mut f64, row: &Row<'_>| {

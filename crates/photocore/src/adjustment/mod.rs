@@ -62,9 +62,9 @@
 mod acceleration;
 mod additional;
 mod alone;
-mod damped;
 mod datum;
 mod distributions;
+mod end;
 mod ended;
 mod equations;
 mod group_test;
@@ -77,19 +77,18 @@ mod observation_rows;
 mod options;
 mod part;
 mod problem;
+mod published;
 mod result;
 mod run;
-mod secants;
 mod statistics;
+mod steps;
 mod terms;
 mod traces;
 mod transformation;
-mod trust_region;
 mod walk;
 
 pub use additional::{Additional, AdditionalParameters, Equation, EquationOf, Shared};
 pub use alone::Alone;
-pub use damped::step_rules;
 pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
@@ -114,6 +113,7 @@ pub use run::go_on;
 pub use run::{Requests, Watch, adjust, adjust_with};
 pub(crate) use statistics::weighted;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
+pub use steps::step_rules;
 pub use terms::Terms;
 pub use traces::{EquationGroups, GroupSquares, Probing};
 pub use transformation::DatumOfPart;

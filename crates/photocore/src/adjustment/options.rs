@@ -92,9 +92,6 @@ pub enum Method {
     TrustRegion(Stop),
 }
 
-/// Damping of the first step in a trust region.
-pub(super) const FIRST_DAMPING: f64 = 1e-4;
-
 impl Default for Method {
     /// Full steps, damped after failures, converged to 1e-5 standard deviations.
     fn default() -> Self {

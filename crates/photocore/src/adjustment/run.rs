@@ -3,14 +3,16 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use super::acceleration::Secants;
 use super::datum::{Adjusted, Basis, Datum, moved};
+use super::end::End;
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
 use super::loss::Reweighting;
-use super::options::{Event, FIRST_DAMPING, Iteration, Method, Options, Phase, Status, leaves_cofactors};
+use super::options::{Event, Iteration, Method, Options, Phase, leaves_cofactors};
 use super::problem::{AnyProblem, Evaluated, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
-use super::secants::Secants;
+use super::steps::{AFTER_FAILURES, ALWAYS};
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 use crate::{Stopped, Threads};
 
@@ -94,7 +96,7 @@ pub fn adjust_with(
         collapsed: vec![],
     };
     let damping = match options.method {
-        Method::TrustRegion(_) => FIRST_DAMPING,
+        Method::TrustRegion(_) => ALWAYS.first,
         Method::Full(_) | Method::Damped(_) => {
             run.datum = problem.to_hold(&problem.initial, threads);
             0.0
@@ -107,8 +109,8 @@ pub fn adjust_with(
     }
     let end = match options.method {
         Method::Full(rule) => run.full_steps(start, rule)?,
-        Method::Damped(stop) => run.damped_steps(start, stop)?,
-        Method::TrustRegion(stop) => run.in_trust_region(start, stop)?,
+        Method::Damped(stop) => run.controlled_steps(start, stop, &AFTER_FAILURES)?,
+        Method::TrustRegion(stop) => run.controlled_steps(start, stop, &ALWAYS)?,
     };
     run.finish(end, initial_sum_of_squares)
 }
@@ -145,36 +147,6 @@ impl Iterate<'_> {
     }
 }
 
-/// Final state of the iterations, without cofactors if the final values leave unknowns undetermined.
-pub(super) struct End<'a> {
-    pub status: Status,
-    pub unknowns: Vec<f64>,
-    /// Linearization for the cofactors.
-    pub state: Option<Iterate<'a>>,
-    /// Reason for a missing linearization.
-    pub undetermined: Option<AdjustError>,
-    /// Last iteration and its step, not applied yet; cofactors refer to the values before it.
-    pub last: Option<(Iteration, Vec<f64>)>,
-}
-
-impl<'a> End<'a> {
-    /// Ends at given values, without cofactors.
-    pub fn at(status: Status, unknowns: Vec<f64>) -> Self {
-        Self { status, unknowns, state: None, undetermined: None, last: None }
-    }
-
-    /// Ends at the values of a linearization, with cofactors.
-    pub fn with(status: Status, state: Iterate<'a>) -> Self {
-        let unknowns = state.values().to_vec();
-        Self { state: Some(state), ..Self::at(status, unknowns) }
-    }
-
-    /// Ends after one more step, with cofactors from the equations before it.
-    pub fn after(status: Status, state: Iterate<'a>, step: Vec<f64>, iteration: Iteration) -> Self {
-        Self { last: Some((iteration, step)), ..Self::with(status, state) }
-    }
-}
-
 pub(super) struct Run<'a, 'w> {
     pub problem: &'a AnyProblem<'a>,
     pub options: &'a Options,
@@ -205,17 +177,6 @@ pub(super) struct Run<'a, 'w> {
 }
 
 impl<'a> Run<'a, '_> {
-    /// Ends at the current values without another step. Cofactors belong to the reweighted equations without second-order term, because
-    /// their weights can be reported.
-    pub(super) fn stay(&mut self, state: Iterate<'a>, status: Status) -> Result<End<'a>, AdjustError> {
-        let plain = state.linearized.damping() == 0.0 && !state.linearized.is_curved();
-        self.curved = false;
-        let state = if plain { state } else { self.form(state.recycle(), 0.0)? };
-        let Some(error) = state.linearized.undetermined() else { return Ok(End::with(status, state)) };
-        let status = if status == Status::Converged { status } else { Status::Diverged };
-        Ok(End { undetermined: Some(error), ..End::at(status, state.recycle()) })
-    }
-
     /// Computes the step; None if an earlier step led to values that leave unknowns undetermined. An error if the initial values already
     /// do.
     pub(super) fn step(&mut self, state: &Iterate<'a>) -> Result<Option<Vec<f64>>, AdjustError> {
@@ -224,23 +185,17 @@ impl<'a> Run<'a, '_> {
             Some(error) => return Err(error),
             None => {}
         }
-        let start = Instant::now();
-        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
-        let step =
-            state.linearized.solve(&state.equations, &SolveOptions::default(), self.threads, &mut between)?;
-        self.seconds.solve += start.elapsed().as_secs_f64();
-        Ok(Some(step))
+        self.solved(state, SolveOptions::default()).map(Some)
     }
 
-    /// Solves the same equations for another right-hand side.
-    pub(super) fn solve_again(
+    /// Computes the step, or solves the same equations for the right-hand sides in the options.
+    pub(super) fn solved(
         &mut self,
         state: &Iterate<'a>,
-        right: &[f64],
+        options: SolveOptions<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
-        let options = SolveOptions { rights: Some(right), ..SolveOptions::default() };
         let found = state.linearized.solve(&state.equations, &options, self.threads, &mut between)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(found)
@@ -368,18 +323,6 @@ impl<'a> Run<'a, '_> {
             collapsed: self.collapsed,
             ..adjustment
         })
-    }
-
-    /// Whether a step made local blocks ill-conditioned; stores them.
-    pub(super) fn has_collapsed(&mut self, before: &[f64], after: &dyn Evaluated) -> bool {
-        self.collapsed = self.threads.install(|| after.collapsed(before));
-        !self.collapsed.is_empty()
-    }
-
-    /// Whether a step made local blocks diverge; stores them.
-    pub(super) fn has_run_off(&mut self, before: &[f64], after: &dyn Evaluated) -> bool {
-        self.collapsed = self.threads.install(|| after.run_off(before));
-        !self.collapsed.is_empty()
     }
 
     /// Stores and reports an accepted iteration with its corrections.

@@ -1,0 +1,487 @@
+//! Levenberg-Marquardt iterations: full Gauss-Newton steps (damping 0) that are damped after failures, or damped steps from the start
+//! (Nielsen 1999; Madsen, Nielsen and Tingleff 2004, section 3.2).
+//!
+//! For the step dx and the normal matrix N, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz). The predicted decrease of the sum of squares by a
+//! full step is dx^T N dx. Its root bounds every correction in standard deviations, without an inverse.
+//!
+//! A full step seldom fails, so that the normal equations are formed at its end, and their sum of squares decides. If every step is damped,
+//! it is judged by the residuals at its end. Full steps that fail repeatedly do not converge: the neglected term, residuals times second derivatives,
+//! dominates a combination of unknowns. From then on every step is damped, and a full step at the end confirms convergence.
+
+use std::ops::ControlFlow;
+
+use super::end::End;
+use super::options::{Iteration, NEGLIGIBLE, Status, Stop};
+use super::problem::Evaluated;
+use super::result::AdjustError;
+use super::run::{Iterate, NEAR, Run};
+
+/// Relative increase of the sum of squares that is accepted as rounding error.
+pub(super) const ROUNDING: f64 = 1e-12;
+/// Relative predicted decrease of the sum of squares by a damped step, and its change in standard deviations, that count as rounding error.
+const DAMPED_ROUNDING: f64 = 1e-14;
+const DAMPED_NEGLIGIBLE: f64 = 1e-6;
+/// Maximum decrease of the sum of squares between two failures of full steps that counts as stagnation, as a multiple of the variance of
+/// unit weight. It corresponds to 0.01 standard deviations of a combination of unknowns.
+const STILL: f64 = 1e-4;
+/// Minimum mean change, in standard deviations, for a recomputation of local unknowns instead of their linearization.
+const FAR: f64 = 30.0;
+/// Reciprocal of the fraction of groups that may leave the layout before convergence.
+const FEW: usize = 20;
+/// Maximum change, in standard deviations, after which groups must not leave the layout: missing columns are detected before the last
+/// steps.
+const SETTLED: f64 = 0.1;
+/// Maximum change, in standard deviations, of a failed full step in a valley: its combination is determined so weakly that the other
+/// unknowns change nonlinearly along it.
+const VALLEY: f64 = 30.0;
+/// Maximum number of steps along a valley in an adjustment; afterwards their unknowns are reported.
+const MOST_ALONG: usize = 8;
+/// Maximum number of failed full steps; after more failures every step is damped.
+const MOST_FAILURES: usize = 4;
+
+/// Minimum ratio of actual to predicted decrease for an accepted damped step.
+const LEAST_GAIN: f64 = 1e-3;
+/// Gain ratio below which damped steps are accelerated,
+pub(super) const BENDS: f64 = 0.75;
+/// and size of the second-order term, relative to the step in the metric of the normal equations, below which they are not.
+const STRAIGHT: f64 = 0.1;
+/// Maximum damping: the step is parallel to the gradient and must lower the sum of squares if any step does.
+pub(super) const MOST_DAMPING: f64 = 1e9;
+
+/// Number of damped steps for the test of stagnation, and minimum ratio of the last decrease to the first. Stagnation: their total decrease
+/// is less than required of one step. Such steps follow an undetermined combination at any damping.
+const CREEPING: usize = 50;
+const FALLING: f64 = 0.1;
+/// Number of steps for networks, and the insignificant total decrease as a multiple of the variance of unit weight: about a fifth of a
+/// standard deviation.
+const CREEPING_IN_NETWORKS: usize = 12;
+const LITTLE: f64 = 0.05;
+/// Minimum number of local blocks of a network, whose damped steps may be accelerated and stopped at stagnation. Valleys of small problems
+/// may be long (Eckerle4 of NIST's problems, from its first start), but those in networks are short.
+const NETWORK: usize = 16;
+/// Maximum change of a short step, in standard deviations.
+pub(super) const SHORT: f64 = 1.0;
+
+/// Damping, as a fraction of the diagonal of the normal matrix.
+pub(super) struct Damping {
+    /// Damping of the first damped step.
+    pub first: f64,
+    /// Limit below which damping is replaced by `floor`.
+    least: f64,
+    floor: f64,
+    /// Factor after a failure, and its growth with each further failure in sequence.
+    rise: f64,
+    growth: f64,
+    /// Factor after a success, as a function of the gain: the ratio of actual to predicted decrease.
+    fall: fn(f64) -> f64,
+}
+
+/// Damping after failures of full steps: zero as soon as possible.
+pub(super) const AFTER_FAILURES: Damping =
+    Damping { first: 1e-3, least: 1e-5, floor: 0.0, rise: 10.0, growth: 1.0, fall: |_| 0.1 };
+/// Damping of all steps. With less than the least, the seven null pivots of a network without datum would be rounding errors.
+pub(super) const ALWAYS: Damping =
+    Damping { first: 1e-4, least: 1e-10, floor: 1e-10, rise: 2.0, growth: 2.0, fall: by_gain };
+
+/// Returns a factor of the damping: 1/3 after a good prediction, up to 2 after a poor one.
+fn by_gain(gain: f64) -> f64 {
+    (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0)
+}
+
+/// Returns the constants of the step control by name, for partitioned problems (see [`super::Linearized::of_part`]).
+pub fn step_rules() -> [(&'static str, f64); 8] {
+    [
+        ("rounding", ROUNDING),
+        ("negligible", NEGLIGIBLE),
+        ("far", FAR),
+        ("still", STILL),
+        ("first_damping", AFTER_FAILURES.first),
+        ("least_damping", AFTER_FAILURES.least),
+        ("most_damping", MOST_DAMPING),
+        ("near", NEAR),
+    ]
+}
+
+/// State of the step control between steps.
+pub(super) struct Control {
+    pub stop: Stop,
+    damping: &'static Damping,
+    /// Factor of the damping at the next failure.
+    rise: f64,
+    /// Lowest sum of squares.
+    pub best: f64,
+    /// Sum of squares at the last failure of a full step, and the unknowns that the step moved most.
+    pub refused: Option<(f64, Vec<usize>)>,
+    /// Whether this step followed a valley.
+    pub in_valley: bool,
+    /// Number of steps along a valley,
+    along: usize,
+    /// and of other failures of full steps.
+    pub failures: usize,
+    /// Whether steps follow a curved valley.
+    pub bends: bool,
+    /// Decreases of the sum of squares by damped steps.
+    falls: Vec<f64>,
+}
+
+impl Control {
+    /// Whether every step is damped.
+    pub fn always(&self) -> bool {
+        self.damping.floor > 0.0
+    }
+
+    /// Damps every step from now on.
+    fn damp_always(&mut self) {
+        (self.damping, self.rise) = (&ALWAYS, ALWAYS.rise);
+        self.falls.clear();
+    }
+
+    /// Whether a step with this damping is not much shortened.
+    fn is_whole(&self, damping: f64) -> bool {
+        damping <= if self.always() { self.damping.first } else { 0.0 }
+    }
+
+    /// Whether the stopping rule ends a sequence of damped steps at this one, or its predicted decrease is a rounding error.
+    fn is_last_damped(&self, step: &Iteration, predicted: f64) -> bool {
+        let rounding = (DAMPED_ROUNDING * self.best).max(DAMPED_NEGLIGIBLE.powi(2));
+        let ends = self.stop.at_change(step.largest_change) || self.stop.at_decrease(predicted, self.best);
+        predicted <= rounding || self.is_whole(step.damping) && ends
+    }
+
+    /// Returns the damping after a successful step.
+    fn eased(&mut self, damping: f64, gain: f64) -> f64 {
+        self.rise = self.damping.rise;
+        let eased = damping * (self.damping.fall)(gain);
+        if eased < self.damping.least { self.damping.floor } else { eased }
+    }
+
+    /// Returns the damping after a failed step.
+    fn raised(&mut self, damping: f64) -> f64 {
+        if damping == 0.0 {
+            return self.damping.first;
+        }
+        let raised = damping * self.rise;
+        self.rise *= self.damping.growth;
+        raised
+    }
+}
+
+/// Values after a step.
+enum Reached<'a> {
+    /// With normal equations.
+    Formed(Iterate<'a>),
+    /// With the sum of squares only.
+    Evaluated(Vec<f64>, Box<dyn Evaluated + 'a>, f64),
+}
+
+impl Reached<'_> {
+    /// Returns the values before a transformation to the datum.
+    fn values(&self) -> &[f64] {
+        match self {
+            Self::Formed(state) => state.reached(),
+            Self::Evaluated(values, ..) => values,
+        }
+    }
+
+    fn at(&self) -> &dyn Evaluated {
+        match self {
+            Self::Formed(state) => state.equations.at(),
+            Self::Evaluated(_, at, _) => &**at,
+        }
+    }
+
+    fn sum_of_squares(&self) -> f64 {
+        match self {
+            Self::Formed(state) => state.linearized.sum_of_squares,
+            Self::Evaluated(.., sum_of_squares) => *sum_of_squares,
+        }
+    }
+
+    /// Whether the step lowers the sum of squares enough. A NaN sum of squares or a newly deficient local block is also a failure.
+    fn succeeds(&self, step: &Iteration, gain: f64, best: f64) -> bool {
+        match self {
+            Self::Formed(state) => {
+                let negligible = step.damping == 0.0 && step.largest_change <= NEGLIGIBLE;
+                let highest = if negligible { f64::MAX } else { best * (1.0 + ROUNDING) };
+                self.sum_of_squares() <= highest && state.linearized.factor.deficient_locals.is_empty()
+            }
+            Self::Evaluated(..) => gain > LEAST_GAIN && self.sum_of_squares() <= best,
+        }
+    }
+}
+
+/// Next linearization, or the end of the iterations.
+pub(super) type Next<'a> = Result<ControlFlow<End<'a>, Iterate<'a>>, AdjustError>;
+
+impl<'a> Run<'a, '_> {
+    /// Iterates until the stopping rule is satisfied, or steps no longer lower the sum of squares.
+    pub(super) fn controlled_steps(
+        &mut self,
+        start: Iterate<'a>,
+        stop: Stop,
+        damping: &'static Damping,
+    ) -> Result<End<'a>, AdjustError> {
+        let mut control = Control {
+            stop,
+            damping,
+            rise: damping.rise,
+            best: start.linearized.sum_of_squares,
+            refused: None,
+            in_valley: false,
+            along: 0,
+            failures: 0,
+            bends: false,
+            falls: vec![],
+        };
+        let mut state = start;
+        while self.iterations.len() < self.options.max_iterations
+            && state.linearized.damping() <= MOST_DAMPING
+        {
+            let next = match self.step(&state)? {
+                Some(step) => self.take(state, step, &mut control)?,
+                None => {
+                    let damping = state.linearized.damping();
+                    self.refuse(state.recycle(), damping, vec![], &mut control)?
+                }
+            };
+            match next {
+                ControlFlow::Continue(next) => state = next,
+                ControlFlow::Break(end) => return Ok(end),
+            }
+        }
+        self.exhausted(state, control)
+    }
+
+    /// Applies a step unless it fails, or ends with it.
+    fn take(&mut self, state: Iterate<'a>, step: Vec<f64>, control: &mut Control) -> Next<'a> {
+        let (damping, change) = (state.linearized.damping(), state.linearized.change());
+        let (number, full) = (self.iterations.len() + 1, damping == 0.0);
+        let iteration = Iteration { number, sum_of_squares: control.best, largest_change: change, damping };
+        if full && self.is_end(&state, &step, control) {
+            return self.end_after(state, step, iteration).map(ControlFlow::Break);
+        }
+        let predicted = match control.always() {
+            false => change * change,
+            true => state.equations.decrease(self.threads, &state.linearized.prior, &step),
+        };
+        let accelerated = self.accelerated(&state, &step, iteration, predicted, control)?;
+        let iteration = accelerated.iteration;
+        let moved = if full { state.moved(&accelerated.step) } else { vec![] };
+        let before = state.recycle();
+        let values = self.relocated(accelerated.values, iteration.largest_change, control);
+        if accelerated.outgrown {
+            let (_, sum_of_squares) = self.evaluated(&values);
+            if sum_of_squares <= control.best * (1.0 + ROUNDING) {
+                self.accept(Iteration { sum_of_squares, ..iteration }, &before, &values)?;
+                return Ok(ControlFlow::Break(End::at(Status::NotConverged, values)));
+            }
+        }
+        let reached = match accelerated.evaluated {
+            Some((at, sum_of_squares)) => Reached::Evaluated(values, at, sum_of_squares),
+            None if control.always() => {
+                let (at, sum_of_squares) = self.evaluated(&values);
+                Reached::Evaluated(values, at, sum_of_squares)
+            }
+            None => {
+                self.look_ahead(&iteration);
+                Reached::Formed(self.form(values, control.eased(damping, f64::NAN))?)
+            }
+        };
+        let gain = (control.best - reached.sum_of_squares()) / predicted;
+        control.bends &= accelerated.bend.is_none_or(|bend| bend > STRAIGHT);
+        control.bends |= control.always() && self.may_bend() && (gain.is_nan() || gain < BENDS);
+        let last = control.always() && control.is_last_damped(&iteration, predicted);
+        if reached.succeeds(&iteration, gain, control.best) {
+            let next = self.follow(reached, iteration, &before, (gain, last), control);
+            if full && self.problem.model.steps_swing() {
+                self.secants.remember(step, before);
+            }
+            return next;
+        }
+        if let Reached::Formed(state) = reached {
+            state.recycle();
+        }
+        if full {
+            control.in_valley = iteration.largest_change <= VALLEY;
+            if self.may_follow_valley(control)
+                && let Some((values, sum_of_squares)) =
+                    self.along_valley(&before, &accelerated.step, &iteration)?
+            {
+                control.along += 1;
+                control.refused = Some((control.best, moved.clone()));
+                (control.best, self.weak) = (sum_of_squares, moved);
+                self.accept(Iteration { sum_of_squares, ..iteration }, &before, &values)?;
+                return self.form(values, 0.0).map(ControlFlow::Continue);
+            }
+        } else if last {
+            return self.end_at_best(before, control);
+        }
+        self.refuse(before, damping, moved, control)
+    }
+
+    /// Continues after a successful step, or ends there.
+    fn follow(
+        &mut self,
+        reached: Reached<'a>,
+        iteration: Iteration,
+        before: &[f64],
+        (gain, last): (f64, bool),
+        control: &mut Control,
+    ) -> Next<'a> {
+        let sum_of_squares = reached.sum_of_squares();
+        let decrease = std::mem::replace(&mut control.best, sum_of_squares) - sum_of_squares;
+        self.accept(Iteration { sum_of_squares, ..iteration }, before, reached.values())?;
+        let enough =
+            control.is_whole(iteration.damping) && control.stop.at_decrease(decrease, sum_of_squares);
+        let short = control.always() && iteration.largest_change < SHORT;
+        if iteration.damping > 0.0 {
+            self.collapsed = self.threads.install(|| match reached.at().collapsed(before) {
+                none if none.is_empty() && short => reached.at().run_off(before),
+                found => found,
+            });
+        }
+        let (values, at) = match reached {
+            Reached::Formed(next) if !self.collapsed.is_empty() => {
+                return Ok(ControlFlow::Break(End::at(Status::NotConverged, next.recycle())));
+            }
+            Reached::Formed(next) if enough => {
+                return self.stay(next, Status::Converged).map(ControlFlow::Break);
+            }
+            Reached::Formed(next) => return Ok(ControlFlow::Continue(next)),
+            Reached::Evaluated(values, ..) if !self.collapsed.is_empty() => {
+                return Ok(ControlFlow::Break(End::at(Status::NotConverged, values)));
+            }
+            Reached::Evaluated(values, at, _) => (values, at),
+        };
+        control.falls.push(decrease);
+        if enough || last {
+            return self.rest(values, Status::Converged, false, control).map(ControlFlow::Break);
+        }
+        if self.creeps(control) {
+            return self.rest(values, Status::Converged, true, control).map(ControlFlow::Break);
+        }
+        let damping = control.eased(iteration.damping, gain);
+        self.formed(values, at, damping).map(ControlFlow::Continue)
+    }
+
+    /// Continues from the same values with more damping. Ends there if the sum of squares has stagnated although full steps, which move the
+    /// unknowns `moved` most, have failed.
+    fn refuse(
+        &mut self,
+        before: Vec<f64>,
+        damping: f64,
+        moved: Vec<usize>,
+        control: &mut Control,
+    ) -> Next<'a> {
+        if damping == 0.0 {
+            let refused = control.refused.replace((control.best, moved));
+            if self.is_still(&refused, control.best) {
+                return self.end_at_best(before, control);
+            }
+            control.failures += 1;
+            if control.failures > MOST_FAILURES {
+                control.damp_always();
+            }
+        }
+        self.form(before, control.raised(damping)).map(ControlFlow::Continue)
+    }
+
+    /// Evaluates the model, and its objective.
+    pub(super) fn evaluated(&self, values: &[f64]) -> (Box<dyn Evaluated + 'a>, f64) {
+        let at = self.threads.install(|| self.problem.model.at(values));
+        let sum_of_squares = self.objective_at(values, &*at);
+        (at, sum_of_squares)
+    }
+
+    /// Whether a full step makes too many groups leave the layout: more than a fraction, or any after a short step. Missing columns would
+    /// disturb chords and last steps.
+    pub(super) fn is_outgrown(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
+        let short = followed || step.largest_change <= SETTLED;
+        let most = if short { 0 } else { self.problem.layout().groups() / FEW };
+        step.damping == 0.0
+            && self.problem.model.steps_swing()
+            && self.threads.install(|| self.problem.model.outgrown(values)) > most
+    }
+
+    /// Recomputes the local unknowns after a long step if that lowers the sum of squares.
+    fn relocated(&self, unknowns: Vec<f64>, change: f64, control: &Control) -> Vec<f64> {
+        if control.always() || change <= FAR * (unknowns.len() as f64).sqrt() {
+            return unknowns;
+        }
+        let mut other = unknowns.clone();
+        let relocated = self.threads.install(|| self.problem.model.relocate(&mut other));
+        let lower = relocated && self.objective(&other) < self.objective(&unknowns);
+        if lower { other } else { unknowns }
+    }
+
+    /// Whether a full step is the last one: by its length, by the predicted lengths of further steps, or because steps remain negligible
+    /// without decreasing. In this case their unknowns are stored.
+    fn is_end(&mut self, state: &Iterate<'a>, step: &[f64], control: &Control) -> bool {
+        let change = state.linearized.change();
+        let last = control.stop.at_change(change)
+            || matches!(control.stop, Stop::Fraction(fraction) if self.leaves_less_than(fraction, change))
+            || self.is_foreseen(control, state, step);
+        let rests = !last && self.history().falls_no_more(change);
+        if rests {
+            self.weak = state.moved(step);
+        }
+        last || rests
+    }
+
+    /// Whether the sum of all further steps is within a limit; unknown for accelerated steps.
+    fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
+        let learns = self.secants.correct() || self.problem.model.steps_swing() && self.chord.is_some();
+        !learns && self.history().leaves_less_than(limit, change)
+    }
+
+    /// Whether the step after a full step would be negligible, judged by the sum of squares after the full step.
+    fn is_foreseen(&self, control: &Control, state: &Iterate<'a>, step: &[f64]) -> bool {
+        let Stop::Foreseen(limit) = control.stop else { return false };
+        let foreseen = control.best - state.linearized.change().powi(2);
+        // A smaller difference is a rounding error.
+        if limit.powi(2) <= ROUNDING * control.best {
+            return false;
+        }
+        let reached = self.objective(&self.problem.advanced(state.values(), step));
+        (reached - foreseen).abs() <= limit.powi(2)
+    }
+
+    /// Whether the sum of squares has hardly decreased since the last failed full step. Further damped steps would not change any unknown
+    /// significantly.
+    fn is_still(&self, refused: &Option<(f64, Vec<usize>)>, sum: f64) -> bool {
+        let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
+        let least = STILL * (sum / freedom).max(1.0);
+        refused.as_ref().is_some_and(|(before, _)| before - sum <= least)
+    }
+
+    /// Whether a failed full step may be followed along a valley: if previous full steps succeeded, and the sum of squares still decreases.
+    fn may_follow_valley(&self, control: &Control) -> bool {
+        control.in_valley
+            && control.along < MOST_ALONG
+            && self.options.loss.is_none()
+            && self.iterations.iter().any(|iteration| iteration.damping == 0.0)
+            && !self.is_still(&control.refused, control.best)
+    }
+
+    /// Whether damped steps may be accelerated in a curved valley. Kinks of a loss also make steps fail.
+    fn may_bend(&self) -> bool {
+        self.options.loss.is_none() && self.is_network()
+    }
+
+    fn is_network(&self) -> bool {
+        self.problem.layout().locals() >= NETWORK
+    }
+
+    /// Whether the objective stagnates: small decreases that do not converge.
+    fn creeps(&self, control: &Control) -> bool {
+        let least = control.stop.least_decrease(control.best).unwrap_or(0.0);
+        let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
+        let (steps, little) = match self.is_network() {
+            true => (CREEPING_IN_NETWORKS, least.max(LITTLE * (control.best / freedom).max(1.0))),
+            false => (CREEPING, least),
+        };
+        let Some(first) = control.falls.len().checked_sub(steps) else { return false };
+        let last = &control.falls[first..];
+        last.iter().sum::<f64>() <= little && last[steps - 1] >= FALLING * last[0]
+    }
+}
