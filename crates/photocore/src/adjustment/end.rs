@@ -115,7 +115,7 @@ impl<'a> Run<'a, '_> {
         }
         let last = self.iterations.last();
         let in_valley = moving && last.is_some_and(|last| last.largest_change <= SHORT);
-        let unconfirmed = control.failures > 0 && status == Status::Converged;
+        let unconfirmed = control.failures > 0 && status == Status::Converged && self.weak.is_empty();
         if !(self.options.covariance || in_valley || unconfirmed) {
             return Ok(End::at(status, unknowns));
         }

@@ -162,7 +162,7 @@ impl Control {
         }
         let raised = damping * self.rise;
         self.rise *= self.damping.growth;
-        raised
+        if self.always() { raised } else { raised.max(self.damping.first) }
     }
 }
 
