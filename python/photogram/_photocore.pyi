@@ -1429,6 +1429,7 @@ class NetworkTrial:
         observed: _Floats | None = None,
         check_sd: _Floats | None = None,
         check_weights: _Floats | None = None,
+        by_component: bool = False,
     ) -> dict[str, Any]:
         """Test errors that sets of observations have in common, and errors of groups except images.
 
@@ -1460,6 +1461,8 @@ class NetworkTrial:
         check_sd, check_weights
             (c, 3) standard deviations of the differences of the first c `checks`, and the inverse covariance
             of all differences, row by row, zero for missing ones; None if only single points are tested.
+        by_component
+            Whether check points also test errors of each component of groups.
 
         Returns
         -------
@@ -1470,8 +1473,9 @@ class NetworkTrial:
         beyond the limit, points other than those of the group that the largest undetected error moves so far,
         the largest change in standard deviations, its point and coordinate, the largest change, and the
         changes of `checks`. `sets`: dictionaries with `parameters`, `plausible`, `estimate`, its
-        `cofactors`, `error`, and the changes of `checks` by each parameter, (c, 3, k) row by row.
-        `correlations`: (s, s), of the scores of sets.
+        `cofactors`, `error`, and the changes of check points by each parameter, (c, 3, k) row by row;
+        `groups`: the same by row of groups with effects, if `by_component`. `correlations`: (s, s), of the
+        scores of sets.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:

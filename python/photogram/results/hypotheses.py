@@ -441,6 +441,10 @@ def hypotheses(
             weights = np.zeros((3 * checks, 3 * checks))
             weights[np.ix_(flat, flat)] = joint[2]
             core["check_weights"] = weights.ravel()
+            # Otherwise, they differ no more than expected, and name no single component.
+            core["by_component"] = (
+                agreement.together is not None and agreement.together.probability_above < 0.5
+            )
     found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )

@@ -206,7 +206,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, check_sd=None, check_weights=None))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, check_sd=None, check_weights=None, by_component=false))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -226,6 +226,7 @@ impl NetworkTrial {
         observed: Option<Array<'_>>,
         check_sd: Option<Array<'_>>,
         check_weights: Option<PyReadonlyArray1<'_, f64>>,
+        by_component: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let velocities = rows("velocities", &velocities)?;
         let observed = observed.map_or_else(|| Ok(vec![]), |own| rows("observed", &own))?;
@@ -241,6 +242,7 @@ impl NetworkTrial {
             checks,
             check_sd,
             check_weights: check_weights.map_or(vec![], |own| own.as_array().iter().copied().collect()),
+            by_component,
             centre,
             estimated,
             detection,

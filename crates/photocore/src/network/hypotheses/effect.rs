@@ -110,12 +110,14 @@ impl<'a> Sample<'a> {
         count: usize,
         threads: &Threads,
     ) -> DMatrix<f64> {
-        let mut found = DMatrix::from_element(3 * self.checks.len(), count, f64::NAN);
+        // Behind the check points are points whose changes are only reported.
+        let checks = &self.checks[..self.facts.check_sd.len().min(self.checks.len())];
+        let mut found = DMatrix::from_element(3 * checks.len(), count, f64::NAN);
         let (errors, first) = (DMatrix::identity(effects.ncols(), count), self.locals.len());
         let others = effects.columns(0, count).into_owned();
         let model = &self.trial.assembled.problem.model;
         let mut locals = vec![];
-        for (check, index) in self.checks.iter().enumerate().filter_map(|(check, at)| Some((check, (*at)?))) {
+        for (check, index) in checks.iter().enumerate().filter_map(|(check, at)| Some((check, (*at)?))) {
             match index.checked_sub(first) {
                 None => locals.push((3 * check, self.locals[index])),
                 Some(behind) => {

@@ -54,14 +54,12 @@ impl Trial {
         let worst = worst(&singles, facts);
 
         let mut catalogue = catalogue(self, found, facts);
-        // Check points can distinguish errors of components that residuals cannot.
-        let by_component = !facts.check_weights.is_empty();
-        let mut add = |&k: &usize| singles[k].add(&mut catalogue, by_component);
+        let mut add = |&k: &usize| singles[k].add(&mut catalogue, facts.by_component);
         let shares: Vec<Vec<(usize, f64)>> = worst.iter().map(&mut add).collect();
         let sums = linearized.additional(problem, &catalogue, threads);
         let count = sums.score.len();
         let of_sets = shares.iter().flatten().map(|own| own.0).min().unwrap_or(count);
-        let compared = if by_component { count } else { of_sets };
+        let compared = if facts.by_component { count } else { of_sets };
         let at_checks = sample.at_checks(&catalogue, &sums.effects, compared, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
@@ -104,7 +102,7 @@ impl Trial {
             let mut error = DVector::zeros(count);
             own.iter().for_each(|&(column, share)| error[column] = share);
             errors.push(error);
-            if by_component {
+            if facts.by_component {
                 singles[k].compare(&at_checks.select_columns(own.iter().map(|own| &own.0)));
             }
         }

@@ -24,6 +24,8 @@ pub struct Facts {
     pub check_sd: Vec<[f64; 3]>,
     /// Inverse covariance of all these differences, row by row, zero for missing ones; empty if only single points are tested.
     pub check_weights: Vec<f64>,
+    /// Whether these also test errors of each component of groups.
+    pub by_component: bool,
     /// Centre of scale, rotation and bending; the middle of the network if None.
     pub centre: Option<[f64; 3]>,
     /// Sum of squares and degrees of freedom if the unit weight is estimated; None if it is known.

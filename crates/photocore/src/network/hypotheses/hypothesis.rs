@@ -31,7 +31,7 @@ pub struct Hypothesis {
     /// What an undetected error changes: one of the size of the MDB or, if there is none, of the plausible size. None if its bias-to-noise
     /// ratio excludes an effect above the limit.
     pub effect: Option<Effect>,
-    /// Changes of the coordinates of the check points by its parameters, row by row: of sets and, if check points are judged together, of
+    /// Changes of the coordinates of the check points by its parameters, row by row: of sets and, with [`Facts::by_component`](super::Facts), of
     /// groups with effects.
     pub at_checks: Vec<f64>,
 }
