@@ -2,45 +2,15 @@
 
 use std::ops::ControlFlow;
 
+use super::control::{Control, MOST_DAMPING, SHORT};
 use super::options::{Iteration, Status};
 use super::result::AdjustError;
-use super::run::{Iterate, Run};
-use super::steps::{Control, MOST_DAMPING, Next, SHORT};
+use super::run::{End, Iterate, Next, Run};
 
 /// Maximum change, in standard deviations, of a full step that confirms the convergence of damped steps.
 const CONFIRMED: f64 = 1e-2;
 /// Minimum change of an unknown in a weak combination: multiple of the overall change, scaled by the unknown's own equations.
 const WEAK: f64 = 10.0;
-
-/// Final state of the iterations, without cofactors if the final values leave unknowns undetermined.
-pub(super) struct End<'a> {
-    pub status: Status,
-    pub unknowns: Vec<f64>,
-    /// Linearization for the cofactors.
-    pub state: Option<Iterate<'a>>,
-    /// Reason for a missing linearization.
-    pub undetermined: Option<AdjustError>,
-    /// Last iteration and its step, not applied yet; cofactors refer to the values before it.
-    pub last: Option<(Iteration, Vec<f64>)>,
-}
-
-impl<'a> End<'a> {
-    /// Ends at given values, without cofactors.
-    pub fn at(status: Status, unknowns: Vec<f64>) -> Self {
-        Self { status, unknowns, state: None, undetermined: None, last: None }
-    }
-
-    /// Ends at the values of a linearization, with cofactors.
-    pub fn with(status: Status, state: Iterate<'a>) -> Self {
-        let unknowns = state.values().to_vec();
-        Self { state: Some(state), ..Self::at(status, unknowns) }
-    }
-
-    /// Ends after one more step, with cofactors from the equations before it.
-    pub fn after(status: Status, state: Iterate<'a>, step: Vec<f64>, iteration: Iteration) -> Self {
-        Self { last: Some((iteration, step)), ..Self::with(status, state) }
-    }
-}
 
 impl<'a> Run<'a, '_> {
     /// Ends at the current values without another step. Cofactors belong to the reweighted equations without second-order term, because

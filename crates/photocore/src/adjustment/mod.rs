@@ -62,6 +62,7 @@
 mod acceleration;
 mod additional;
 mod alone;
+mod control;
 mod datum;
 mod distributions;
 mod end;
@@ -80,6 +81,7 @@ mod problem;
 mod published;
 mod result;
 mod run;
+mod secants;
 mod statistics;
 mod steps;
 mod terms;
@@ -89,6 +91,7 @@ mod walk;
 
 pub use additional::{Additional, AdditionalParameters, Equation, EquationOf, Shared};
 pub use alone::Alone;
+pub use control::step_rules;
 pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
@@ -113,7 +116,6 @@ pub use run::go_on;
 pub use run::{Requests, Watch, adjust, adjust_with};
 pub(crate) use statistics::weighted;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
-pub use steps::step_rules;
 pub use terms::Terms;
 pub use traces::{EquationGroups, GroupSquares, Probing};
 pub use transformation::DatumOfPart;

@@ -1,9 +1,8 @@
 //! Full steps without control of the sum of squares, with the stopping rules of the programs of 1962 to 1987.
 
-use super::end::End;
 use super::options::{Iteration, Published, Status};
 use super::result::AdjustError;
-use super::run::{Iterate, Run};
+use super::run::{End, Iterate, Run};
 
 impl<'a> Run<'a, '_> {
     /// Iterates with full steps, without control of the sum of squares.

@@ -3,16 +3,15 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use super::acceleration::Secants;
+use super::control::{AFTER_FAILURES, ALWAYS, NEAR};
 use super::datum::{Adjusted, Basis, Datum, moved};
-use super::end::End;
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
 use super::loss::Reweighting;
-use super::options::{Event, Iteration, Method, Options, Phase, leaves_cofactors};
+use super::options::{Event, Iteration, Method, Options, Phase, Status, leaves_cofactors};
 use super::problem::{AnyProblem, Evaluated, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
-use super::steps::{AFTER_FAILURES, ALWAYS};
+use super::secants::Secants;
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 use crate::{Stopped, Threads};
 
@@ -115,9 +114,6 @@ pub fn adjust_with(
     run.finish(end, initial_sum_of_squares)
 }
 
-/// Maximum change, in standard deviations, for the second-order term of a loss, which is harmful farther from the solution.
-pub(super) const NEAR: f64 = 1.0;
-
 /// Current linearization of the iterations.
 pub(super) struct Iterate<'a> {
     pub equations: ObservationEquations<'a>,
@@ -146,6 +142,39 @@ impl Iterate<'_> {
         self.linearized.factor.moved(&self.equations.problem().system, step)
     }
 }
+
+/// Final state of the iterations, without cofactors if the final values leave unknowns undetermined.
+pub(super) struct End<'a> {
+    pub status: Status,
+    pub unknowns: Vec<f64>,
+    /// Linearization for the cofactors.
+    pub state: Option<Iterate<'a>>,
+    /// Reason for a missing linearization.
+    pub undetermined: Option<AdjustError>,
+    /// Last iteration and its step, not applied yet; cofactors refer to the values before it.
+    pub last: Option<(Iteration, Vec<f64>)>,
+}
+
+impl<'a> End<'a> {
+    /// Ends at given values, without cofactors.
+    pub fn at(status: Status, unknowns: Vec<f64>) -> Self {
+        Self { status, unknowns, state: None, undetermined: None, last: None }
+    }
+
+    /// Ends at the values of a linearization, with cofactors.
+    pub fn with(status: Status, state: Iterate<'a>) -> Self {
+        let unknowns = state.values().to_vec();
+        Self { state: Some(state), ..Self::at(status, unknowns) }
+    }
+
+    /// Ends after one more step, with cofactors from the equations before it.
+    pub fn after(status: Status, state: Iterate<'a>, step: Vec<f64>, iteration: Iteration) -> Self {
+        Self { last: Some((iteration, step)), ..Self::with(status, state) }
+    }
+}
+
+/// Next linearization, or the end of the iterations.
+pub(super) type Next<'a> = Result<ControlFlow<End<'a>, Iterate<'a>>, AdjustError>;
 
 pub(super) struct Run<'a, 'w> {
     pub problem: &'a AnyProblem<'a>,

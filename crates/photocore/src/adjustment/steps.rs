@@ -5,27 +5,17 @@
 //! full step is dx^T N dx. Its root bounds every correction in standard deviations, without an inverse.
 //!
 //! A full step seldom fails, so that the normal equations are formed at its end, and their sum of squares decides. If every step is damped,
-//! it is judged by the residuals at its end. Full steps that fail repeatedly do not converge: the neglected term, residuals times second derivatives,
-//! dominates a combination of unknowns. From then on every step is damped, and a full step at the end confirms convergence.
+//! it is judged by the residuals at its end. Full steps that fail repeatedly do not converge: the neglected term, residuals times second
+//! derivatives, dominates a combination of unknowns. From then on every step is damped, and a full step at the end confirms convergence.
 
 use std::ops::ControlFlow;
 
-use super::end::End;
+use super::control::{BENDS, Control, Damping, FAR, MOST_DAMPING, ROUNDING, SHORT, STILL};
 use super::options::{Iteration, NEGLIGIBLE, Status, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;
-use super::run::{Iterate, NEAR, Run};
+use super::run::{End, Iterate, Next, Run};
 
-/// Relative increase of the sum of squares that is accepted as rounding error.
-pub(super) const ROUNDING: f64 = 1e-12;
-/// Relative predicted decrease of the sum of squares by a damped step, and its change in standard deviations, that count as rounding error.
-const DAMPED_ROUNDING: f64 = 1e-14;
-const DAMPED_NEGLIGIBLE: f64 = 1e-6;
-/// Maximum decrease of the sum of squares between two failures of full steps that counts as stagnation, as a multiple of the variance of
-/// unit weight. It corresponds to 0.01 standard deviations of a combination of unknowns.
-const STILL: f64 = 1e-4;
-/// Minimum mean change, in standard deviations, for a recomputation of local unknowns instead of their linearization.
-const FAR: f64 = 30.0;
 /// Reciprocal of the fraction of groups that may leave the layout before convergence.
 const FEW: usize = 20;
 /// Maximum change, in standard deviations, after which groups must not leave the layout: missing columns are detected before the last
@@ -38,16 +28,10 @@ const VALLEY: f64 = 30.0;
 const MOST_ALONG: usize = 8;
 /// Maximum number of failed full steps; after more failures every step is damped.
 const MOST_FAILURES: usize = 4;
-
 /// Minimum ratio of actual to predicted decrease for an accepted damped step.
 const LEAST_GAIN: f64 = 1e-3;
-/// Gain ratio below which damped steps are accelerated,
-pub(super) const BENDS: f64 = 0.75;
-/// and size of the second-order term, relative to the step in the metric of the normal equations, below which they are not.
+/// Minimum size of the second-order term for acceleration, relative to the step in the metric of the normal equations.
 const STRAIGHT: f64 = 0.1;
-/// Maximum damping: the step is parallel to the gradient and must lower the sum of squares if any step does.
-pub(super) const MOST_DAMPING: f64 = 1e9;
-
 /// Number of damped steps for the test of stagnation, and minimum ratio of the last decrease to the first. Stagnation: their total decrease
 /// is less than required of one step. Such steps follow an undetermined combination at any damping.
 const CREEPING: usize = 50;
@@ -59,112 +43,6 @@ const LITTLE: f64 = 0.05;
 /// Minimum number of local blocks of a network, whose damped steps may be accelerated and stopped at stagnation. Valleys of small problems
 /// may be long (Eckerle4 of NIST's problems, from its first start), but those in networks are short.
 const NETWORK: usize = 16;
-/// Maximum change of a short step, in standard deviations.
-pub(super) const SHORT: f64 = 1.0;
-
-/// Damping, as a fraction of the diagonal of the normal matrix.
-pub(super) struct Damping {
-    /// Damping of the first damped step.
-    pub first: f64,
-    /// Limit below which damping is replaced by `floor`.
-    least: f64,
-    floor: f64,
-    /// Factor after a failure, and its growth with each further failure in sequence.
-    rise: f64,
-    growth: f64,
-    /// Factor after a success, as a function of the gain: the ratio of actual to predicted decrease.
-    fall: fn(f64) -> f64,
-}
-
-/// Damping after failures of full steps: zero as soon as possible.
-pub(super) const AFTER_FAILURES: Damping =
-    Damping { first: 1e-3, least: 1e-5, floor: 0.0, rise: 10.0, growth: 1.0, fall: |_| 0.1 };
-/// Damping of all steps. With less than the least, the seven null pivots of a network without datum would be rounding errors.
-pub(super) const ALWAYS: Damping =
-    Damping { first: 1e-4, least: 1e-10, floor: 1e-10, rise: 2.0, growth: 2.0, fall: by_gain };
-
-/// Returns a factor of the damping: 1/3 after a good prediction, up to 2 after a poor one.
-fn by_gain(gain: f64) -> f64 {
-    (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0)
-}
-
-/// Returns the constants of the step control by name, for partitioned problems (see [`super::Linearized::of_part`]).
-pub fn step_rules() -> [(&'static str, f64); 8] {
-    [
-        ("rounding", ROUNDING),
-        ("negligible", NEGLIGIBLE),
-        ("far", FAR),
-        ("still", STILL),
-        ("first_damping", AFTER_FAILURES.first),
-        ("least_damping", AFTER_FAILURES.least),
-        ("most_damping", MOST_DAMPING),
-        ("near", NEAR),
-    ]
-}
-
-/// State of the step control between steps.
-pub(super) struct Control {
-    pub stop: Stop,
-    damping: &'static Damping,
-    /// Factor of the damping at the next failure.
-    rise: f64,
-    /// Lowest sum of squares.
-    pub best: f64,
-    /// Sum of squares at the last failure of a full step, and the unknowns that the step moved most.
-    pub refused: Option<(f64, Vec<usize>)>,
-    /// Whether this step followed a valley.
-    pub in_valley: bool,
-    /// Number of steps along a valley,
-    along: usize,
-    /// and of other failures of full steps.
-    pub failures: usize,
-    /// Whether steps follow a curved valley.
-    pub bends: bool,
-    /// Decreases of the sum of squares by damped steps.
-    falls: Vec<f64>,
-}
-
-impl Control {
-    /// Whether every step is damped.
-    pub fn always(&self) -> bool {
-        self.damping.floor > 0.0
-    }
-
-    /// Damps every step from now on.
-    fn damp_always(&mut self) {
-        (self.damping, self.rise) = (&ALWAYS, ALWAYS.rise);
-        self.falls.clear();
-    }
-
-    /// Whether a step with this damping is not much shortened.
-    fn is_whole(&self, damping: f64) -> bool {
-        damping <= if self.always() { self.damping.first } else { 0.0 }
-    }
-
-    /// Whether the stopping rule ends a sequence of damped steps at this one, or its predicted decrease is a rounding error.
-    fn is_last_damped(&self, step: &Iteration, predicted: f64) -> bool {
-        let rounding = (DAMPED_ROUNDING * self.best).max(DAMPED_NEGLIGIBLE.powi(2));
-        let ends = self.stop.at_change(step.largest_change) || self.stop.at_decrease(predicted, self.best);
-        predicted <= rounding || self.is_whole(step.damping) && ends
-    }
-
-    /// Returns the damping after a successful step.
-    fn eased(&mut self, damping: f64, gain: f64) -> f64 {
-        self.rise = self.damping.rise;
-        let eased = damping * (self.damping.fall)(gain);
-        if eased < self.damping.least { self.damping.floor } else { eased }
-    }
-
-    /// Returns the damping after a failed step.
-    fn raised(&mut self, damping: f64) -> f64 {
-        if damping == 0.0 {
-            return self.damping.first;
-        }
-        let raised = damping * self.rise;
-        self.rise *= self.damping.growth;
-        if self.always() { raised } else { raised.max(self.damping.first) }
-    }
-}
 
 /// Values after a step.
 enum Reached<'a> {
@@ -210,9 +88,6 @@ impl Reached<'_> {
     }
 }
 
-/// Next linearization, or the end of the iterations.
-pub(super) type Next<'a> = Result<ControlFlow<End<'a>, Iterate<'a>>, AdjustError>;
-
 impl<'a> Run<'a, '_> {
     /// Iterates until the stopping rule is satisfied, or steps no longer lower the sum of squares.
     pub(super) fn controlled_steps(
@@ -221,18 +96,7 @@ impl<'a> Run<'a, '_> {
         stop: Stop,
         damping: &'static Damping,
     ) -> Result<End<'a>, AdjustError> {
-        let mut control = Control {
-            stop,
-            damping,
-            rise: damping.rise,
-            best: start.linearized.sum_of_squares,
-            refused: None,
-            in_valley: false,
-            along: 0,
-            failures: 0,
-            bends: false,
-            falls: vec![],
-        };
+        let mut control = Control::new(stop, damping, start.linearized.sum_of_squares);
         let mut state = start;
         while self.iterations.len() < self.options.max_iterations
             && state.linearized.damping() <= MOST_DAMPING
