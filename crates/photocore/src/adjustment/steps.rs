@@ -47,7 +47,7 @@ const NETWORK: usize = 16;
 /// Values after a step.
 enum Reached<'a> {
     /// With normal equations.
-    Formed(Iterate<'a>),
+    Formed(Box<Iterate<'a>>),
     /// With the sum of squares only.
     Evaluated(Vec<f64>, Box<dyn Evaluated + 'a>, f64),
 }
@@ -148,7 +148,7 @@ impl<'a> Run<'a, '_> {
             }
             None => {
                 self.look_ahead(&iteration);
-                Reached::Formed(self.form(values, control.eased(damping, f64::NAN))?)
+                Reached::Formed(Box::new(self.form(values, control.eased(damping, f64::NAN))?))
             }
         };
         let gain = (control.best - reached.sum_of_squares()) / predicted;
@@ -209,9 +209,9 @@ impl<'a> Run<'a, '_> {
                 return Ok(ControlFlow::Break(End::at(Status::NotConverged, next.recycle())));
             }
             Reached::Formed(next) if enough => {
-                return self.stay(next, Status::Converged).map(ControlFlow::Break);
+                return self.stay(*next, Status::Converged).map(ControlFlow::Break);
             }
-            Reached::Formed(next) => return Ok(ControlFlow::Continue(next)),
+            Reached::Formed(next) => return Ok(ControlFlow::Continue(*next)),
             Reached::Evaluated(values, ..) if !self.collapsed.is_empty() => {
                 return Ok(ControlFlow::Break(End::at(Status::NotConverged, values)));
             }
