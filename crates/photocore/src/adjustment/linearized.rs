@@ -300,7 +300,7 @@ impl Linearized {
         self.solve(&self.equations(problem, threads), &options, threads, between)
     }
 
-    /// Computes R z for columns z over the equations of [`Problem::equations`], one after the other: the residuals caused by errors z, in
+    /// Computes R z for columns z over the equations of [`AnyProblem::equations`], one after the other: the residuals caused by errors z, in
     /// standard deviations. Bitwise identical for any number of threads; independent of the datum.
     ///
     /// # Errors
@@ -336,7 +336,7 @@ impl Linearized {
         Ok(columns)
     }
 
-    /// Returns a flag per equation of [`Problem::equations`]: for unknowns, whether they are weighted and not constrained.
+    /// Returns a flag per equation of [`AnyProblem::equations`]: for unknowns, whether they are weighted and not constrained.
     pub fn is_equation(&self, problem: &AnyProblem<'_>) -> Vec<bool> {
         let mut found = vec![true; problem.observation_sd.len()];
         found.extend((0..problem.sd.len()).map(|i| problem.is_weighted(i) && !self.held.contains(&i)));
