@@ -442,7 +442,7 @@ def test_section_13_a_lens_that_is_not_corrected_is_named(block):
     outcome = checked(block.replace(image_xy=block.image_xy + 0.06 * radius2 * block.image_xy / 115))
     (common,) = found(outcome, "common-error")
     assert common.level == "grave"
-    first, second = common.phrase.fields["errors"]
+    first, second, *_ = common.phrase.fields["errors"]
     assert first.fields["named"].code == "hypothesis.camera-radial"
     assert second.fields["named"].code == "hypothesis.bending"
 
