@@ -309,6 +309,7 @@ impl<'a> ObservationEquations<'a> {
         }
         sum
     }
+
     /// Returns the decrease of the weighted sum of squares of equations and priors by a step: sum of Ax (2 l - Ax).
     pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
         let add = |sum: &mut f64, row: &Row<'_>| {

@@ -232,7 +232,14 @@ impl<'a> Run<'a, '_> {
 
     /// Returns the weighted sum of squares at given values; with a loss, the sum of losses.
     pub(super) fn objective(&self, unknowns: &[f64]) -> f64 {
-        self.objective_at(unknowns, &*self.threads.install(|| self.problem.model.at(unknowns)))
+        self.evaluated(unknowns).1
+    }
+
+    /// Evaluates the model, and its objective.
+    pub(super) fn evaluated(&self, unknowns: &[f64]) -> (Box<dyn Evaluated + 'a>, f64) {
+        let at = self.threads.install(|| self.problem.model.at(unknowns));
+        let objective = self.objective_at(unknowns, &*at);
+        (at, objective)
     }
 
     /// Returns the objective at an evaluated model.

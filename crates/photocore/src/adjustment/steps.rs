@@ -134,18 +134,18 @@ impl<'a> Run<'a, '_> {
         let before = state.recycle();
         let values = self.relocated(accelerated.values, iteration.largest_change, control);
         if accelerated.outgrown {
-            let (_, sum_of_squares) = self.evaluated(&values);
+            let sum_of_squares = self.objective(&values);
             if sum_of_squares <= control.best * (1.0 + ROUNDING) {
                 self.accept(Iteration { sum_of_squares, ..iteration }, &before, &values)?;
                 return Ok(ControlFlow::Break(End::at(Status::NotConverged, values)));
             }
         }
-        let reached = match accelerated.evaluated {
+        let evaluated = match accelerated.evaluated {
+            None if control.always() => Some(self.evaluated(&values)),
+            found => found,
+        };
+        let reached = match evaluated {
             Some((at, sum_of_squares)) => Reached::Evaluated(values, at, sum_of_squares),
-            None if control.always() => {
-                let (at, sum_of_squares) = self.evaluated(&values);
-                Reached::Evaluated(values, at, sum_of_squares)
-            }
             None => {
                 self.look_ahead(&iteration);
                 Reached::Formed(Box::new(self.form(values, control.eased(damping, f64::NAN))?))
@@ -250,13 +250,6 @@ impl<'a> Run<'a, '_> {
         self.form(before, control.raised(damping)).map(ControlFlow::Continue)
     }
 
-    /// Evaluates the model, and its objective.
-    pub(super) fn evaluated(&self, values: &[f64]) -> (Box<dyn Evaluated + 'a>, f64) {
-        let at = self.threads.install(|| self.problem.model.at(values));
-        let sum_of_squares = self.objective_at(values, &*at);
-        (at, sum_of_squares)
-    }
-
     /// Whether a full step makes too many groups leave the layout: more than a fraction, or any after a short step. Missing columns would
     /// disturb chords and last steps.
     pub(super) fn is_outgrown(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
@@ -313,9 +306,13 @@ impl<'a> Run<'a, '_> {
     /// Whether the sum of squares has hardly decreased since the last failed full step. Further damped steps would not change any unknown
     /// significantly.
     fn is_still(&self, refused: &Option<(f64, Vec<usize>)>, sum: f64) -> bool {
-        let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
-        let least = STILL * (sum / freedom).max(1.0);
+        let least = STILL * self.variance(sum);
         refused.as_ref().is_some_and(|(before, _)| before - sum <= least)
+    }
+
+    /// Returns the variance of unit weight for a sum of squares, at least 1.
+    fn variance(&self, sum: f64) -> f64 {
+        (sum / self.problem.counts(&[]).degrees_of_freedom().max(1) as f64).max(1.0)
     }
 
     /// Whether a failed full step may be followed along a valley: if previous full steps succeeded, and the sum of squares still decreases.
@@ -339,9 +336,8 @@ impl<'a> Run<'a, '_> {
     /// Whether the objective stagnates: small decreases that do not converge.
     fn creeps(&self, control: &Control) -> bool {
         let least = control.stop.least_decrease(control.best).unwrap_or(0.0);
-        let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
         let (steps, little) = match self.is_network() {
-            true => (CREEPING_IN_NETWORKS, least.max(LITTLE * (control.best / freedom).max(1.0))),
+            true => (CREEPING_IN_NETWORKS, least.max(LITTLE * self.variance(control.best))),
             false => (CREEPING, least),
         };
         let Some(first) = control.falls.len().checked_sub(steps) else { return false };
