@@ -73,7 +73,7 @@ class ColumnTable:
     delimiter: str = ","
     # Number format of columns of texts that have it in common
     marks: Mapping[str, Marks] = field(default_factory=dict)
-    # NameColumn of the columns in the file, in small letters; empty for unnamed ones
+    # Names of the columns in the file, in small letters; empty for unnamed ones
     own: tuple[str, ...] = ()
 
     def __contains__(self, column: str) -> bool:
@@ -292,6 +292,8 @@ class ColumnTable:
 
     def flags(self, column: str) -> Bools:
         """Return (rows,) a column of true or false; empty cells are true."""
+        if column not in self.columns:
+            return np.ones(self.count, dtype=bool)
         cells = self.texts(column)
         for row, cell in enumerate(cells):
             if cell and cell.lower() not in TRUE | FALSE:

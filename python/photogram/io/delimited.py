@@ -409,7 +409,7 @@ def _of_arrow(
     for name, column in zip(columns, table.columns, strict=True):
         is_number = types.is_floating(column.type) or types.is_integer(column.type)
         is_text = types.is_string(column.type) or types.is_large_string(column.type)
-        # NameColumn may consist of digits.
+        # Names may consist of digits.
         digits = types.is_integer(column.type) and name not in numbers
         if is_text or digits or types.is_dictionary(column.type):
             texts, codes = coded(column)

@@ -59,7 +59,7 @@ def network_findings(
     """Return the findings of all networks, with tests of fixed values and of patterns."""
     tests, summary = Tests(result), result.reliability_summary
     lost = None if summary is None else summary.downweighted
-    test = _robust_test(result) if result.loss else result.global_test
+    test = _whole_test(result)
     assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
     rivals, known = hypotheses.largest_odds(fixed), result.KNOWN and summary is not None
@@ -114,8 +114,10 @@ def _unchecked_control(result: AdjustedNetwork, types: Iterable[TypeFactor]) -> 
     ]
 
 
-def _robust_test(result: AdjustedNetwork) -> GlobalTest | None:
-    """Return the test of the observations that a loss does not remove, with their given weights."""
+def _whole_test(result: AdjustedNetwork) -> GlobalTest | None:
+    """Return the test of all observations that a loss does not remove, with their given weights."""
+    if not result.loss:
+        return result.global_test
     summary = result.reliability_summary
     constrained = getattr(result, "unit_variance", "constrained") == "constrained"
     if summary is None or not result.KNOWN or not constrained:
@@ -131,7 +133,7 @@ def block_findings(result: Result) -> Findings:
     tests_more = result.WHOLE and not intersected
 
     def residual_findings() -> tuple[Sequence[Systematic], list[Phrase]]:
-        test = _robust_test(result) if result.loss else result.global_test
+        test = _whole_test(result)
         copies = duplicates(result.block, test.factor if test else 1.0)
         return [] if intersected else block_patterns(result), copies
 

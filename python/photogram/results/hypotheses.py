@@ -231,10 +231,9 @@ class Hypotheses:
 
     def _assumption(self, code: str) -> Phrase:
         """Return the source of the datum, with the error of its heights that check points detect."""
-        rows = [row for row in np.flatnonzero(self.code == code).tolist() if row in self.relative]
-        if not rows:  # Also of control without heights
+        row = next((row for row in np.flatnonzero(self.code == code).tolist() if row in self.relative), None)
+        if row is None:  # Also of control without heights
             return phrase(f"datum.{code}")
-        row = rows[0]
         size = DETECTED * math.sqrt(self.sets[row]["cofactors"][0])
         return phrase(f"datum.{code}.checks", size=f"{size:.2g}{self._unit(row)}")
 
