@@ -1,4 +1,4 @@
-"""Wrong lens parameters: sign or unit of radial terms, half-pixel offsets."""
+"""Wrong lens parameters: sign or unit of radial terms, principal points, half-pixel offsets."""
 
 from __future__ import annotations
 
@@ -11,15 +11,22 @@ from functools import partial
 import numpy as np
 
 from photogram.diagnosis.findings import Finding, finding
-from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain
+from photogram.diagnosis.mistakes import MOST, Adjuster, Explained, Proposal, explain
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.results.network_trial import KINDS, type_name
 from photogram.results.result import Result
+from photogram.results.tables import Tests
 from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[AKk]([1-6])")
 SIGNIFICANT = 5.0
 HALF, NEARLY = 0.5, 0.1  # Pixels
+POINT = ("xp", "yp")
+CHANCE = 1e-4  # Probability of any message on a certificate in correct data
+WITHIN = 3.0  # Standard deviations of an error that equals twice the given value
+INDICATED = 1e-3  # Largest distance of an indicated principal point from the origin, mm
 
 
 def wrong_terms(block: Block, adjusted: Adjuster) -> Explained | None:
@@ -58,17 +65,61 @@ def _proposals(block: Block) -> Iterator[Proposal]:
 
 
 def _scaled(block: Block, factors: list[float], power: int) -> Block:
-    """Multiply the radial terms of all cameras; see :func:`radial_scaled`."""
-    pairs = zip(block.cameras, factors, strict=True)
-    return block.replace(cameras=[radial_scaled(camera, factor, power) for camera, factor in pairs])
+    """Multiply radial terms of all cameras by factor^(power number), or the factor if `power` is 0."""
+    cameras = []
+    for camera, factor in zip(block.cameras, factors, strict=True):
+        terms = {
+            name: camera.parameters[name] * factor ** (power * number or 1)
+            for name, number in _given_terms(camera).items()
+        }
+        cameras.append(replace(camera, parameters={**camera.parameters, **terms}))
+    return block.replace(cameras=cameras)
 
 
-def radial_scaled(camera: Camera, factor: float, power: int = 0) -> Camera:
-    """Multiply radial terms by factor^(power number), or the factor if `power` is 0."""
-    changed = dict(camera.parameters)
-    for name, number in _given_terms(camera).items():
-        changed[name] *= factor ** (power * number) if power else factor
-    return replace(camera, parameters=changed)
+def certificate_hints(result: Result) -> list[Message]:
+    """Return mistakes in weighted lenses of films whose test as a group rejects."""
+    of_photos, summary = result.block.photo_cameras, result.reliability_summary
+    if of_photos is None or summary is None or result.loss is not None or not result.films:
+        return []
+    films, found = {int(of_photos[row]) for row, _ in result.films}, list[Message]()
+    kind, suspects = KINDS.index("camera"), summary.suspects
+    for tests in Tests(result).groups:
+        if tests.kind == type_name(kind) and tests.rows is not None:
+            for _, (place,) in tests.beyond(CHANCE / len(films)):
+                row = int(tests.rows[place])
+                group = np.flatnonzero((suspects.kinds == kind) & (suspects.subjects == row))[0]
+                message = _of_certificate(result, row, int(group)) if row in films else None
+                found += [Message(message)] * (message is not None)
+    return found
+
+
+def _of_certificate(result: Result, row: int, group: int) -> Phrase | None:
+    """Return the sign of the distortion, or the principal point, if its errors explain the test of a camera.
+
+    An opposite sign is an error of twice the given value.
+    """
+    summary, camera, title = result.reliability_summary, result.block.cameras[row], result.cameras[row].name
+    assert summary is not None
+    errors, tests = summary.hypotheses, summary.tests
+    parts = np.flatnonzero((errors.group == group) & (errors.component >= 0))
+    names = [camera.names[component] for component in errors.component[parts].tolist()]
+    squares = dict(zip(names, errors.statistic[parts].tolist(), strict=True))
+    sizes = dict(zip(names, errors.estimate[parts, 0].tolist(), strict=True))
+    least = MOST * float(tests.statistic[group])
+    for name in {*_given_terms(camera)} & {*names}:
+        error, sd = sizes[name], abs(sizes[name]) / math.sqrt(squares[name])
+        if squares[name] > least and abs(error - 2 * camera.parameters[name]) < WITHIN * sd:
+            return phrase("film-lens.sign", camera=title)
+    if not {*POINT} <= {*names} or sum(squares[name] for name in POINT) < least:
+        return None
+    rows = summary.suspects.rows(group)[[names.index(name) for name in POINT]]
+    old, sd = np.array([camera.parameters[name] for name in POINT]), tests.error_sd[rows]
+    values, size = old - tests.error[rows], float(np.hypot(*old))
+    opposite = (np.abs(values + old) < WITHIN * sd).all() and size > WITHIN * float(sd.max())
+    code = "signs" if opposite else "indicated" if size < INDICATED else "point"
+    fields = {"x": values[0], "y": values[1], "sd_x": sd[0], "sd_y": sd[1]}
+    fields |= {"given_x": old[0], "given_y": old[1]}
+    return phrase(f"film-lens.{code}", camera=title, **{name: float(own) for name, own in fields.items()})
 
 
 def half_pixel(result: Result) -> list[Finding]:

@@ -48,7 +48,7 @@ REGISTRY = (
     # A film in two pieces, or one that has changed along one axis, also makes marks fail.
     Mistake("axis", "fit", "film_marks.axis_hints", unless=("seam",)),
     Mistake("marks", "fit", "film_marks.mark_hints", unless=("seam", "axis")),
-    Mistake("certificate", "fit", "film_lenses.lens_hints"),
+    Mistake("certificate", "fit", "lenses.certificate_hints"),
     Mistake("jitter", "fit", "film_scans.line_hints"),
 )
 
