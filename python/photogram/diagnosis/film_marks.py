@@ -1,7 +1,7 @@
 """Misfitting fiducial marks of all photos, a photo, or a reading, with the cause.
 
-Films that have changed along one axis but are modelled as conformal leave a pattern at the marks. If the sum
-of squares of marks is too large, the block is adjusted with free b1 and b2 of these films. Along the axis at
+Films that have changed along one axis but are modelled as conformal leave a pattern at the marks. If
+residuals are too large, the block is adjusted with free b1 and b2 of these films. Along the axis at
 atan2(b2, b1)/2 a film is longer by 2 sqrt(b1^2 + b2^2) than across.
 """
 
@@ -10,18 +10,17 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from photogram import _photocore
-from photogram.diagnosis.mistakes import Proposal, explain_test
+from photogram.diagnosis.mistakes import MOST, Adjuster, omega
 from photogram.diagnosis.tested_values import FOUND
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
+from photogram.results.fixed_tests import is_suspected
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.limits import normal_limit
@@ -102,7 +101,6 @@ def _tested(result: Result) -> Iterator[_Tested]:
 
 FEWEST = 4  # Marks of a photo: three fit any axis
 CHANCE = 1e-3  # Probability of a hint in correct data
-DOUBTFUL = 0.05  # Level of the test of the marks of any photo
 
 
 def axis_hints(result: Result) -> list[Message]:
@@ -115,15 +113,16 @@ def axis_hints(result: Result) -> list[Message]:
         for row, film in result.films
         if not (film.placement.is_held or film.size.deviations[1:].any()) and count[names[row]] >= FEWEST
     }
-    excess = _excess(result) if conformal else 0.0
-    proposal = Proposal("axis", phrase("film-check.axis"), partial(_freed, films=conformal))
-    meant = explain_test(result, [proposal], excess) if excess else None
-    if meant is None:
+    if not conformal or not is_suspected(result):
         return []
-    limit, changes, found = critical_chi_square(CHANCE / len(conformal), 2), meant[1].film[:, 4:], []
+    meant = Adjuster.of(result).converged(_freed(result.block, conformal))
+    squares, freedom = result.sum_and_freedom
+    if meant is None or omega(result) - omega(meant) < MOST * (squares - freedom):
+        return []
+    limit, found = critical_chi_square(CHANCE / len(conformal), 2), []
     for row in conformal:
-        b = changes[row]
-        if b @ np.linalg.solve(meant[1].film_cofactors[row, 4:, 4:], b) > limit:
+        b = meant.film[row, 4:]
+        if b @ np.linalg.solve(meant.film_cofactors[row, 4:, 4:], b) > limit:
             found.append((2.0 * float(np.hypot(*b)), names[row], np.degrees(np.arctan2(b[1], b[0]) / 2)))
     if not found:
         return []
@@ -132,20 +131,6 @@ def axis_hints(result: Result) -> list[Message]:
     far = max(float(np.linalg.norm(each.mark.position[:2])) for each in read if each.photo == photo)
     fields = {"longer": longer, "angle": float(angle), "at_marks": 1e3 * longer * far}
     return [Message(phrase("film-check.axis", photos=[name for _, name, _ in found], photo=photo, **fields))]
-
-
-def _excess(result: Result) -> float:
-    """Return the excess of the sum of squares; 0 unless the marks of a photo, or of a certificate, fail."""
-    squares, redundancy = defaultdict[str, float](float), defaultdict[str, float](float)
-    for kind in (result.kinds[name] for name in (Fiducial.KIND, CERTIFICATE) if name in result.kinds):
-        of_rows = (kind.redundancy * np.nan_to_num(kind.standardized) ** 2).sum(axis=1)
-        for row, own, r in zip(kind.rows.tolist(), of_rows, kind.redundancy.sum(axis=1), strict=True):
-            name = result.block.observations[row].of[0]
-            squares[name] += float(own)
-            redundancy[name] += float(r)
-    fails = (_photocore.chi_square(squares[name], redundancy[name]) for name in squares)
-    omega, freedom = result.sum_and_freedom
-    return omega - freedom if min(fails, default=1.0) * len(squares) < DOUBTFUL else 0.0
 
 
 def _freed(block: Block, films: Mapping[int, Film]) -> Block:

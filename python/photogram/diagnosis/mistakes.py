@@ -23,7 +23,7 @@ from photogram.words import Phrase, phrase
 KEPT = 2  # Adjustments that are always stored
 STORED = 500_000  # Image observations of the blocks of all stored adjustments, if there are more
 CLEARLY = 2 * math.log(20)  # Additional cost of single wrong members of a set (likelihood ratio of 20)
-MOST = 0.8  # Part of the statistic of a rejected test that a mistake explains
+MOST = 0.8  # Part of a rejected test that a mistake explains
 WORST = 1e6  # Assumed ratio to the worst proposal of a block that cannot be adjusted
 
 Change = Callable[[Block], Block]
@@ -149,21 +149,6 @@ def explain(
     if found is None:
         return None
     return Explained([tried[row] for row in found.best], [results[row] for row in found.best], found)
-
-
-def explain_test(
-    result: Result, proposals: Iterable[Proposal], statistic: float
-) -> tuple[Proposal, Result] | None:
-    """Return the first proposal that explains a rejected test of a set, with its adjustment.
-
-    `statistic` is T of the set: the decrease of the sum of squares without all its values.
-    """
-    adjusted = Adjuster.of(result)
-    for proposal in proposals:
-        changed = adjusted.converged(proposal.change(result.block))
-        if changed is not None and omega(result) - omega(changed) > MOST * statistic:
-            return proposal, changed
-    return None
 
 
 def omega(result: Result | None) -> float:
