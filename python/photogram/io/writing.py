@@ -12,9 +12,9 @@ import secrets
 import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO, Self
 
@@ -165,8 +165,6 @@ class _Staged:
     path: str
     file: io.BufferedRandom | None = None
     is_moved: bool = False  # Or is being moved
-    flushing: Thread | None = None  # Flushes the file to disk
-    error: OSError | None = None  # Of this thread
 
     @property
     def old(self) -> str:
@@ -186,30 +184,13 @@ class _Staged:
             os.fchmod(descriptor, mode)
         return file
 
-    def begin_flush(self) -> None:
-        """Start to flush a file to disk; meanwhile other results are computed and written."""
-        if self.flushing is None:
-            self.flushing = Thread(target=self._flush)
-            self.flushing.start()
-
-    def _flush(self) -> None:
-        assert self.file is not None
-        # A signal that ends the process closes the file: a ValueError.
-        with suppress(ValueError):
-            try:
-                with naming(self.target.given):
-                    self.file.flush()
-                    os.fsync(self.file.fileno())
-                self.file.close()
-            except OSError as error:
-                self.error = error
-
     def complete(self) -> None:
-        """Wait until a file is on disk."""
-        if self.flushing is not None:
-            self.flushing.join()
-        if self.error is not None:
-            raise self.error
+        """Write a file to disk."""
+        if self.file is not None and not self.file.closed:
+            with naming(self.target.given):
+                self.file.flush()
+                os.fsync(self.file.fileno())
+            self.file.close()
 
     def move(self) -> None:
         if self.target.status:
@@ -248,6 +229,8 @@ class OutputSet:
         self._streams: list[io.BufferedWriter] = []
         self._late: list[tuple[Target, Content]] = []
         self._made: list[str] = []
+        self._pending: list[Future[None]] = []
+        self._disk = ThreadPoolExecutor(MOST_PENDING)
         self._is_complete = False
 
     def __enter__(self) -> Self:
@@ -259,8 +242,8 @@ class OutputSet:
     ) -> None:
         try:
             if kind is None:
-                for staged in self._staged:
-                    staged.begin_flush()
+                for future in self._pending:
+                    future.result()
                 for staged in self._staged:
                     staged.complete()
                 for file in self._streams:
@@ -272,9 +255,7 @@ class OutputSet:
                     staged.move()
                 self._is_complete = True
         finally:
-            for staged in self._staged:
-                with suppress(OSError):
-                    staged.complete()
+            self._disk.shutdown()
             self.abandon()
 
     def open(self, path: Path) -> _Buffer:
@@ -291,9 +272,10 @@ class OutputSet:
         target = self._target(path)
         if target.regular:
             _put(self._stage(target), content)
-            self._staged[-1].begin_flush()
-            if len(self._staged) > MOST_PENDING:
-                self._staged[-MOST_PENDING].complete()
+            # Meanwhile other results are computed and written.
+            self._pending.append(self._disk.submit(self._staged[-1].complete))
+            if len(self._pending) > MOST_PENDING:
+                self._pending[-MOST_PENDING].result()
         else:
             self._late.append((target, content))
 
