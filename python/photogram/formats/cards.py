@@ -9,13 +9,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.delimited import read_columns
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.words import phrase
 
 END = "-99"  # Word that ends a photo or a file
-_UNITS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}
 
 
 class Card:
@@ -61,21 +59,6 @@ def cards(path: Path) -> Iterator[Card]:
         yield Card(Place(path, record, line))
 
 
-def names_beside(path: Path) -> dict[str, str]:
-    """Return names by number from a table `number, name`; empty without file."""
-    if not path.is_file():
-        return {}
-    table = read_columns(path, known=("number", "name"))
-    table.require("number", "name")
-    table.names("number")
-    found: dict[str, str] = {}
-    for row, (number, name) in enumerate(zip(table.texts("number"), table.texts("name"), strict=True)):
-        if number in found or not name:
-            raise table.error(row, phrase("format.name", what="number", name=number))
-        found[number] = name
-    return found
-
-
 def has_suffix(suffix: str, path: Path) -> bool:
     """Return whether a file, or a file in a folder, has a suffix in any case."""
     return any(each.suffix.lower() == suffix for each in (path.iterdir() if path.is_dir() else (path,)))
@@ -89,17 +72,3 @@ def one_file(path: Path, suffix: str) -> Path | None:
             phrase("format.several", name=suffix, names=[file.name for file in found]), file=path
         )
     return found[0] if found else None
-
-
-def angle_unit(wished: str | None, default: str | None, path: Path) -> str:
-    """Return the unit of angles: requested or of the format, else an error."""
-    unit = wished or default
-    if unit is None:
-        raise InputError(phrase("format.angle-unit"), file=path)
-    return unit
-
-
-def to_radians(values: Floats, unit: str) -> Floats:
-    """Return angles in radians."""
-    found: Floats = values * _UNITS[unit]
-    return found

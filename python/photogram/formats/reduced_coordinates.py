@@ -1,8 +1,13 @@
-"""Reduced photo coordinates: mm from the principal point, y up."""
+"""PATB and BINGO: photo coordinates reduced to the principal point, y up.
+
+PATB has an image file in micrometres, an orientation with matrices, and control with codes. BINGO has
+`image.dat` in millimetres, and an orientation with lines `ORIA`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +15,25 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
+from photogram.formats.cards import END, Card, cards, has_suffix, one_file
+from photogram.formats.format import Format
+from photogram.formats.images import checked_rotation
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras, known_points
+from photogram.formats.names import numbered
+from photogram.formats.plain.cameras import read_cameras
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
+from photogram.formats.read_options import ReadOptions
 from photogram.formats.self_check import agreement
-from photogram.io.places import Place
+from photogram.io.csv_text import csv_text
+from photogram.io.delimited import read_columns
+from photogram.io.numbers import scaled
+from photogram.io.places import Place, one_word
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
+from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
@@ -26,15 +44,46 @@ LEAST, MOST = 2.0, 3000.0  # Smallest and largest principal distance of cameras,
 NOMINAL = 100.0
 """Principal distance in millimetres for an unknown pixel size; it does not affect the rays."""
 HOLDS = frozenset({"names", "shared-cameras", "control"})
+RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}
+LARGEST = 1e4  # Largest angle, radians
 SIDE = -0.02  # Largest u3 of unit directions that a perspective camera can image
 
 
 class ReducedBuilder(BlockBuilder):
-    """A block of such files; `sd` are standard deviations of the user."""
+    """A block of such files; `names` are names of photos and points by their words."""
 
-    def __init__(self, path: Path, title: str, sd: Mapping[str, tuple[float, ...]]) -> None:
+    def __init__(
+        self, path: Path, title: str, options: ReadOptions, names: Mapping[str, str] | None = None
+    ) -> None:
         super().__init__(path, title)
-        self.sd = sd
+        self.sd, self.unit_of_angles, self.names = options.sd, options.angles, names or {}
+
+    def name(self, card: Card, index: int = 0) -> str:
+        """Return the name of a word."""
+        return self.names.get(card.words[index], card.words[index])
+
+    def add_images(self, add: Callable[[str, Card], None], unit: float, *, ends_empty: bool) -> None:
+        """Add the photos of the image file, each with the observations up to an end mark or empty line."""
+        photo: str | None = None
+        for card in cards(self.path):
+            if card.ends or not card.words:
+                photo = None if card.ends or ends_empty else photo
+            elif photo is None:
+                photo = self.name(card)
+                add(photo, card)
+            else:
+                xy = card.numbers(1, "x y")
+                x, y = (xy if unit == 1.0 else scaled(xy, unit)).tolist()
+                self.image(photo, self.name(card), x, y)
+
+    def turn(self, card: Card, first: int, default: str | None) -> Floats:
+        """Return the rotation of angles in the unit of the user, or by default of the format."""
+        if (unit := self.unit_of_angles or default) is None:
+            raise InputError(phrase("format.angle-unit"), file=card.place.file)
+        angles = card.numbers(first, "omega phi kappa") * RADIANS[unit]
+        if (most := abs(angles).max()) > LARGEST:
+            raise card.place.error(phrase("format.angles", most=LARGEST, unit="rad", value=float(most)))
+        return Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
 
     def principal_distance(self, c: float, place: Place) -> str:
         """Return the name of the camera of a principal distance in millimetres."""
@@ -74,8 +123,6 @@ def with_fitting_rotations(project: Project) -> Project:
     if not np.isfinite(block.photo_attitudes).all():
         return project
     as_read = _misfit(project)
-    from photogram.network.attitudes import Attitudes
-
     matrices = Attitudes.of("omega_phi_kappa", block.photo_attitudes).matrices
     turned = Attitudes(matrices.transpose(0, 2, 1)).values("omega_phi_kappa")
     other = project.replace(block=block.replace(photo_attitudes=turned))
@@ -169,3 +216,217 @@ def by_photo(project: Project, reduced: ReducedImages) -> Sequence[list[tuple[st
     for photo, point, (x, y) in zip(photos, points, reduced.xy.tolist(), strict=True):
         found[photo].append((block.point_ids[point], x, y))
     return found
+
+
+PATB = "PATB block"
+IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
+MICROMETRES = 1e-3
+DIGITS = 6  # Digits of principal distances in millimetres; files have three of micrometres
+
+
+def _read_patb(path: Path, options: ReadOptions) -> Project:
+    """Read the image file, and orientation, control and names if present."""
+    folder = path if path.is_dir() else path.parent
+    images = path if path.is_file() else one_file(folder, IMAGES)
+    if images is None:
+        raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
+    block = ReducedBuilder(images, PATB, options, _names(folder / NAMES))
+
+    def add(photo: str, card: Card) -> None:
+        c = card.number(1, "the principal distance") * MICROMETRES
+        block.photo(photo, block.principal_distance(c, card.place), card.place)
+
+    block.add_images(add, MICROMETRES, ends_empty=False)
+    if (orientation := one_file(folder, ORIENTATION)) is not None:
+        _orientation(orientation, block)
+    if (control := one_file(folder, CONTROL)) is not None:
+        for card in _filled(control):
+            xyz = card.numbers(1, "X Y Z")
+            codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
+            # A single code applies to all coordinates, two to position and height.
+            level, height = (code > 0 for code in (codes[0], codes[-1])) if codes else (False, False)
+            block.known_point(block.name(card), xyz, np.array([level, level, height]), card.place)
+    return block.reduced_project("um")
+
+
+def _filled(path: Path) -> Sequence[Card]:
+    return [card for card in cards(path) if card.words and not card.ends]
+
+
+def _names(path: Path) -> dict[str, str]:
+    """Return names by number from a table `number, name`; empty without file."""
+    if not path.is_file():
+        return {}
+    table = read_columns(path, known=("number", "name"))
+    table.require("number", "name")
+    table.names("number")
+    found: dict[str, str] = {}
+    for row, (number, name) in enumerate(zip(table.texts("number"), table.texts("name"), strict=True)):
+        if number in found or not name:
+            raise table.error(row, phrase("format.name", what="number", name=number))
+        found[number] = name
+    return found
+
+
+def _orientation(path: Path, block: ReducedBuilder) -> None:
+    """Add poses: angles in the line of the centre, or the matrix in the lines after it."""
+    lines = iter(_filled(path))
+    for head in lines:
+        centre = head.numbers(1, "X Y Z")
+        if len(head.words) >= 7:
+            matrix = block.turn(head, 4, None)
+        else:
+            elements: list[float] = []
+            while len(elements) < 9:
+                if (card := next(lines, None)) is None:
+                    raise head.place.error(phrase("format.end", name="the nine elements of the rotation"))
+                elements += card.numbers(0, " ".join(["element"] * len(card.words))).tolist()
+            if len(elements) != 9:
+                raise head.place.error(phrase("format.count", n=len(elements), required=9))
+            matrix = checked_rotation(head.place, np.array(elements).reshape(3, 3), 1e-4)
+        block.pose(block.name(head), centre, matrix, head.place)
+
+
+def _lost_in_patb(project: Project) -> list[Phrase]:
+    found = [*lost_of_reduced(project, reduced_images(project, DIGITS)), phrase("lost.patb-digits")]
+    if any((held[0] != held[1]) for _, held in given_control(project).values()):
+        found.append(phrase("lost.horizontal-control"))
+    return found
+
+
+def _write_patb(project: Project) -> Mapping[str, bytes]:
+    """Return image file, orientation, control, and names if they are not numbers."""
+    block, reduced = project.block, reduced_images(project, DIGITS)
+    numbers = numbered([*block.photo_ids, *block.point_ids])
+    images: list[str] = []
+    distances = reduced.distances[reduced.cameras]
+    for photo, c, own in zip(block.photo_ids, distances, by_photo(project, reduced), strict=True):
+        images.append(f"{numbers[photo]:12d}{c / MICROMETRES:15.3f}")
+        images += [
+            f"{numbers[point]:12d}{x / MICROMETRES:16.4f}{y / MICROMETRES:16.4f}    0" for point, x, y in own
+        ]
+        images.append(f"{END:>12}")
+    files = {f"block{IMAGES}": images, f"block{ORIENTATION}": _oriented(project, reduced, numbers)}
+    control = [
+        f"{numbers[name]:12d}{''.join(f'{0.0 if np.isnan(own) else own:17.5f}' for own in position)}"
+        f"{int(held[:2].all()):5d}{int(held[2]):5d}"
+        for name, (position, held) in given_control(project).items()
+    ]
+    files[f"block{CONTROL}"] = [*control, f"{END:>12}"] if control else []
+    found = {name: ("\n".join(lines) + "\n").encode() for name, lines in files.items() if lines}
+    if any(str(number) != name for name, number in numbers.items()):
+        found[NAMES] = csv_text({"number": list(numbers.values()), "name": list(numbers)})
+    return found
+
+
+def _oriented(project: Project, reduced: ReducedImages, numbers: Mapping[str, int]) -> list[str]:
+    lines = []
+    for row in np.flatnonzero(reduced.posed).tolist():
+        centre = "".join(f"{own:16.5f}" for own in project.block.photo_positions[row])
+        elements = [f"{own:16.12f}" for own in reduced.matrices[row].ravel()]
+        lines += [
+            f"{numbers[project.block.photo_ids[row]]:16d}{'':16}{centre}",
+            "".join(elements[:5]),
+            "".join(elements[5:]),
+        ]
+    return lines
+
+
+BINGO = "BINGO block"
+IMAGE_DAT, ORIENTATION_DAT, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
+
+
+def _read_bingo(path: Path, options: ReadOptions) -> Project:
+    """Read `image.dat` and the orientation; the default angle unit is gon."""
+    folder = path if path.is_dir() else path.parent
+    images = folder / IMAGE_DAT if path.is_dir() else path
+    table = options.cameras or folder / CAMERAS
+    if options.cameras is None and not table.is_file():
+        raise InputError(phrase("format.cameras"), file=images)
+    given = read_cameras(Tables(Settings(images, tables={"cameras": table}, image="mm"), []))
+    known = {each.name: each for each in given.cameras}
+    block = ReducedBuilder(images, BINGO, options)
+
+    def add(photo: str, card: Card) -> None:
+        camera = card.words[1] if len(card.words) > 1 else ""
+        if camera in known and camera not in block.camera_rows:
+            block.camera(known[camera])
+        block.photo(photo, camera, card.place)
+
+    block.add_images(add, 1.0, ends_empty=True)
+    for card in _filled(folder / ORIENTATION_DAT) if (folder / ORIENTATION_DAT).is_file() else ():
+        one_word(card.place, "keyword", card.words[0], ["ORIA"])
+        if len(card.words) < 9:
+            raise card.place.error(phrase("format.member", name="photo, camera, X, Y, Z, omega, phi, kappa"))
+        matrix = block.turn(card, 6, "gon")
+        block.pose(card.words[1], card.numbers(3, "X Y Z"), matrix, card.place)
+    return block.reduced_project("mm")
+
+
+def _lost_in_bingo(project: Project) -> list[Phrase]:
+    found = lost_of_reduced(project, reduced_images(project))
+    if any(name != word for name, word in _words(project).items()):
+        found.append(phrase("lost.blanks"))
+    if given_control(project):
+        found.append(phrase("lost.control-table"))
+    return found
+
+
+def _words(project: Project) -> dict[str, str]:
+    """Return names as words of the files."""
+    found: dict[str, str] = {}
+    cameras = reduced_images(project).names
+    for names in (project.block.photo_ids, project.block.point_ids, cameras):
+        own = {name: "_".join(name.split()) for name in names}
+        last = {word: name for name, word in own.items()}
+        if same := [[name, last[word]] for name, word in own.items() if last[word] != name]:
+            raise InputError(phrase("bingo.blanks", names=same[0]))
+        found |= own
+    if bad := [name for name, word in found.items() if word in (END, "C", "#")]:
+        raise InputError(phrase("bingo.reserved", name=bad[0]))
+    return found
+
+
+def _write_bingo(project: Project) -> Mapping[str, bytes]:
+    """Return images, orientation, and tables of cameras and of control."""
+    block, reduced, words = project.block, reduced_images(project), _words(project)
+    lines: list[str] = []
+    owners = [words[reduced.names[row]] for row in reduced.cameras.tolist()]
+    for photo, camera, own in zip(block.photo_ids, owners, by_photo(project, reduced), strict=True):
+        lines.append(f"{words[photo]} {camera}")
+        lines += [f"{words[point]} {x!r} {y!r}" for point, x, y in own]
+        lines.append(END)
+    files = {IMAGE_DAT: ("\n".join(lines) + "\n").encode()}
+    if len(rows := np.flatnonzero(reduced.posed)):
+        angles = Attitudes(reduced.matrices[rows]).values("omega_phi_kappa") * (200 / np.pi)
+        lines = []
+        for row, own in zip(rows.tolist(), angles.tolist(), strict=True):
+            numbers = " ".join(map(repr, [*block.photo_positions[row].tolist(), *own]))
+            lines.append(f"ORIA {words[block.photo_ids[row]]} {owners[row]} {numbers}\n")
+        files[ORIENTATION_DAT] = "".join(lines).encode()
+    files[CAMERAS] = csv_text({"camera": [words[name] for name in reduced.names], "c": reduced.distances})
+    if table := control_table(project):
+        files["control.csv"] = csv_text({**table, "point": [words[name] for name in table["point"]]})
+    return files
+
+
+PATB_FORMAT = Format(
+    name="patb",
+    title=PATB,
+    recognises=partial(has_suffix, IMAGES),
+    read=_read_patb,
+    write=_write_patb,
+    files=(f"block{IMAGES}", f"*{IMAGES}"),
+    holds=HOLDS,
+    cannot_hold=_lost_in_patb,
+)
+BINGO_FORMAT = Format(
+    name="bingo",
+    title=BINGO,
+    recognises=lambda path: (path / IMAGE_DAT).is_file() if path.is_dir() else path.name.lower() == IMAGE_DAT,
+    read=_read_bingo,
+    write=_write_bingo,
+    files=(IMAGE_DAT,),
+    holds=HOLDS,
+    cannot_hold=_lost_in_bingo,
+)
