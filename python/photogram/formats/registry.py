@@ -57,7 +57,7 @@ FORMATS: dict[str, Format] = {
             "pixels:FORMAT",
             "reduced_coordinates:PATB_FORMAT",
             "reduced_coordinates:BINGO_FORMAT",
-            "dbat:FORMAT",
+            "dbat.script:FORMAT",
             "aicon:FORMAT",
             "giant:FORMAT",
             "isis:FORMAT",
