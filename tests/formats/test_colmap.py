@@ -147,7 +147,7 @@ def test_control_by_names_carries_a_model_in_a_frame_of_its_own(run, tmp_path):
 
 
 def test_rotations_of_the_sidecar_are_those_of_the_cameras_axes():
-    from photogram.formats.colmap.writing import _centre_and_rotation
+    from photogram.formats.colmap.models import _centre_and_rotation
 
     result = adjust(formats.read(EXAMPLE).block)
     covariances = _centre_and_rotation(result)

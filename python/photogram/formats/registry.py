@@ -47,8 +47,8 @@ FORMATS: dict[str, Format] = {
         resolve_name(f"photogram.formats.{home}")
         for home in (
             "plain:FORMAT",
-            "colmap:FORMAT",
-            "colmap:TEXT",
+            "colmap.models:FORMAT",
+            "colmap.models:TEXT",
             "opensfm:FORMAT",
             "blocks_exchange:FORMAT",
             "agisoft:FORMAT",

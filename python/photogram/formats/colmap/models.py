@@ -1,29 +1,217 @@
-"""Writer of COLMAP models, and of the covariances of a result."""
+"""COLMAP models as projects, and the covariances of a result."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.builder import BlockBuilder, FrameOf, Rig
 from photogram.formats.colmap import content
-from photogram.formats.colmap.files import binary_files, text_files
+from photogram.formats.colmap.files import binary_files, read_model, text_files
+from photogram.formats.format import Format
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras
-from photogram.formats.names import names_file, numbered
+from photogram.formats.names import NAMES, NamedValues, names_file, numbered, renamed
 from photogram.formats.project import Project, Size
+from photogram.formats.read_options import ReadOptions
 from photogram.io.json import to_json
 from photogram.io.parquet import packed
-from photogram.lazy_dataclasses import dataclass
+from photogram.io.places import Place, at_place
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.rigs import Mount
+from photogram.network.unknowns import Sensor
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase
+
+TITLE = "COLMAP model"
+MAX_DIFFERENCE, NORMALISED = 1e-2, 1e-6
+"""Differences of the length of a quaternion from 1: the largest, and the largest without a remark."""
+
+
+def place_of(path: Path) -> Path | None:
+    """Return the folder of a model: a path itself, or `sparse/0` or `sparse` in it."""
+    for folder in (path, path / "sparse" / "0", path / "sparse"):
+        if any(
+            (folder / f"cameras{end}").is_file() and (folder / f"images{end}").is_file()
+            for end in (".bin", ".txt")
+        ):
+            return folder
+    return None
+
+
+def read(path: Path, options: ReadOptions) -> Project:
+    """Read a model."""
+    del options
+    folder = place_of(path)
+    if folder is None:
+        raise InputError(phrase("colmap.files"), file=path)
+    return renamed(_project(read_model(folder), path), folder / NAMES)
+
+
+def _project(model: content.Model, path: Path) -> Project:
+    block, images = BlockBuilder(path, TITLE), model.images
+    for each in model.cameras:
+        block.camera(_camera(each), (each.width, each.height), key=each.number, place=each.place)
+    for image in images:
+        block.photo(image.number, image.camera, image.place, name=image.name)
+    _check_model(model)
+    names = list(block.photo_ids)
+    rotations, translations, off = _rigid([each.pose for each in images], [each.place for each in images])
+    if len(off):
+        remark = Message.of("colmap.normalised", n=len(off), names=[names[row] for row in off])
+        block.messages.append(remark)
+    frames = _composed(model, rotations, translations, block.messages)
+    centres = -np.einsum("nji,nj->ni", rotations, translations)
+    block.photos(names, block.photo_cameras, centres, (Y_DOWN @ rotations).transpose(0, 2, 1))
+    block.rigs(frames)
+    rows, points = _observed(model, block.messages)
+    block.points(list(map(str, model.points["number"].tolist())), model.points["xyz"].copy())
+    photos = np.repeat(np.arange(len(images)), model.counts)[rows]
+    block.images(photos, points, model.features["xy"][rows])
+    if len(rows):
+        block.lacks.append(Phrase("read.placeless", {"option": Phrase("option.control")}))
+    return block.project(
+        details={
+            "image numbers": dict(zip(names, model.numbers.tolist(), strict=True)),
+            "colours": NamedValues(block.point_ids, model.points["rgb"]),
+        }
+    )
+
+
+def _camera(camera: content.Camera) -> Camera:
+    model = camera.model.lower()
+    names = [name for name, _ in dict(_photocore.camera_models())[model][1]]
+    values = dict(zip(names, camera.parameters, strict=True))
+    with at_place(camera.place):
+        return Camera(model, values, name=str(camera.number), unit="px")
+
+
+def _check_model(model: content.Model) -> None:
+    """Reject positions of features and points that are not finite, and repeated points."""
+    finite = np.isfinite(model.features["xy"]).all(axis=1)
+    if not finite.all():
+        row = int(np.searchsorted(np.cumsum(model.counts), np.argmin(finite), side="right"))
+        raise model.images[row].place.error(phrase("format.finite", name="a feature"))
+    _check_finite(model.points["xyz"], model.point_places, "the position")
+    _, first = np.unique(numbers := model.points["number"], return_index=True)
+    if len(first) < len(numbers):
+        row = int(np.setdiff1d(np.arange(len(numbers)), first)[0])
+        raise model.point_places[row].error(phrase("format.repeated", what="point", name=str(numbers[row])))
+
+
+def _check_finite(values: Floats, places: Sequence[Place], name: str) -> None:
+    finite = np.isfinite(values).all(axis=1)
+    if not finite.all():
+        raise places[int(np.argmin(finite))].error(phrase("format.finite", name=name))
+
+
+def _rigid(poses: Sequence[Sequence[float]], places: Sequence[Place]) -> tuple[Floats, Floats, Indices]:
+    """Return (n, 3, 3) rotations, (n, 3) translations, and rows of quaternions without unit length."""
+    table = np.array(poses, dtype=float).reshape(-1, 7)
+    _check_finite(table[:, 4:], places, "the translation")
+    with np.errstate(over="ignore", invalid="ignore"):
+        lengths = np.linalg.norm(table[:, :4], axis=1)
+        differences = np.abs(lengths - 1)
+    bad = ~(differences <= MAX_DIFFERENCE)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise places[row].error(phrase("format.length", length=float(lengths[row])))
+    matrices = Attitudes.of("quaternion", table[:, :4]).matrices.copy()
+    return matrices, table[:, 4:], np.flatnonzero(differences > NORMALISED)
+
+
+def _composed(
+    model: content.Model, rotations: Floats, translations: Floats, messages: list[Message]
+) -> list[FrameOf]:
+    """Compose poses of frames and rigs to poses of images."""
+    if not model.frames:
+        return []
+    cameras = {camera.number: str(camera.number) for camera in model.cameras}
+    numbers = {rig.number for rig in model.rigs}
+    sensors, rigs = _mounted_sensors(model, cameras)
+    rows = {each.number: row for row, each in enumerate(model.images)}
+    frames, seen, unknown = [], set(), 0
+    turns, shifts, _ = _rigid([each.pose for each in model.frames], [each.place for each in model.frames])
+    for frame, turn, shift in zip(model.frames, turns, shifts, strict=True):
+        place = frame.place
+        if frame.rig not in numbers:
+            raise place.error(phrase("format.undefined", what="rig", name=str(frame.rig)))
+        photos: dict[str, int] = {}
+        for sensor, image in ((own.number, own.image) for own in frame.data if own.kind == content.CAMERA):
+            if image not in rows:
+                raise place.error(phrase("format.undefined", what="image", name=str(image)))
+            row = rows[image]
+            if (frame.rig, sensor) not in sensors or model.images[row].camera != sensor:
+                raise place.error(phrase("colmap.sensor", frame=frame.number, image=image, camera=sensor))
+            if row in seen or cameras[sensor] in photos:
+                raise place.error(phrase("colmap.frame", frame=frame.number, image=image, camera=sensor))
+            seen.add(row)
+            pose = sensors[frame.rig, sensor]
+            if pose is None:
+                rotations[row], translations[row] = np.nan, np.nan
+                unknown += 1
+                continue
+            rotations[row], translations[row] = pose[0] @ turn, pose[0] @ shift + pose[1]
+            photos[cameras[sensor]] = row
+        rig = rigs.get(frame.rig)
+        if rig is not None and any(camera != rig.reference for camera in photos):
+            frames.append(FrameOf(str(frame.number), rig, photos))
+    for code, n in (("colmap.unposed", unknown), ("colmap.frameless", len(rows) - len(seen))):
+        messages += [Message.of(code, n=n)] if n else []
+    return frames
+
+
+def _mounted_sensors(
+    model: content.Model, cameras: Mapping[int, str]
+) -> tuple[dict[tuple[int, int], tuple[Floats, Floats] | None], dict[int, Rig]]:
+    """Return poses of cameras on rigs (None: unknown), and rigs by frame camera."""
+    poses: dict[tuple[int, int], tuple[Floats, Floats] | None] = {}
+    rigs: dict[int, Rig] = {}
+    for rig in model.rigs:
+        sensors: dict[str, Sensor] = {}
+        for number, pose in ((own.number, own.pose) for own in rig.sensors if own.kind == content.CAMERA):
+            if number not in cameras:
+                raise rig.place.error(phrase("format.undefined", what="camera", name=str(number)))
+            poses[rig.number, number] = None
+            if pose:
+                turns, shifts, _ = _rigid([pose], [rig.place])
+                poses[rig.number, number] = rigid = turns[0], shifts[0]
+                name = f"rig {rig.number}, camera {number}"
+                sensors[cameras[number]] = Sensor.from_colmap(name, *rigid)
+        for reference in (own.number for own in rig.reference if own.kind == content.CAMERA):
+            poses[rig.number, reference] = np.eye(3), np.zeros(3)
+            rigs[rig.number] = Rig(str(rig.number), cameras.get(reference, ""), sensors)
+    return poses, rigs
+
+
+def _observed(model: content.Model, messages: list[Message]) -> tuple[Indices, Indices]:
+    """Return rows of features that are images of points, and the rows of the points."""
+    named, own = model.features["point"].copy(), model.points["number"].astype(np.int64)
+    features = np.flatnonzero(named != content.NO_POINT)
+    order = np.argsort(own, kind="stable")
+    numbers, wanted = own[order], named[features]
+    at = np.searchsorted(numbers, wanted)
+    known = np.append(numbers, content.NO_POINT)[at] == wanted
+    rows = order[at[known]]
+    missing = np.unique(wanted[~known]).tolist()
+    counts = np.bincount(rows, minlength=len(own))
+    for code, n in (
+        ("colmap.pointless", len(named) - len(features)),
+        ("colmap.unknown-points", np.count_nonzero(~known)),
+        ("colmap.tracks", np.count_nonzero(counts != model.points["track"].astype(np.int64))),
+    ):
+        messages += [Message.of(code, n=int(n), names=missing)] if n else []
+    return features[known], rows
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
@@ -77,7 +265,7 @@ def _written(project: Project) -> _Written:
     cameras, photo_cameras = known_cameras(block)
     numbers = numbered([camera.name for camera in cameras])
     records = [
-        _camera(camera, size, numbers[camera.name])
+        _record(camera, size, numbers[camera.name])
         for camera, size in zip(cameras, sizes_of(project), strict=True)
     ]
     rows = np.flatnonzero(known_poses(block))
@@ -122,7 +310,7 @@ def _written(project: Project) -> _Written:
     return _Written(model, photos, points, numbers, image_rows)
 
 
-def _camera(camera: Camera, size: Size, number: int) -> content.Camera:
+def _record(camera: Camera, size: Size, number: int) -> content.Camera:
     model = camera.model.upper()
     if model in content.MODELS and camera.unit == "px":
         return content.Camera(number, model, *size, tuple(camera.values.tolist()))
@@ -252,3 +440,28 @@ def _centre_and_rotation(result: Result) -> Floats:
     jacobian[3:, 3:] = -Y_DOWN
     found: Floats = jacobian @ result.photo_rotation_covariances @ jacobian.T
     return found
+
+
+HOLDS = frozenset({"names", "points", "lenses", "shared-cameras", "rigs"})
+FORMAT = Format(
+    name="colmap",
+    title=TITLE,
+    recognises=lambda path: path.is_dir() and place_of(path) is not None,
+    read=read,
+    write=write,
+    holds=HOLDS,
+    cannot_hold=cannot_hold,
+    pixels=True,
+    results=covariance_files,
+    folders=("sparse",),
+)
+TEXT = replace(
+    FORMAT,
+    name="colmap_text",
+    title=f"{TITLE} as text",
+    recognises=lambda _: False,
+    write=write_as_text,
+    results=None,
+    folders=(),
+)
+"""Formats for writing only: text is read and recognised by the other format."""
