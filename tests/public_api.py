@@ -24,7 +24,7 @@ KEYWORDS = {
         "AdjustKeywords(TypedDict": "photogram.adjustment.options.AdjustOptions",
         "SnoopKeywords(AdjustKeywords": "photogram.results.snooping_options.SnoopOptions",
     },
-    "targets": {"CalibrationKeywords(TypedDict": "photogram.targets.calibration_options.CalibrationOptions"},
+    "targets": {"CalibrationKeywords(TypedDict": "photogram.targets.options.CalibrationOptions"},
     "network": {"SimulationKeywords(TypedDict": "photogram.network.simulation_options.SimulationOptions"},
 }
 """Types of keywords that the fields of a class define, for checkers of types and editors, by folder."""

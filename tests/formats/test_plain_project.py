@@ -44,7 +44,7 @@ from photogram.network import (
     moving_photos,
     trajectories,
 )
-from photogram.targets import board, choices
+from photogram.targets import board, options
 from photogram.words import option_sd
 
 ANGLES = ("omega", "phi", "kappa")
@@ -641,8 +641,8 @@ def test_a_written_project_keeps_the_comments_of_its_settings(example, tmp_path)
         ("trajectories", "position_axes", trajectories.PositionAxes),
         ("trajectories", "angles", trajectories.Angles),
         ("boards", "kind", board.BoardKind),
-        ("boards", "shape", choices.Shape),
-        ("boards", "regularise", choices.Regularisation),
+        ("boards", "shape", options.Shape),
+        ("boards", "regularise", options.Regularisation),
     ],
 )
 def test_declared_words_are_those_of_the_classes(table, column, words):

@@ -17,7 +17,7 @@ from photogram.cli import calibrate as calibrating
 from photogram.formats import to_files
 from photogram.formats.targets.calibrations import adjusted_project
 from photogram.targets import read
-from photogram.targets.choices import CornerBasis, Shape
+from photogram.targets.options import CornerBasis, Shape
 
 from .projects import Files
 

@@ -5,7 +5,7 @@ import pytest
 
 from message_codes import refusal
 from photogram.targets import Board
-from photogram.targets.board_files import is_board, read_board
+from photogram.targets.board import is_board, read_board
 
 
 def test_points_of_a_chessboard_run_along_x_first():

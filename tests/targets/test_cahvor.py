@@ -10,8 +10,7 @@ from typer.testing import CliRunner
 from photogram import Camera, InputError
 from photogram.cli import app
 from photogram.targets import Calibration, camera_files, convert_lens, difference, first_values
-from photogram.targets.mrcal_model import read_lens, read_model
-from photogram.targets.output.mrcal import mrcal_models
+from photogram.targets.mrcal import mrcal_models, read_lens, read_model
 
 NAMES = ("fx", "fy", "cx", "cy", "axis_x", "axis_y", "r0", "r1", "r2")
 VALUES = (520.0, 521.0, 318.0, 236.0, 0.05, -0.04, 0.01, -0.2, 0.05)

@@ -14,8 +14,8 @@ from golden_boards import left, rig
 from message_codes import refusal
 from photogram import InputError
 from photogram.targets import Calibration, camera_files, first_values, projection_uncertainty, uncertainty_map
-from photogram.targets.mrcal_model import read_model
-from photogram.targets.output.formats import CAMERA_FORMATS, cameras_covariance
+from photogram.targets.camera_formats import CAMERA_FORMATS, cameras_covariance
+from photogram.targets.mrcal import read_model
 from photogram.targets.projection import worst
 
 

@@ -14,7 +14,7 @@ from photogram.cli import app
 from photogram.formats.registry import FORMATS_OF_CAMERAS
 from photogram.formats.targets.calibrations import adjusted_project, rig_of_project
 from photogram.targets import camera_files
-from photogram.targets.output.formats import CAMERA_FORMATS
+from photogram.targets.camera_formats import CAMERA_FORMATS
 
 PROJECT = Path(str(files("photogram.examples") / "project"))
 

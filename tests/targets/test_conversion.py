@@ -7,7 +7,7 @@ from golden_data import shared
 from message_codes import refusal
 from photogram import Camera
 from photogram.targets import convert_lens
-from photogram.targets.mrcal_model import read_model
+from photogram.targets.mrcal import read_model
 
 SIZE = (1280, 960)
 GIVEN = {"fx": 900.0, "fy": 905.0, "cx": 640.0, "cy": 470.0, "k1": -0.2, "k2": 0.06, "p1": 1e-3, "p2": -5e-4}

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram.cli import app
-from photogram.targets.mrcal_model import read_lens
+from photogram.targets.mrcal import read_lens
 from photogram.words import phrase
 
 NAMES = {"lensmodel": "LENSMODEL_OPENCV4", "imagersize": [640, 480]}

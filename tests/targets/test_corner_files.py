@@ -12,8 +12,8 @@ from message_codes import described, refusal
 from photogram import Camera, InputError
 from photogram.targets import Board, CalibrationOptions, read
 from photogram.targets.corner_files import holds_targets, read_table, read_vnl, sorted_files
-from photogram.targets.corner_views import Grouping, grouped
-from photogram.targets.mrcal_model import read_model
+from photogram.targets.corners import Grouping, grouped
+from photogram.targets.mrcal import read_model
 from photogram.targets.opencv_corners import read_npz, read_storage
 from photogram.targets.reading import _measured
 

@@ -11,8 +11,8 @@ import pytest
 from photogram import InputError
 from photogram.io.yaml_text import read_yaml_text
 from photogram.targets import Board, read
-from photogram.targets.board_files import read_board
-from photogram.targets.mrcal_model import read_lens
+from photogram.targets.board import read_board
+from photogram.targets.mrcal import read_lens
 from photogram.targets.opencv_corners import read_npz, read_storage
 from photogram.targets.sightings import focal_lengths, homographies, ray_homographies
 

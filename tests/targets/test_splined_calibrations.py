@@ -13,8 +13,8 @@ from message_codes import refusal
 from photogram import formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, cross_validate, projection_uncertainty, read
-from photogram.targets.output.mrcal import mrcal_models
-from photogram.targets.output.rig import rig_of
+from photogram.targets.mrcal import mrcal_models
+from photogram.targets.output import rig_of
 from photogram.targets.regularisation import regularised, with_knot_sd
 from photogram.targets.tables import spline_lines, splines
 from photogram.targets.vision import composed

@@ -9,8 +9,8 @@ from golden_calibrations import stored
 
 from photogram import Camera
 from photogram.targets import Board, Calibration, Corners, projection_uncertainty
+from photogram.targets.calibration_difference import differences_at, fitted_motion
 from photogram.targets.maps import image_grid
-from photogram.targets.motion_fit import differences_at, fitted_motion
 from photogram.targets.vision import composed, imaged, touched
 
 ACROSS = 10.0

@@ -17,9 +17,13 @@ from photogram.cli.job import Job, adjustment_status, estimation_status, with_jo
 from photogram.cli.options import Changes, Input, InputFile, OfSnooping, Threads, Without, misuse
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.snooping_options import SnoopOptions
-from photogram.targets.calibration_options import CalibrationOptions
-from photogram.targets.choices import CornerBasis, Regularisation
-from photogram.targets.worth_options import WorthOptions, distances_of
+from photogram.targets.options import (
+    CalibrationOptions,
+    CornerBasis,
+    Regularisation,
+    WorthOptions,
+    distances_of,
+)
 
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
@@ -164,7 +168,7 @@ def _plan(
 def _board(seen: CalibrationOptions) -> Board:
     """Return the board of `--board`."""
     from photogram.targets import Board
-    from photogram.targets.board_files import read_board
+    from photogram.targets.board import read_board
 
     if isinstance(seen.board, tuple):
         board = Board(columns=seen.board[0], rows=seen.board[1], spacing=seen.spacing or 0.0)
@@ -231,7 +235,7 @@ def _files(found: Calibrated, formats: Sequence[str], need: float | None) -> dic
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets import camera_files
-    from photogram.targets.output.formats import FILE, cameras_covariance
+    from photogram.targets.camera_formats import FILE, cameras_covariance
     from photogram.targets.page import worth_files
     from photogram.targets.tables import views
 

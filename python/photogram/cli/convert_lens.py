@@ -15,8 +15,7 @@ from photogram.cli.documents import Documents
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Only, Reads, misuse
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.targets.calibration_options import pair
-from photogram.targets.worth_options import distances_of
+from photogram.targets.options import distances_of, pair
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -91,7 +90,7 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
     from photogram.errors import InputError
     from photogram.formats import read
     from photogram.formats.targets.calibrations import MIDDLE, shifted
-    from photogram.targets.mrcal_model import read_lens
+    from photogram.targets.mrcal import read_lens
 
     if path.suffix == ".cameramodel":
         return read_lens(path)
@@ -109,7 +108,7 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
 def _files(found: Conversion) -> dict[str, bytes]:
     """Return the output files: the camera in each suitable format."""
     from photogram.errors import InputError
-    from photogram.targets.output.formats import CAMERA_FORMATS
+    from photogram.targets.camera_formats import CAMERA_FORMATS
 
     files = {"difference.csv": found.to_csv()}
     for name, make in CAMERA_FORMATS.items():

@@ -71,7 +71,7 @@ FORMATS: dict[str, Format] = {
 
 def _written(name: str, project: Project) -> Mapping[str, bytes]:
     from photogram.formats.targets.calibrations import rig_of_project
-    from photogram.targets.output.formats import CAMERA_FORMATS
+    from photogram.targets.camera_formats import CAMERA_FORMATS
 
     return CAMERA_FORMATS[name](rig_of_project(project))
 

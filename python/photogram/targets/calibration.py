@@ -19,12 +19,11 @@ from photogram.network.cameras import images_of
 from photogram.results.result import Result
 from photogram.results.snooping_options import SnoopOptions
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.findings import judged
+from photogram.targets.findings import deviation_of_corners, judged, with_unknown_weight
 from photogram.targets.housing import transformed
 from photogram.targets.motion import dated, errors_of_speeds
 from photogram.targets.regularisation import weighted_block
 from photogram.targets.start import Start
-from photogram.targets.unknown_weight import deviation_of_corners, with_unknown_weight
 from photogram.targets.vision import FLIP, photo_poses
 from photogram.words import phrase
 

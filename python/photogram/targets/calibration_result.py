@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -26,7 +26,9 @@ from photogram.statistics.verdict import Verdict
 from photogram.summaries import Rows
 from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
-from photogram.targets.worth import Worth
+
+if TYPE_CHECKING:
+    from photogram.targets import Worth
 
 Part = Literal["cameras", "sensors", "board", "views"]
 # Names of unknowns, their identifiers in the result, and their partials by steps of the block, or the numbers

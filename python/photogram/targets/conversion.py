@@ -22,7 +22,7 @@ from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table
 from photogram.summaries import Rows
-from photogram.targets.calibration_difference import CameraDifference, motion_of
+from photogram.targets.calibration_difference import CameraDifference, Fitted, motion_of, points_at
 from photogram.targets.lens_fit import (
     GRID,
     KNOTS,
@@ -36,8 +36,7 @@ from photogram.targets.lens_fit import (
     within,
 )
 from photogram.targets.maps import at_distance, image_grid
-from photogram.targets.motion_fit import Fitted, points_at
-from photogram.targets.output.rig import Rig
+from photogram.targets.output import Rig
 from photogram.targets.vision import TURNED
 from photogram.words import phrase
 

@@ -18,9 +18,8 @@ from photogram.io.delimited import read_columns, read_rows
 from photogram.io.files import read_beginning, reading
 from photogram.io.numbers import finite_number
 from photogram.lazy_dataclasses import dataclass
-from photogram.targets.board import Board
-from photogram.targets.board_files import is_board
-from photogram.targets.corner_views import Measured
+from photogram.targets.board import Board, is_board
+from photogram.targets.corners import Measured
 from photogram.targets.opencv_corners import BEGIN_BYTES, is_npz, is_storage, read_npz, read_storage
 from photogram.words import Phrase, phrase
 

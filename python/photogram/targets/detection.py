@@ -24,7 +24,7 @@ from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.targets.board import Board
-from photogram.targets.corner_views import Measured
+from photogram.targets.corners import Measured
 from photogram.words import phrase
 
 Picture = NDArray[np.uint8]

@@ -6,28 +6,29 @@ Views of the board are described by covered image parts, distance and tilt.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import KNOTTED
+from photogram.results.findings import block_findings
+from photogram.results.result import Result
 from photogram.statistics.findings import Findings, Systematic
+from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import verdict
 from photogram.statistics.weight_rules import LARGEST_FACTOR
 from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.housing import middle_of
 from photogram.targets.maps import PARTS, distance_text, parts_of
-from photogram.targets.unknown_weight import UnknownWeight, deviation_of_corners
 from photogram.targets.vision import rays
-from photogram.targets.worth import Worth
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.targets import Calibrated
+    from photogram.targets import Calibrated, Worth
 
 MIN_TILT_DEG, MIN_TILTED_VIEWS = 15.0, 3  # separate focal length and distance
 MIN_DISTANCE_RATIO = 1.3  # ratio of farthest and nearest view
@@ -90,23 +91,18 @@ def showings(calibrated: Calibrated) -> list[Showing]:
         poses = calibrated.sensors[number] @ calibrated.poses[views]
         distances = np.linalg.norm((poses @ middle)[:, :3], axis=1)
         tilts = np.degrees(np.arccos(np.clip(np.abs(poses[:, 2, 2]), 0.0, 1.0)))
-        found.append(Showing(camera.name, board.unit, *_parts(calibrated, number), distances, tilts))
+        parts, empty, size = 0, None, corners.sizes[number]
+        if size is not None:
+            own = corners.xy[corners.use & (corners.cameras[corners.picture] == number)]
+            cells = np.clip(((own + 0.5) / size * PARTS).astype(int), 0, np.array(PARTS) - 1)
+            reached = {(column, row) for column, row in cells.tolist()}
+            places = list(parts_of(size))
+            looks = rays(camera.camera, np.array([each.middle for each in places]))
+            there = [each for each, ray in zip(places, looks, strict=True) if np.isfinite(ray).all()]
+            parts = len(there)
+            empty = tuple(each.name.replace(",", "") for each in there if each.cell not in reached)
+        found.append(Showing(camera.name, board.unit, parts, empty, distances, tilts))
     return found
-
-
-def _parts(calibrated: Calibrated, number: int) -> tuple[int, tuple[str, ...] | None]:
-    """Return the number of image parts, and the names of those without corners."""
-    corners = calibrated.calibration.corners
-    size = corners.sizes[number]
-    if size is None:
-        return 0, None
-    own = corners.xy[corners.use & (corners.cameras[corners.picture] == number)]
-    cells = np.clip(((own + 0.5) / size * PARTS).astype(int), 0, np.array(PARTS) - 1)
-    reached = {(column, row) for column, row in cells.tolist()}
-    places = list(parts_of(size))
-    looks = rays(calibrated.cameras[number].camera, np.array([each.middle for each in places]))
-    there = [each for each, ray in zip(places, looks, strict=True) if np.isfinite(ray).all()]
-    return len(there), tuple(each.name.replace(",", "") for each in there if each.cell not in reached)
 
 
 FREE_PARAMETERS_OF_LENS = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
@@ -117,22 +113,19 @@ def judged(calibrated: Calibrated, worth: Worth | None = None, need: float | Non
 
     `need` is the largest accepted standard deviation of projection, px.
     """
-    own = verdict(replace(_findings(calibrated, worth), shortfall=_shortfall(worth, need)))
+    shortfall = None
+    if worth is not None and need is not None and not worth.largest <= need:
+        worst = max(worth.maps, key=lambda found: found.largest)
+        distance = distance_text(worst.distance, worst.unit)
+        fields = {"camera": worst.camera, "sd": worst.largest, "distance": distance, "need": need}
+        shortfall = phrase("verdict.not-accurate-enough", **fields)
+    own = verdict(replace(_findings(calibrated, worth), shortfall=shortfall))
     result, snooped = copy(calibrated.result), calibrated.snooped
     vars(result)["verdict"] = own
     if snooped is not None:
         snooped = replace(snooped, result=copy(snooped.result))
         vars(snooped.result)["verdict"] = own
     return replace(calibrated, result=result, snooped=snooped, worth=worth)
-
-
-def _shortfall(worth: Worth | None, need: float | None) -> Phrase | None:
-    if worth is None or need is None or worth.largest <= need:
-        return None
-    worst = max(worth.maps, key=lambda found: found.largest)
-    distance = distance_text(worst.distance, worst.unit)
-    fields = {"camera": worst.camera, "sd": worst.largest, "distance": distance, "need": need}
-    return phrase("verdict.not-accurate-enough", **fields)
 
 
 def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
@@ -195,3 +188,29 @@ def _systematic(cross: CrossValidation) -> Systematic:
         level=MIN_PROBABILITY / len(cross.tests),
         large=cross.factor > LARGEST_FACTOR,
     )
+
+
+class UnknownWeight(Result):
+    """Result without a global test."""
+
+    KNOWN: ClassVar[bool] = False
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """None: the standard deviation of corners is unknown."""
+        return None
+
+    def _findings(self) -> Findings:
+        return replace(block_findings(self), untested=phrase("untested.corners"))
+
+
+def with_unknown_weight(result: Result) -> Result:
+    """Return a copy of a result with unknown unit weight."""
+    return UnknownWeight(**{each.name: getattr(result, each.name) for each in fields(Result)})
+
+
+def deviation_of_corners(result: Result) -> float:
+    """Return the ratio of the corner sd from residuals to the given one."""
+    used = result.used_images
+    weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
+    return float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))

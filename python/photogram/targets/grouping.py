@@ -20,7 +20,7 @@ from photogram.errors import InputError
 from photogram.results.components import VarianceComponents
 from photogram.results.grouping import GroupsArgument
 from photogram.show.quantity import Axis, Quantity, chosen
-from photogram.targets.choices import CornerBasis
+from photogram.targets.options import CornerBasis
 from photogram.targets.regularisation import weighted_block
 from photogram.words import phrase
 

@@ -2,8 +2,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TypedDict
 
-from photogram.targets.board import Board
-from photogram.targets.choices import PixelOrigin, Regularisation, Shape, Synchronisation, ViewBy
+from photogram.targets import Board
+from photogram.targets.options import PixelOrigin, Regularisation, Shape, Synchronisation, ViewBy
 
 class CalibrationKeywords(TypedDict, total=False):
     """Fields of `CalibrationOptions` as keywords of functions."""

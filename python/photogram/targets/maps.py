@@ -13,8 +13,8 @@ from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import hull, outside
 from photogram.summaries import Brief, Rows
+from photogram.targets.options import DatumName
 from photogram.targets.projection import worst
-from photogram.targets.worth_options import DatumName
 from photogram.words import Phrase, phrase
 
 

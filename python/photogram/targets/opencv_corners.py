@@ -17,7 +17,7 @@ from photogram.io.numbers import number_or_text
 from photogram.io.tree import Tree
 from photogram.io.yaml_text import read_yaml_text
 from photogram.targets.board import Board
-from photogram.targets.corner_views import Measured
+from photogram.targets.corners import Measured
 from photogram.targets.npz_arrays import read_arrays
 from photogram.words import phrase
 

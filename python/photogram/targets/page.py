@@ -36,10 +36,9 @@ from photogram.targets.tables import (
     views,
     worst_points,
 )
-from photogram.targets.worth import Worth
 
 if TYPE_CHECKING:
-    from photogram.targets import Calibrated
+    from photogram.targets import Calibrated, Worth
 
 
 @np.errstate(over="ignore", invalid="ignore")

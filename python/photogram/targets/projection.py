@@ -16,6 +16,7 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
+from photogram.targets.options import DatumName
 from photogram.targets.vision import (
     Touched,
     cross_matrices,
@@ -26,7 +27,6 @@ from photogram.targets.vision import (
     touched,
     unknown_of,
 )
-from photogram.targets.worth_options import DatumName
 
 POINTS_PER_BATCH = 4096
 

@@ -14,18 +14,16 @@ from photogram.errors import InputError
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.knots import KNOTTED
-from photogram.targets.board import Board
-from photogram.targets.board_files import picture_size, read_board
+from photogram.targets.board import Board, picture_size, read_board
 from photogram.targets.calibration import Calibration
-from photogram.targets.calibration_options import CalibrationOptions
 from photogram.targets.corner_files import Form, files_at, is_picture, sorted_files
-from photogram.targets.corner_views import Grouping, Measured, grouped
-from photogram.targets.corners import Corners
+from photogram.targets.corners import Corners, Grouping, Measured, grouped
 from photogram.targets.detection import detected
 from photogram.targets.first_calibration import first_values
 from photogram.targets.lens_fit import KNOTS
-from photogram.targets.mrcal_model import read_model
+from photogram.targets.mrcal import read_model
 from photogram.targets.opencv_corners import read_npz
+from photogram.targets.options import CalibrationOptions
 from photogram.targets.regularisation import with_knot_sd
 from photogram.words import phrase
 

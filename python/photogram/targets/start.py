@@ -23,9 +23,9 @@ from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.summaries import Brief, Rows, few
 from photogram.targets.board import Board
-from photogram.targets.choices import Regularisation, Shape, Synchronisation
 from photogram.targets.corners import Corners
 from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
+from photogram.targets.options import Regularisation, Shape, Synchronisation
 from photogram.targets.vision import FLIP, photo_poses
 from photogram.words import phrase
 

@@ -12,13 +12,12 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.knots import beyond_knots
-from photogram.targets.calibration_difference import CameraDifference, Side, compared
+from photogram.targets.calibration_difference import CameraDifference, Criterion, Side, compared, points_at
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import camera_number, housing_of, size_of
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
-from photogram.targets.motion_fit import Criterion, points_at
+from photogram.targets.options import DatumName
 from photogram.targets.projection import datum_rows, projection_cofactors, worst
-from photogram.targets.worth_options import DatumName
 from photogram.words import phrase
 
 IMAGE_GRID = (60, 40)  # rays that define the datum `image`

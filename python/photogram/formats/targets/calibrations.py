@@ -25,7 +25,7 @@ from photogram.targets.calibration import Calibration
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners
 from photogram.targets.motion import motion_of
-from photogram.targets.output.rig import Rig
+from photogram.targets.output import Rig
 from photogram.targets.reading import read
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from photogram.arguments.fields import Checked, option
 from photogram.lazy_dataclasses import dataclass
-from photogram.targets.choices import PixelOrigin, Regularisation, Shape, Synchronisation, ViewBy
 
 if TYPE_CHECKING:
-    from photogram.targets.board import Board
+    from photogram.targets import Board
 
 
 def pair(text: str) -> tuple[int, int]:
@@ -125,3 +124,63 @@ class CalibrationOptions(Checked):
         is_pair = isinstance(self.board, tuple)
         require(not is_pair or self.spacing is not None, "board", "requires", name="CxR", other="spacing")
         require(is_pair or self.spacing is None, "spacing", "requires", name="spacing", other="board CxR")
+
+
+Shape = Literal["held", "bend", "points"]  # estimated: none, centre-line deflections, every point
+ViewBy = Literal["name", "time"]
+Synchronisation = Literal["known", "none", "offset"]
+Regularisation = Literal["mrcal"]
+CornerBasis = Literal["kind", "camera", "level", "photo", "component", "rays"]
+PixelOrigin = Literal["corner", "center"]
+
+
+# Fixed: the corners of the camera, the mean of the boards, rays of the image, the axes of the camera
+DatumName = Literal["corners", "mean-frames", "image", "axes"]
+Into = Literal["odd", "halves"] | int
+
+
+def distances_of(text: str) -> list[float]:
+    """Return positive distances with commas between them."""
+    try:
+        distances = [float(each) for each in text.split(",") if each.strip()]
+    except ValueError:
+        distances = [0.0]
+    if not all(each > 0 for each in distances):
+        raise ValueError("a list of distances, such as 1,inf")
+    return distances
+
+
+def _division(text: str) -> str | int | None:
+    """Return a division of the views for cross-validation."""
+    if text in ("none", "odd", "halves"):
+        return None if text == "none" else text
+    if not (text.isdecimal() and int(text) > 1):
+        raise ValueError("odd, halves, none, or a number greater than 1")
+    return int(text)
+
+
+@dataclass(frozen=True)
+class WorthOptions(Checked):
+    """Options of the assessment of a calibration, and of `photogram calibrate`.
+
+    Attributes
+    ----------
+    distances
+        Distances of the maps, in the unit of the board; empty: infinity, and the median distance of the
+        boards.
+    datum, noise_only
+        Options of the maps.
+    cross_validate
+        Type of split; None: without cross-validation.
+    suggest
+        Number of suggested views.
+    grid
+        Grid of the maps, pixels across and down.
+    """
+
+    distances: Sequence[float] = option((), kind=str, parse=distances_of, name="--distance")
+    datum: DatumName = option("corners", name="--datum")
+    noise_only: bool = False
+    cross_validate: Into | None = option("odd", kind=str, parse=_division)
+    suggest: int = option(0, 0)
+    grid: tuple[int, int] = (60, 40)

@@ -9,10 +9,8 @@ from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.output.mrcal import mrcal_models, valid_region
-from photogram.targets.output.opencv import opencv_yaml
-from photogram.targets.output.rig import Rig, rig_of
-from photogram.targets.output.ros import kalibr_camchain, ros_camera_info
+from photogram.targets.mrcal import mrcal_models, valid_region
+from photogram.targets.output import Rig, kalibr_camchain, opencv_yaml, rig_of, ros_camera_info
 from photogram.targets.uncertainty import uncertainty_map
 from photogram.words import phrase
 

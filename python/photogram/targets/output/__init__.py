@@ -1,1 +1,0 @@
-"""Output of cameras and rigs: files of OpenCV, ROS, Kalibr and mrcal."""
