@@ -39,6 +39,7 @@ from photogram.network.film_reduction import as_seen
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
+from photogram.statistics.findings import Findings
 
 FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
 HARDLY = 10.0  # Multiple of the usual residual that coarse stations can cause before the adjustment
@@ -177,15 +178,16 @@ def _checked(
         errors,
         edited.section,
     ]
-    sections += _after_adjustment(oriented, edited, words)
-    if edited.last is not None and edited.last.converged:
+    found = edited.last._findings() if edited.last is not None and edited.last.converged else None
+    sections += _after_adjustment(oriented, edited, found, words)
+    if edited.last is not None and found is not None:
         sets.findings += half_pixel(edited.last)
         if not any(each.level == "grave" for section in sections for each in section.findings):
-            found = disagreeing(edited.last)
+            different = disagreeing(found)
             # Control of which one of several points is wrong may be the reason.
             if any(len(each.points) > 1 for own in edited.control.values() for each in own):
-                found = [replace(each, level="look") for each in found]
-            edited.section.findings += found
+                different = [replace(each, level="look") for each in different]
+            edited.section.findings += different
     if not exact:
         for section in sections:
             if section is not sets:
@@ -237,14 +239,14 @@ def _edited(view: View, suspects: Suspects, intersect_only: str, adjusted: Adjus
     return Edited(section_of("blunders"), reason=reason, asked=False)
 
 
-def _after_adjustment(view: View, edited: Edited, words: Words) -> list[Section]:
+def _after_adjustment(view: View, edited: Edited, found: Findings | None, words: Words) -> list[Section]:
     result = edited.last
-    if result is None or not result.converged:
+    if result is None or found is None:
         return [stations(view.block, None), key_numbers(edited, words)]
     return [
         control(edited, words),
         stations(view.block, result),
-        residuals(result, edited.spread),
+        residuals(result, found.systematic),
         two_ray_heights(result),
         key_numbers(edited, words),
     ]

@@ -12,6 +12,7 @@ from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
 from photogram.results.result import Result
 from photogram.statistics.evidence import SUSPECT, WITHHELD, Evidence
+from photogram.statistics.findings import Findings
 from photogram.words import phrase
 
 VARIANCE = (0.5, 2.0)  # Variance of unit weight of realistic standard deviations
@@ -115,9 +116,9 @@ def held_values(result: Result) -> list[Finding]:
     return [finding("grave", message, photos, points, values={"statistic": value})]
 
 
-def disagreeing(result: Result) -> list[Finding]:
+def disagreeing(found: Findings) -> list[Finding]:
     """Return the finding on disagreeing check points, as in the verdict."""
-    evidence = Evidence(result._findings())
+    evidence = Evidence(found)
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", SUSPECT))
     for level, limit in levels:
         if points := evidence.disagreement(limit):
