@@ -12,6 +12,7 @@ shifts them by many lines.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -28,11 +29,11 @@ from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.directions import image_directions
-from photogram.network.geometry import geographic_to_geocentric
+from photogram.network.geometry import Cartesian
 from photogram.network.motion import given_poses, timed_images, timed_photos
 from photogram.network.moving_photos import Lines, Moment, Timed
 from photogram.network.observations import Position
-from photogram.network.projecting import camera_of, projected
+from photogram.network.projecting import projected_images
 from photogram.network.rays import meet_rays
 from photogram.network.subset import kept_images
 from photogram.network.trajectories import Table, Trajectory
@@ -221,64 +222,41 @@ def flown_misfits(block: Block, photos: Indices) -> Floats:
 
     Points without given positions fit any scale. Very large if many points are not visible.
     """
-    predicted = flown_predictions(block, photos)
-    apart = np.linalg.norm(block.image_xy - predicted, axis=1)
+    apart = np.linalg.norm(block.image_xy - flown_predictions(block, photos), axis=1)
     given = given_points(block)[block.image_points]
     found = np.full(len(photos), UNKNOWN)
-    images = {photo: own for _, _, photo, own in timed_images(block)}
     for k, photo in enumerate(photos.tolist()):
-        rows = images[photo]
-        xy = block.image_xy[rows]
-        extent = float(np.sqrt(((xy - xy.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        parts = [own for own in (rows, rows[given[rows]]) if len(own)]
-        seen = [apart[own[np.isfinite(apart[own])]] for own in parts]
-        whole = all(len(own) > SEEN * len(all_) for own, all_ in zip(seen, parts, strict=True))
-        if whole and extent > 0:
-            found[k] = max(float(np.sqrt((own**2).mean())) for own in seen) / extent
+        rows = np.flatnonzero(block.image_photos == photo)
+        extent = float(np.sqrt(block.image_xy[rows].var(axis=0).sum()))
+        parts = [apart[own] for own in (rows, rows[given[rows]]) if len(own)]
+        if extent > 0 and all(np.isfinite(own).mean() > SEEN for own in parts):
+            found[k] = max(float(np.sqrt(np.nanmean(own**2))) for own in parts) / extent
     return found
 
 
 def flown_predictions(block: Block, photos: Indices) -> Floats:
     """(m, 2) predicted image coordinates of some photos; NaN if invisible."""
-    places = _places(block)
+    own = np.isin(block.image_photos, photos)
     found = np.full(block.image_xy.shape, np.nan)
-    wanted = set(photos.tolist())
-    for own, trajectory, row, images in timed_images(block):
-        if row not in wanted:
-            continue
-        images = images[np.isfinite(places[block.image_points[images]]).all(axis=1)]
-        try:
-            seen = projected(own, trajectory, camera_of(block, row), places[block.image_points[images]])
-        except InputError:
-            # A scanner whose trajectory has a single record.
-            continue
-        found[images] = seen
+    with suppress(InputError):  # The trajectory of a scanner has a single record
+        found[own] = projected_images(kept_images(block.replace(point_positions=_places(block)), own))
     return found
 
 
 def _places(block: Block) -> Floats:
-    """(n, 3) given or intersected points, in the axes of trajectories."""
-    places = block.point_positions
-    if block.spheroid is not None:
-        places = geographic_to_geocentric(places, block.spheroid)
+    """(n, 3) given or intersected points."""
     given = given_points(block)
     if given.all():
-        return places
-    centres, directions = _rays(block)
-    seen = np.isfinite(directions).all(axis=1)
-    met = meet_rays(block.image_points[seen], len(places), centres[seen], directions[seen])
-    return np.where(given[:, np.newaxis], places, met)
-
-
-def _rays(block: Block) -> tuple[Floats, Floats]:
-    """(m, 3) origins of the rays and unit directions; NaN of photos at rest."""
-    seen = image_directions(block)
-    centres, directions = np.full(seen.shape, np.nan), np.full(seen.shape, np.nan)
+        return block.point_positions
+    inner = image_directions(block)
+    centres, directions = np.full(inner.shape, np.nan), np.full(inner.shape, np.nan)
     for own, trajectory, _, images in timed_images(block):
         times = np.clip(own.times(block.image_xy[images]), *trajectory.reach)
         at, turned = given_poses(trajectory, times)
         if own.sensor is not None:
             at, turned = at + turned @ own.sensor.position, turned @ own.sensor.attitude
-        centres[images] = at
-        directions[images] = np.einsum("mij,mj->mi", turned, seen[images])
-    return centres, directions
+        centres[images], directions[images] = at, np.einsum("mij,mj->mi", turned, inner[images])
+    seen = np.isfinite(directions).all(axis=1)
+    met = meet_rays(block.image_points[seen], len(given), centres[seen], directions[seen])
+    positions = Cartesian(block.spheroid).from_cartesian(met)
+    return np.where(given[:, np.newaxis], block.point_positions, positions)
