@@ -107,9 +107,9 @@ def test_nothing_but_an_input_error_comes_of_any_bytes(tmp_path_factory, data):
     ("name", "value", "message"),
     [
         ("photo_parameters", np.zeros((3, 8)), "must have the shape"),
-        ("point_positions", np.full((4, 3), np.nan), "point_positions[0, 0] must be finite"),
-        ("image_sd", 0.0, "image_sd[0, 0] must be positive"),
-        ("photo_sd", -1.0, "photo_sd[0, 0] must be a standard deviation"),
+        ("point_positions", np.full((4, 3), np.nan), "point_positions[0, 0]: must be a finite number"),
+        ("image_sd", 0.0, "image_sd[0, 0]: must be positive"),
+        ("photo_sd", -1.0, "photo_sd[0, 0]: must not be negative"),
         ("image_photos", np.full(len(SMALL.image_xy), 3), "must be an integer from 0 to 2"),
         ("image_points", np.zeros(len(SMALL.image_xy)), "whole numbers"),
     ],

@@ -30,6 +30,7 @@ _ROUNDING = 1e-6  # Tolerance for correlations that were written with all digits
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 RULES: dict[str, Callable[[Any], Any]] = {
+    "number": lambda values: ~np.isnan(values),
     "finite": np.isfinite,
     "positive": lambda values: (values > 0) & np.isfinite(values),
     "not-negative": lambda values: (values >= 0) & np.isfinite(values),

@@ -54,6 +54,41 @@ def option(
     return field(default=default, metadata=metadata)
 
 
+def array(*shape: int | str, rule: str = "", missing: bool = False, index: str = "") -> dict[str, Any]:
+    """Declare an array field.
+
+    Parameters
+    ----------
+    shape
+        Sizes, as numbers or names. A name is the number of rows of the first array that begins with it.
+    rule
+        Rule of its numbers, of `arrays.RULES`.
+    missing
+        Whether NaN is valid.
+    index
+        Name of the size that its indices are below; empty: an array of numbers.
+    """
+    return {"shape": shape, "rule": rule, "missing": missing, "index": index}
+
+
+def check_arrays(made: Any, **sizes: int) -> None:
+    """Check and convert the declared arrays of an object; `sizes` are known by other means."""
+    from photogram.arguments import arrays
+
+    for each in fields(made):
+        name, declared, value = each.name, each.metadata, getattr(made, each.name)
+        if "shape" not in declared or value is None:
+            continue
+        if isinstance(rows := declared["shape"][0], str) and rows not in sizes:
+            sizes[rows] = arrays.length(name, value)
+        shape = tuple(size if isinstance(size, int) else sizes[size] for size in declared["shape"])
+        if limit := declared["index"]:
+            value = arrays.indices(name, value, shape[0], sizes[limit])
+        else:
+            value = arrays.shaped(name, value, shape, declared["rule"], missing=declared["missing"])
+        object.__setattr__(made, name, value)
+
+
 class Checked:
     """Base class of a dataclass whose constructor checks and converts the fields by their types."""
 

@@ -6,12 +6,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import indices, shaped
+from photogram.arguments.arrays import length
 from photogram.arguments.equality import Valued
-from photogram.arguments.types import FREE, ONE, Array, Floats, IndexArray
+from photogram.arguments.fields import array, check_arrays
+from photogram.arguments.types import FREE, ONE, Array, Bools, Floats, IndexArray
 from photogram.collection.parameters import POSE, parameters_of
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
@@ -62,14 +62,14 @@ class Collection(Valued, Brief):
         right, y up. `docs/cameras.md` describes the other models.
     """
 
-    photo_parameters: Array
-    point_positions: Array
-    image_photos: IndexArray
-    image_points: IndexArray
-    image_xy: Array
-    image_sd: Array = field(default=ONE)
-    photo_sd: Array = field(default=FREE)
-    point_sd: Array = field(default=FREE)
+    photo_parameters: Array = field(metadata=array("photos", "parameters", rule="finite"))
+    point_positions: Array = field(metadata=array("points", 3, rule="finite"))
+    image_photos: IndexArray = field(metadata=array("images", index="photos"))
+    image_points: IndexArray = field(metadata=array("images", index="points"))
+    image_xy: Array = field(metadata=array("images", 2, rule="finite"))
+    image_sd: Array = field(default=ONE, metadata=array("images", 2, rule="positive"))
+    photo_sd: Array = field(default=FREE, metadata=array("photos", "parameters", rule="sd"))
+    point_sd: Array = field(default=FREE, metadata=array("points", 3, rule="sd"))
     camera: str = "bal"
 
     def __post_init__(self) -> None:
@@ -77,29 +77,11 @@ class Collection(Valued, Brief):
         known = [name for name in _photocore.CAMERAS if name != KNOTTED]
         if self.camera not in known:
             raise InputError(phrase("collection.camera", names=known, value=self.camera))
-        photos, points, images = (
-            len(np.atleast_1d(rows)) for rows in (self.photo_parameters, self.point_positions, self.image_xy)
-        )
-        shapes = {
-            "photo_parameters": (photos, len(self.parameters)),
-            "point_positions": (points, 3),
-            "image_xy": (images, 2),
-            "image_sd": (images, 2),
-            "photo_sd": (photos, len(self.parameters)),
-            "point_sd": (points, 3),
-        }
         if np.ndim(self.photo_sd) == 0:
-            of_each = np.where(self._constant, 0.0, self.photo_sd)
-            object.__setattr__(self, "photo_sd", np.broadcast_to(of_each, shapes["photo_sd"]))
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, shaped(name, getattr(self, name), shape))
-        for name in ("photo_parameters", "point_positions", "image_xy"):
-            _check(name, values := getattr(self, name), np.isfinite(values), "finite")
-        for name in ("photo_sd", "point_sd"):
-            _check(name, sd := getattr(self, name), sd >= 0, "a standard deviation, from zero to infinite")
-        _check("image_sd", sd := self.image_sd, (sd > 0) & np.isfinite(sd), "positive and finite")
-        for name, count in (("image_photos", photos), ("image_points", points)):
-            object.__setattr__(self, name, indices(name, getattr(self, name), images, count))
+            rows = length("photo_parameters", self.photo_parameters)
+            of_all = np.tile(np.where(self._constant, 0.0, self.photo_sd), (rows, 1))
+            object.__setattr__(self, "photo_sd", of_all)
+        check_arrays(self, parameters=len(self.parameters))
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the collection, as shown by its `repr` and in notebooks."""
@@ -146,7 +128,7 @@ class Collection(Valued, Brief):
         return parameters_of(self.camera)[0]
 
     @property
-    def _constant(self) -> NDArray[np.bool_]:
+    def _constant(self) -> Bools:
         """(k,) which parameters of a photo are always fixed."""
         return np.arange(len(self.parameters)) >= len(self.parameters) - self._model[2]
 
@@ -217,10 +199,3 @@ class Collection(Valued, Brief):
     def cost(self) -> float:
         """Return half the weighted sum of squared residuals, as in "Bundle Adjustment in the Large"."""
         return 0.5 * float((((self.image_xy - self.computed_xy()) / self.image_sd) ** 2).sum())
-
-
-def _check(name: str, values: Floats, good: NDArray[np.bool_], what: str) -> None:
-    bad = np.argwhere(~good)
-    if len(bad):
-        place, value = ", ".join(str(index) for index in bad[0]), float(values[tuple(bad[0])])
-        raise InputError(phrase("collection.element", name=name, row=place, form=what, value=value))

@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram.arguments.arrays import text
 from photogram.arguments.equality import Valued
+from photogram.arguments.fields import array
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import (
     FREE,
@@ -26,7 +27,7 @@ from photogram.arguments.types import (
 )
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, fields
-from photogram.network.block_checks import array, check_block, known_poses, unsupported
+from photogram.network.block_checks import check_block, known_poses, unsupported
 from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import reads_pixels
 from photogram.network.frame import Frame
@@ -152,33 +153,35 @@ class Block(Valued, Brief):
     """
 
     photo_ids: Names = field(default=NONE)
-    photo_positions: Array = field(metadata=array("photos", 3, "not-infinite"))
-    photo_attitudes: Array = field(metadata=array("photos", 3, "angle"))
-    principal_distances: OptionalArray = field(default=NONE, metadata=array("photos", 0, "not-zero"))
+    photo_positions: Array = field(metadata=array("photos", 3, rule="not-infinite"))
+    photo_attitudes: Array = field(metadata=array("photos", 3, rule="angle"))
+    principal_distances: OptionalArray = field(default=NONE, metadata=array("photos", rule="not-zero"))
     point_ids: Names = field(default=NONE)
-    point_positions: Array = field(metadata=array("points", 3, "not-infinite"))
-    image_photos: IndexArray = field(metadata=array("images", 0, "photos"))
-    image_points: IndexArray = field(metadata=array("images", 0, "points"))
-    image_xy: Array = field(metadata=array("images", 2, "finite"))
-    image_sd: Array = field(metadata=array("images", 2, "positive"))
-    photo_position_sd: Array = field(default=FREE, metadata=array("photos", 3, "sd"))
-    photo_attitude_sd: Array = field(default=FREE, metadata=array("photos", 3, "sd"))
-    point_sd: Array = field(default=FREE, metadata=array("points", 3, "sd"))
+    point_positions: Array = field(metadata=array("points", 3, rule="not-infinite"))
+    image_photos: IndexArray = field(metadata=array("images", index="photos"))
+    image_points: IndexArray = field(metadata=array("images", index="points"))
+    image_xy: Array = field(metadata=array("images", 2, rule="finite"))
+    image_sd: Array = field(metadata=array("images", 2, rule="positive"))
+    photo_position_sd: Array = field(default=FREE, metadata=array("photos", 3, rule="sd"))
+    photo_attitude_sd: Array = field(default=FREE, metadata=array("photos", 3, rule="sd"))
+    point_sd: Array = field(default=FREE, metadata=array("points", 3, rule="sd"))
     spheroid: Spheroid | None = None
     photo_to_ground: bool = False
     title: str = field(default="", metadata={"check": text})
     linear_unit: str = field(default="m", metadata={"check": text})
     refraction: Refraction | None = None
-    photo_positions_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, "not-infinite"))
-    photo_attitudes_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, "angle"))
+    photo_positions_observed: OptionalArray = field(
+        default=NONE, metadata=array("photos", 3, rule="not-infinite")
+    )
+    photo_attitudes_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, rule="angle"))
     observations: Records = field(default=NO_RECORDS)
     cameras: Sequence[Camera] = ()
-    photo_cameras: NamedIndices = field(default=NONE, metadata=array("photos", 0, "cameras"))
+    photo_cameras: NamedIndices = field(default=NONE, metadata=array("photos", index="cameras"))
     mounts: Sequence[Mount] = ()
     timed: Sequence[Timed] = ()
     passages: Sequence[Passage] = ()
     frame: Frame = field(default_factory=Frame)
-    point_check_sd: OptionalArray = field(default=NONE, metadata=array("points", 3, "check-sd"))
+    point_check_sd: OptionalArray = field(default=NONE, metadata=array("points", 3, rule="check-sd"))
     rejected_points = frozenset[str]()
     """Points whose image observations were all rejected; copied with the block, but not a field."""
 

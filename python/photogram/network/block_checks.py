@@ -49,14 +49,9 @@ _ALONE = _IMAGES | {"title", "linear_unit", "refraction", "frame", "point_check_
 """Fields that observations, mounted photos, trajectories and image transformations do not depend on."""
 
 
-def array(rows: str, columns: int, rule: str) -> dict[str, Any]:
-    """Declare an array field: rows, columns (0 for one number in each row), and rule of values or indices."""
-    return {"rows": rows, "columns": columns, "rule": rule}
-
-
 def rows_of(kind: type[Any], rows: str) -> tuple[str, ...]:
     """Return the declared arrays of a class with one row for each photo, point or image."""
-    return tuple(each.name for each in fields(kind) if each.metadata.get("rows") == rows)
+    return tuple(each.name for each in fields(kind) if each.metadata.get("shape", ("",))[0] == rows)
 
 
 def check_block(block: Block, changed: Collection[str]) -> None:
@@ -106,15 +101,14 @@ def _check_field(block: Block, declared: Any, counts: Mapping[str, int]) -> None
         if (check := checks_of(kind).get(name)) is not None:
             block._set(name, check(name, value))
         return
-    rows, rule = rules["rows"], rules["rule"]
-    if rule == "cameras":
+    (rows, *columns), rule, limit = rules["shape"], rules["rule"], rules["index"]
+    if limit == "cameras":
         if block.cameras:
             block._set(name, frozen(photo_indices(value, block.cameras, counts[rows])))
-    elif rule not in BLOCK_RULES:
-        block._set(name, indices(name, value, counts[rows], counts[rule]))
+    elif limit:
+        block._set(name, indices(name, value, counts[rows], counts[limit]))
     elif value is not None or declared.default is not None or (rule == "not-zero" and not block.cameras):
-        shape = (counts[rows], rules["columns"]) if rules["columns"] else (counts[rows],)
-        numbers = shaped(name, value, shape, missing=rule in _WITH_NAN)
+        numbers = shaped(name, value, (counts[rows], *columns), missing=rule in _WITH_NAN)
         block._set(name, numbers)
         refuse(block, name, rows, ~BLOCK_RULES[rule](numbers), rule)
 

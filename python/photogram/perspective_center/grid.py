@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.arrays import names, number, shaped
-from photogram.arguments.fields import Checked, check_fields
+from photogram.arguments.arrays import names, number
+from photogram.arguments.fields import Checked, array, check_arrays, check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -92,30 +92,23 @@ class Grid(Brief):
     """
 
     ids: Sequence[int | str]
-    plate_xy: Floats
-    model: Floats
+    plate_xy: Floats = field(metadata=array("points", 2, rule="finite"))
+    model: Floats = field(metadata=array("points", 3, rule="finite"))
     principal_distance: float
-    initial: Floats | None = None
+    initial: Floats | None = field(default=None, metadata=array(6, rule="finite"))
     tolerance: float = 0.001
-    readings: Indices = field(default_factory=lambda: np.array(1))
-    reading_sd: Floats = field(default_factory=lambda: np.array(0.0))
+    readings: Indices = field(default_factory=lambda: np.array(1), metadata=array("points"))
+    reading_sd: Floats = field(
+        default_factory=lambda: np.array(0.0), metadata=array("points", 2, rule="finite")
+    )
     corrected: bool = False
     title: str = ""
     number: int = 1
 
     def __post_init__(self) -> None:
         check_fields(self)
-        count = len(names("ids", self.ids))
-        shapes: dict[str, tuple[int, ...]] = {
-            "plate_xy": (count, 2),
-            "model": (count, 3),
-            "reading_sd": (count, 2),
-        }
-        if self.initial is not None:
-            shapes["initial"] = (6,)
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, shaped(name, getattr(self, name), shape, "finite"))
-        readings = shaped("readings", self.readings, (count,))
+        check_arrays(self, points=len(names("ids", self.ids)))
+        readings = self.readings
         good = (readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))
         for value in readings[~good].tolist():
             raise InputError(phrase("projector.readings", value=value))

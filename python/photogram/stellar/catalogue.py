@@ -9,12 +9,11 @@ from typing import Self
 
 import numpy as np
 
-from photogram.arguments.fields import check_fields
-from photogram.arguments.objects import require
+from photogram.arguments.fields import array, check_arrays, check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.io.angles import ARCSEC
 from photogram.io.delimited import read_records, renaming
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import phrase
 
 _MAS = 1e-3 * ARCSEC
@@ -57,27 +56,16 @@ class Catalogue:
     """
 
     ids: tuple[str, ...]
-    places: Floats
-    proper_motions: Floats
-    parallaxes: Floats
-    magnitudes: Floats
+    places: Floats = field(metadata=array("stars", 2))
+    proper_motions: Floats = field(metadata=array("stars", 2))
+    parallaxes: Floats = field(metadata=array("stars"))
+    magnitudes: Floats = field(metadata=array("stars"))
     epoch: float = 2000.0
-    errors: Floats | None = None
+    errors: Floats | None = field(default=None, metadata=array("stars", 4))
 
     def __post_init__(self) -> None:
         check_fields(self)
-        count = len(self.ids)
-        shapes = {
-            "places": (count, 2),
-            "proper_motions": (count, 2),
-            "parallaxes": (count,),
-            "magnitudes": (count,),
-            "errors": (count, 4),
-        }
-        for name, shape in shapes.items():
-            array = getattr(self, name)
-            if array is not None:
-                require(array.shape == shape, name, "shape", shape=shape, actual=array.shape)
+        check_arrays(self, stars=len(self.ids))
 
     @classmethod
     def hipparcos(cls) -> Self:

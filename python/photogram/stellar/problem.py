@@ -7,8 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error
-from photogram.arguments.fields import Checked, check_fields
+from photogram.arguments.fields import Checked, array, check_arrays, check_fields
 from photogram.arguments.objects import require
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, failure_of_core
@@ -95,16 +94,19 @@ class Problem(Brief):
 
     site: Site
     star_ids: tuple[str, ...]
-    star_places: Floats
-    star_weights: Floats
+    star_places: Floats = field(metadata=array("stars", 2, rule="finite"))
+    star_weights: Floats = field(metadata=array("stars", 2, 2, rule="number"))
     image_points: tuple[str, ...]
-    image_stars: Indices
-    image_groups: Indices
-    image_xy: Floats
-    image_weights: Floats
-    image_times: Floats
-    initial: Floats
-    parameter_weights: Floats = field(default_factory=lambda: np.zeros((len(NAMES), len(NAMES))))
+    image_stars: Indices = field(metadata=array("images", index="stars"))
+    image_groups: Indices = field(metadata=array("images", index="groups"))
+    image_xy: Floats = field(metadata=array("images", 2, rule="finite"))
+    image_weights: Floats = field(metadata=array("images", 2, 2, rule="finite"))
+    image_times: Floats = field(metadata=array("images", rule="finite"))
+    initial: Floats = field(metadata=array(len(NAMES), rule="finite"))
+    parameter_weights: Floats = field(
+        default_factory=lambda: np.zeros((len(NAMES), len(NAMES))),
+        metadata=array(len(NAMES), len(NAMES), rule="finite"),
+    )
     fixed: Bools = field(default_factory=lambda: np.zeros(len(NAMES), bool))
     axis: Axis | None = None
     star_names: tuple[str, ...] = ()
@@ -113,29 +115,9 @@ class Problem(Brief):
 
     def __post_init__(self) -> None:
         check_fields(self)
-        stars, images = len(self.star_ids), len(self.image_points)
-        shapes = {
-            "star_places": (stars, 2),
-            "star_weights": (stars, 2, 2),
-            "image_stars": (images,),
-            "image_groups": (images,),
-            "image_xy": (images, 2),
-            "image_weights": (images, 2, 2),
-            "image_times": (images,),
-            "initial": (len(NAMES),),
-            "parameter_weights": (len(NAMES), len(NAMES)),
-            "fixed": (len(NAMES),),
-        }
-        for name, shape in shapes.items():
-            array = getattr(self, name)
-            require(array.shape == shape, name, "shape", shape=shape, actual=array.shape)
-            infinite = name == "star_weights"
-            if np.isnan(array).any() or not (infinite or np.isfinite(array).all()):
-                raise InputError(phrase("stars.not-finite", name=name))
-        for name, count in (("image_stars", stars), ("image_groups", 3)):
-            for image in np.flatnonzero((getattr(self, name) < 0) | (getattr(self, name) >= count))[:1]:
-                limits = {"value": int(getattr(self, name)[image]), "low": 0, "high": count - 1}
-                raise argument_error(f"{name}[{image}]", "whole-range", **limits)
+        check_arrays(self, stars=len(self.star_ids), images=len(self.image_points), groups=3)
+        shape = (len(NAMES),)
+        require(self.fixed.shape == shape, "fixed", "shape", shape=shape, actual=self.fixed.shape)
         pairs = zip(self.image_points, self.image_stars, strict=True)
         points = [phrase("stars.point", point=point, star=self.star_ids[star]) for point, star in pairs]
         _refuse_indefinite(points, self.image_weights)

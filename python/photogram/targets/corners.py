@@ -13,15 +13,13 @@ import numpy as np
 from photogram.arguments.arrays import (
     argument_error,
     frozen,
-    indices,
-    length,
     names,
     repeated_pairs,
-    shaped,
     value_field,
     whole_number,
 )
 from photogram.arguments.equality import Valued
+from photogram.arguments.fields import array, check_arrays
 from photogram.arguments.types import (
     ALL,
     NONE,
@@ -83,16 +81,16 @@ class Corners(Valued, Brief):
     """
 
     pictures: Sequence[str]
-    cameras: IndexArray
-    views: IndexArray
+    cameras: IndexArray = field(metadata=array("pictures", index="cameras"))
+    views: IndexArray = field(metadata=array("pictures", index="pictures"))
     camera_names: Sequence[str]
     sizes: Sequence[tuple[int, int] | None]
-    picture: IndexArray
-    point: IndexArray
-    xy: Array
-    sd: Array = field(default=ONE)
+    picture: IndexArray = field(metadata=array("corners", index="pictures"))
+    point: IndexArray = field(metadata=array("corners", index="places"))
+    xy: Array = field(metadata=array("corners", 2))
+    sd: Array = field(default=ONE, metadata=array("corners"))
     use: BoolArray = field(default=ALL)
-    times: OptionalArray = field(default=NONE)
+    times: OptionalArray = field(default=NONE, metadata=array("pictures"))
 
     def __post_init__(self) -> None:
         for name in ("pictures", "camera_names"):
@@ -101,20 +99,13 @@ class Corners(Valued, Brief):
                 repeated = next(each for each in given if given.count(each) > 1)
                 raise InputError(phrase("error.repeated", kind=name, name=repeated))
             self._set(name, tuple(given))
-        pictures, corners = len(self.pictures), length("picture", self.picture)
         self._set("sizes", tuple(map(_size, self.sizes)))
         if len(self.sizes) != len(self.camera_names):
             fields = {"count": len(self.camera_names), "actual": len(self.sizes)}
             raise argument_error("sizes", "count", **fields)
-        self._set("cameras", indices("cameras", self.cameras, pictures, len(self.camera_names)))
-        self._set("views", indices("views", self.views, pictures, pictures))
-        self._set("picture", indices("picture", self.picture, corners, pictures))
-        self._set("point", indices("point", self.point, corners, 2**31))
-        self._set("xy", shaped("xy", self.xy, (corners, 2)))
-        self._set("sd", shaped("sd", self.sd, (corners,)))
-        self._set("use", frozen(np.broadcast_to(np.asarray(self.use, dtype=bool), (corners,)).copy()))
-        if self.times is not None:
-            self._set("times", shaped("times", self.times, (pictures,)))
+        cameras = len(self.camera_names)
+        check_arrays(self, pictures=len(self.pictures), cameras=cameras, places=2**31)
+        self._set("use", frozen(np.broadcast_to(np.asarray(self.use, dtype=bool), self.sd.shape).copy()))
         for code, rows in (
             ("position", np.flatnonzero(~np.isfinite(self.xy).all(axis=1))),
             ("deviation", np.flatnonzero(~((self.sd > 0) & np.isfinite(self.sd)))),

@@ -8,8 +8,9 @@ from typing import Any, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, indices, number, one_of, shaped, value_field
+from photogram.arguments.arrays import argument_error, number, one_of, shaped, value_field
 from photogram.arguments.equality import Valued
+from photogram.arguments.fields import array, check_arrays
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -40,20 +41,20 @@ class Start(Valued, Brief):
     board: Board
     corners: Corners
     cameras: Sequence[Camera]
-    poses: ArrayLike
-    sensors: ArrayLike | None = None
-    references: ArrayLike | None = None
+    poses: ArrayLike = field(metadata=array("views", 4, 4, missing=True))
+    sensors: ArrayLike | None = field(default=None, metadata=array("cameras", 4, 4))
+    references: ArrayLike | None = field(default=None, metadata=array("cameras", index="cameras"))
     sd0: float | None = None
     sync: Synchronisation = "known"
     regularise: Regularisation | None = None
     bend: tuple[float, float] = (0.0, 0.0)
     messages: Sequence[Message] = field(default=())
     assumed: float = 1.0
-    offsets: ArrayLike = 0.0
-    sd_offsets: ArrayLike = np.inf
+    offsets: ArrayLike = field(default=0.0, metadata=array("cameras"))
+    sd_offsets: ArrayLike = field(default=np.inf, metadata=array("cameras"))
     motion: ArrayLike | None = None
-    sd_sensors: ArrayLike = np.inf
-    sd_bend: ArrayLike = np.inf
+    sd_sensors: ArrayLike = field(default=np.inf, metadata=array("cameras", 6))
+    sd_bend: ArrayLike = field(default=np.inf, metadata=array(2))
 
     def __post_init__(self) -> None:
         one_of("sync", self.sync, get_args(Synchronisation))
@@ -71,24 +72,18 @@ class Start(Valued, Brief):
         self._set("cameras", tuple(named))
         if self.sensors is None and count > 1 and self.sync != "none":
             raise argument_error("sensors", "empty")
-        sensors = np.tile(np.eye(4), (count, 1, 1)) if self.sensors is None else self.sensors
-        self._set("sensors", shaped("sensors", sensors, (count, 4, 4)))
-        references = np.zeros(count, dtype=np.int64) if self.references is None else self.references
-        if self.sync == "none":
-            references = np.arange(count)
-        self._set("references", indices("references", references, count, count))
-        poses = shaped("poses", self.poses, (self.corners.view_count, 4, 4), missing=True)
-        self._set("poses", poses)
+        if self.sensors is None:
+            self._set("sensors", np.tile(np.eye(4), (count, 1, 1)))
+        if self.sync == "none" or self.references is None:
+            self._set("references", np.arange(count) if self.sync == "none" else np.zeros(count, np.int64))
+        check_arrays(self, cameras=count, views=self.corners.view_count)
         over = np.flatnonzero(self.corners.point >= len(self.board.places))
         if len(over):
             fields = {"count": len(self.board.places), "board": self.board.described}
             corner = self.corners.title(int(over[0]))
             raise InputError(phrase("targets.corner-beyond", corner=corner, **fields))
-        self._leave_out(poses)
-        for name in ("offsets", "sd_offsets"):
-            self._set(name, shaped(name, getattr(self, name), (count,)))
-        for name, shape in (("sd_sensors", (count, 6)), ("sd_bend", (2,))):
-            self._set(name, shaped(name, getattr(self, name), shape))
+        self._leave_out(np.asarray(self.poses))
+        for name in ("sd_sensors", "sd_bend"):
             values = np.asarray(getattr(self, name))
             for value in values[~(values > 0)].tolist():
                 raise InputError(phrase("targets.free-sd", name=name, value=value))
