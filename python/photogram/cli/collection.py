@@ -14,35 +14,13 @@ from photogram.cli.components import Basis, outcome
 from photogram.cli.documents import TEXT, Documents
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Changes, Input, Threads, Without, misuse
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import replace
 from photogram.results.snooping_options import SnoopOptions, UnitWeight
 
 if TYPE_CHECKING:
-    from photogram.adjustment import robust
     from photogram.collection import AdjustedCollection
 
 PACKED = (".bz2", ".gz")
-
-
-@dataclass(frozen=True)
-class CollectionFit:
-    """Options for the loss function and its minimization."""
-
-    loss: Literal["squares", "huber", "cauchy"] = "squares"
-    scale: float | None = None
-    sd: float = 1.0
-    tolerance: float | None = None
-    max_iterations: Annotated[int, typer.Option(min=1)] = 200
-    covariance: Annotated[bool, typer.Option("--covariance/--no-covariance")] = True
-
-    @property
-    def robust(self) -> robust.Loss | None:
-        """The loss with its scale; None for squares."""
-        if self.loss != "squares":
-            return self.loss if self.scale is None else (self.loss, self.scale)
-        if self.scale is not None:
-            raise misuse("--scale", "requires", options="--loss")
-        return None
 
 
 @with_job("collection", example=("collection", "ring.txt"))
@@ -51,7 +29,12 @@ def collection(
     *,
     problem: Input,
     documents: Annotated[Documents, Without("xlsx", "crs", "map")],
-    fit: CollectionFit,
+    loss: Literal["squares", "huber", "cauchy"] = "squares",
+    scale: float | None = None,
+    sd: float = 1.0,
+    tolerance: float | None = None,
+    max_iterations: Annotated[int, typer.Option(min=1)] = 200,
+    covariance: Annotated[bool, typer.Option("--covariance/--no-covariance")] = True,
     choices: Annotated[Mapping[str, Any], Changes(AdjustOptions, "ordering", "max_bias_ratio")],
     components: list[Basis] | None = None,
     threads: Threads = None,
@@ -72,12 +55,15 @@ def collection(
     photos, found = recognised(problem)
     adjusted = f"adjusted{found.suffix}{packing}"
     documents.declare(job, TEXT, adjusted, pictures=None)
-    photos = photos.replace(image_sd=fit.sd)
+    photos = photos.replace(image_sd=sd)
     if snoop:
         job.alone("--snoop", ("--loss", "--scale"))
+    if loss == "squares" and scale is not None:
+        raise misuse("--scale", "requires", options="--loss")
+    robust: Any = None if loss == "squares" else loss if scale is None else (loss, scale)
     options = {
-        "tolerance": fit.tolerance,
-        "max_iterations": fit.max_iterations,
+        "tolerance": tolerance,
+        "max_iterations": max_iterations,
         "ordering": choices.get("ordering", "auto"),
     }
 
@@ -87,7 +73,7 @@ def collection(
     result = outcome(
         job,
         photos,
-        partial(adjust, photos, loss=fit.robust, covariance=fit.covariance, **options),
+        partial(adjust, photos, loss=robust, covariance=covariance, **options),
         complete,
         # The value of --sd is not verified, so the default differs from blocks.
         snooping=replace(snooping, unit_weight=unit_weight) if snoop else None,

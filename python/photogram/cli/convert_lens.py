@@ -33,21 +33,6 @@ class LensFit:
     knots: tuple[int, int] | None = option(None, kind=str, parse=pair)
     size: tuple[int, int] | None = option(None, kind=str, parse=pair)
 
-    def converted(self, camera: Camera, to: str, size: tuple[int, int]) -> Conversion:
-        """Fit the lens."""
-        from photogram.targets import convert_lens
-        from photogram.targets.lens_fit import KNOTS
-
-        return convert_lens(
-            camera,
-            to,
-            size,
-            radius=self.radius,
-            distances=self.distances or (math.inf,),
-            intrinsics_only=self.intrinsics_only,
-            knots=self.knots or KNOTS,
-        )
-
 
 @with_job("convert-lens")
 def convert_lens(
@@ -67,14 +52,24 @@ def convert_lens(
     """
     documents = replace(documents, no_html=True)
     documents.declare(job, pictures=["difference"])
+    from photogram.targets import convert_lens as fitted
     from photogram.targets.drawing import plot_difference
+    from photogram.targets.lens_fit import KNOTS
 
     source, known = _camera(job, path, camera)
     extent = fit.size or known
     if extent is None:
         raise misuse("--size", "no-size", file=path)
     with job.status("fitting the lens"):
-        found = fit.converted(source, to, extent)
+        found = fitted(
+            source,
+            to,
+            extent,
+            radius=fit.radius,
+            distances=fit.distances or (math.inf,),
+            intrinsics_only=fit.intrinsics_only,
+            knots=fit.knots or KNOTS,
+        )
     documents.conclude(
         job,
         found,

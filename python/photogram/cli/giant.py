@@ -15,7 +15,7 @@ from photogram.cli.console import SHOWN, errors
 from photogram.cli.documents import TEXT, Documents, check_maps
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Changes, OfSnooping, OutputFile, Reads, Threads, Without, misuse
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import replace
 from photogram.network.refraction import Refraction
 from photogram.results.snooping_options import SnoopOptions
 from photogram.words import phrase
@@ -23,26 +23,8 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import Block, Result
     from photogram.giant import Project
-    from photogram.giant.common import Common
 
 RESULTS = ("FRAMES", "GROUND", "RESTART", TEXT)
-
-
-@dataclass(frozen=True)
-class GiantOptions:
-    """How a GIANT project is adjusted if COMMON does not specify it."""
-
-    as_published: bool = False
-    components: list[Basis] | None = None
-
-    def rules(self, common: Common) -> dict[str, Any]:
-        """Return the rules of an adjustment; on request, the rules of 1987."""
-        from photogram import AsPublished
-
-        if not self.as_published:
-            return {}
-        tolerance = AsPublished(common.convergence_percent)
-        return {"tolerance": tolerance, "max_iterations": common.max_iterations}
 
 
 @with_job("giant", example=(GALVESTON,), ending="-adjusted", example_name=GALVESTON)
@@ -52,7 +34,8 @@ def giant(
     directory: Annotated[Path, Reads.PROJECT],
     documents: Annotated[Documents, Without("xlsx", "crs")],
     listing: OutputFile = None,
-    how: GiantOptions,
+    as_published: bool = False,
+    components: list[Basis] | None = None,
     choices: Annotated[
         Mapping[str, Any], Changes(AdjustOptions, "unit_variance", "ordering", "max_bias_ratio")
     ],
@@ -69,7 +52,7 @@ def giant(
     Writes FRAMES and GROUND (adjusted, if converged), RESTART (stations of the last iteration), report.html
     and report.txt.
     """
-    from photogram import adjust
+    from photogram import AsPublished, adjust
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.errors import AdjustmentError
     from photogram.formats.planes import plane_remarks
@@ -92,13 +75,16 @@ def giant(
         job.alone("--snoop", ("--as-published",))
         if common.intersection_only:
             raise misuse("--snoop", "intersection-only")
-    said = common.unit_variance if how.as_published else common.unbiased_variance
+    said = common.unit_variance if as_published else common.unbiased_variance
     options = {"unit_variance": choices.get("unit_variance", said)}
+    rules: dict[str, Any] = {"ordering": choices.get("ordering", "auto")}
+    if as_published:  # the rules of 1987
+        rules["tolerance"] = AsPublished(common.convergence_percent)
+        rules["max_iterations"] = common.max_iterations
 
     def adjusted(**given: Any) -> Result:
         free = block.with_fixed_photos() if common.intersection_only else block
-        rules = {**how.rules(common), **options, "ordering": choices.get("ordering", "auto")}
-        return adjust(free, covariance="verdict", **rules, **given)
+        return adjust(free, covariance="verdict", **rules, **options, **given)
 
     def complete(result: Result) -> Result:
         result = diagnosed(result)
@@ -113,7 +99,7 @@ def giant(
                 adjusted,
                 complete,
                 snooping=snooping if snoop else None,
-                bases=how.components or (),
+                bases=components or (),
                 threads=threads,
                 options=options,
             )
@@ -122,10 +108,10 @@ def giant(
         for message in messages[:SHOWN]:
             errors.print(escape(str(message)))
         raise
-    records = _records(project, block, found.result, how.as_published)
+    records = _records(project, block, found.result, as_published)
     pages = {}
     if listing is not None:
-        printed = printout(project, block, found.result, as_published=how.as_published, limits=allowed)
+        printed = printout(project, block, found.result, as_published=as_published, limits=allowed)
         pages = {listing: printed.encode()}
     documents.conclude(
         job,
