@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from photogram import Camera, Spheroid, adjust, network, simulate
-from photogram.formats.maps.ellipses import ellipses, fitting_scale
+from photogram.formats.maps.layers import ellipses, fitting_scale
 from photogram.results.footprints import footprints, grounds, metric_covariances, picture_frames
 
 SPACES = {

@@ -10,8 +10,7 @@ from moving_blocks import rolling, scanned
 from photogram import InputError, Spheroid, adjust, formats, predict
 from photogram.absolute_orientation import relative_model
 from photogram.formats import FORMATS, cannot_hold, to_files
-from photogram.formats.format_coordinates import in_pixels, in_topocentric
-from photogram.formats.models import is_free
+from photogram.formats.models import in_pixels, in_topocentric, is_free
 from photogram.formats.project import Repeated
 from photogram.formats.supplements import repeated_remarks
 from photogram.network import Polynomial, Table, Timed, Trajectory

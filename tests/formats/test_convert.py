@@ -9,7 +9,7 @@ from test_plain_project import EXAMPLE
 import photogram
 from message_codes import refused
 from photogram import Spheroid, adjust, formats
-from photogram.formats.format_coordinates import in_topocentric, topocentric_remarks
+from photogram.formats.models import in_topocentric, topocentric_remarks
 from photogram.network import lengths_of_units
 from photogram.network.directions import image_directions
 

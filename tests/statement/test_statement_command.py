@@ -9,7 +9,7 @@ from golden_statement import BLOCK
 
 import photogram
 from photogram.formats import read
-from photogram.formats.format_coordinates import in_topocentric
+from photogram.formats.models import in_topocentric
 from photogram.words import Phrase
 
 FILES = (

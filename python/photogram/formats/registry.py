@@ -12,13 +12,14 @@ from typing import Any
 from photogram.arguments.fields import options_of
 from photogram.errors import InputError, PhotogramError, message_of
 from photogram.formats.format import Format, later
-from photogram.formats.format_coordinates import (
+from photogram.formats.models import (
+    check_images,
     in_pixels,
     in_topocentric,
+    lost,
     nominal_pixels,
     topocentric_remarks,
 )
-from photogram.formats.models import check_images, lost
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project

@@ -40,7 +40,7 @@ from photogram.results.result import Result
 from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
 
 if TYPE_CHECKING:
-    from photogram.formats.control_lists import ControlList
+    from photogram.formats.control import ControlList
 
 SAME = 1e-3  # Largest difference (pixels) of equal observations of a point in a photo
 SIMILAR = 10.0  # Smallest improvement of the fit of control for which a similarity is applied to the model
@@ -299,8 +299,7 @@ def with_control(
     columns: Columns = PLAIN,
 ) -> Project:
     """Return a project with control and check points of a table."""
-    from photogram.formats.control_lists import read_control_list
-    from photogram.formats.control_system import check_systems
+    from photogram.formats.control import check_systems, read_control_list
 
     listed = read_control_list(path, project)
     crs = crs or (listed.crs if listed else "")

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from message_codes import refused
-from photogram.formats.isis.settings import OTHERWISE, PARAMETERS, REFUSED, Settings, read_settings
-from photogram.formats.isis.solving import deviations
+from photogram.formats.isis.solving import OTHERWISE, PARAMETERS, REFUSED, Settings, deviations, read_settings
 
 
 def test_defaults_are_those_of_jigsaw():

@@ -16,8 +16,7 @@ from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.isis import TITLE
 from photogram.formats.isis.network import ControlNetwork, read_network
 from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
-from photogram.formats.isis.settings import Settings, read_settings
-from photogram.formats.isis.solving import observations_of, one_flight, solving
+from photogram.formats.isis.solving import Settings, observations_of, one_flight, read_settings, solving
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import Place

@@ -12,7 +12,7 @@ from photogram.formats.csm.isd import to_angles
 from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.network import POINT_TYPES
 from photogram.formats.isis.outcome import Image, Outcome
-from photogram.formats.isis.settings import PARAMETERS, Settings
+from photogram.formats.isis.solving import PARAMETERS, Settings
 from photogram.io.csv_text import csv_text
 from photogram.network.motion import about
 from photogram.network.trajectories import Trajectory

@@ -16,8 +16,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.isis.network import ControlNetwork
-from photogram.formats.isis.settings import Settings
-from photogram.formats.isis.solving import Solving
+from photogram.formats.isis.solving import Settings, Solving
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message

@@ -1,7 +1,8 @@
-"""Layers of a map of a result, as data frames of geopandas."""
+"""Layers of a map of a result, as data frames of geopandas, with error ellipses."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,6 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.crs_results import Placed, placed
-from photogram.formats.maps.ellipses import CONFIDENCE, ellipses, fitting_scale
 from photogram.formats.project import frame_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
@@ -18,6 +18,8 @@ from photogram.network.moving_photos import Moment
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.results.tables import ComponentTests, Tests
+from photogram.show.sketch.marks import ellipse_axes
+from photogram.show.style import round_length
 from photogram.statistics.limits import normal_limit
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Layer", "chosen_crs", "map_layers"]
 
+CONFIDENCE = 0.95  # Default probability of an ellipse
 MOST_ELLIPSES = 20_000  # Default limit of error ellipses of points
 SUSPICIOUS = 3.0  # Smallest test value on the map
 _ANGLES = ("omega", "phi", "kappa")
@@ -356,3 +359,52 @@ def _along(what: str, values: Floats) -> dict[str, Floats]:
 
 def _ids(found: Placed) -> np.ndarray[Any, Any]:
     return np.array(found.result.block.point_ids, dtype=object)
+
+
+VERTICES = 36
+SHARE = 0.3  # Size of a typical drawn ellipse relative to the distance between neighbours
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipses:
+    """n error ellipses."""
+
+    major: Floats  # (n,) semi-axes in the unit of the positions
+    minor: Floats
+    azimuth: Floats  # (n,) of the major axis, clockwise from the second axis (north): radians, -pi/2 to pi/2
+
+    def outlines(self, scale: float = 1.0) -> Floats:
+        """Return (n, 37, 2) closed outlines about the origin, enlarged."""
+        around = np.linspace(0.0, math.tau, VERTICES + 1)
+        along, across = (
+            scale * np.outer(self.major, np.cos(around)),
+            scale * np.outer(self.minor, np.sin(around)),
+        )
+        sine, cosine = np.sin(self.azimuth)[:, np.newaxis], np.cos(self.azimuth)[:, np.newaxis]
+        found = np.stack([along * sine + across * cosine, along * cosine - across * sine], axis=2)
+        found[:, -1] = found[:, 0]
+        return found
+
+
+def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Ellipses:
+    """Return the error ellipses of (n, 2, 2) or larger covariances of east and north.
+
+    The axes are the roots of the eigenvalues, times the root of the quantile of chi-square with two degrees
+    of freedom, -2 ln(1 - confidence): 2.4477 for 95 %. They contain the true position with the probability
+    `confidence`; None: standard ellipses (39 %). NaN if the covariance is NaN.
+    """
+    factor = 1.0 if confidence is None else math.sqrt(-2.0 * math.log1p(-confidence))
+    semi_axes, angles = ellipse_axes(covariances[:, :2, :2])
+    major, minor = factor * semi_axes.T
+    return Ellipses(major, minor, np.radians(np.where(angles < 0, -90.0, 90.0) - angles))
+
+
+def fitting_scale(found: Ellipses, places: Floats) -> float:
+    """Return a round display scale (1, 2, 5, 10 ...) for ellipses at (n, 2) positions."""
+    known = np.isfinite(found.major) & np.isfinite(places[:, :2]).all(axis=1)
+    if not known.any():
+        return 1.0
+    typical, extent = float(np.median(found.major[known])), np.ptp(places[known, :2], axis=0)
+    area = max(float(extent[0] * extent[1]), float(extent.max()) ** 2 / len(places))
+    spacing = math.sqrt(area / known.sum())
+    return max(round_length(SHARE * spacing / typical), 1.0) if typical > 0 else 1.0

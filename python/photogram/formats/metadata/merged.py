@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from photogram.arguments.arrays import natural_order, truth_value
 from photogram.errors import InputError
 from photogram.formats.cards import filled_lines
-from photogram.formats.control_lists import SYSTEMS
+from photogram.formats.control import SYSTEMS
 from photogram.formats.metadata.pictures import said_by_picture, time_of_picture
 from photogram.formats.metadata.record import (
     ENDINGS,

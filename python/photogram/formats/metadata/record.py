@@ -15,7 +15,7 @@ import numpy as np
 from photogram.formats.cards import filled_lines
 from photogram.formats.column_words import column_of
 from photogram.formats.columns import PLAIN, is_geographic, is_photo, settled
-from photogram.formats.control_lists import system_of
+from photogram.formats.control import system_of
 from photogram.formats.plain.schema import AXES, TABLES, column_units, deviation_columns
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows

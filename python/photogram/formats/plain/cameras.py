@@ -13,8 +13,8 @@ from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.images import from_tables, in_unit, to_tables
 from photogram.formats.plain.certificates import certified, read_certificates
-from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
+from photogram.formats.plain.unknowns import read_covariances
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.numbers import scaled

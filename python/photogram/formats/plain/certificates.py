@@ -13,8 +13,8 @@ from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError, message_of
 from photogram.film.distances import with_datum
 from photogram.film.validity import age_remark, changed_remark, valid_certificate
-from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.tables import Tables, columns_of
+from photogram.formats.plain.unknowns import Covariances
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.io.toml import day_of

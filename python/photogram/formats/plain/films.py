@@ -17,7 +17,6 @@ from photogram.film.interior import (
 )
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.certificates import marks_of, read_fiducials
-from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.film_readings import (
     Lying,
     ScannedPhoto,
@@ -39,6 +38,7 @@ from photogram.formats.plain.scanners import (
 )
 from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
+from photogram.formats.plain.unknowns import Covariances
 from photogram.formats.project import Project
 from photogram.io.column_table import FALSE, TRUE
 from photogram.lazy_dataclasses import dataclass, field, replace

@@ -16,24 +16,24 @@ from photogram.formats.names import NamedValues
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
-from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.films import on_film, read_scanned
-from photogram.formats.plain.moving_photos import placed, read_timed
 from photogram.formats.plain.observations import Known, read_observations
 from photogram.formats.plain.photos import (
     Images,
     Photos,
     image_coordinates,
+    mounted_halves,
     read_images,
     read_photos,
+    with_seams,
 )
-from photogram.formats.plain.rigs import read_frames, read_rigs, times_of
+from photogram.formats.plain.rigs import placed, read_frames, read_rigs, read_timed, times_of
 from photogram.formats.plain.schema import AXES, SD_AXES, TABLES
-from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.tables import Tables, Transform, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
+from photogram.formats.plain.unknowns import read_covariances
 from photogram.formats.project import Project, Unused
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
@@ -160,7 +160,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
         with at_place(Place(settings.path), f"[features] {name}"):
             named_points(wanted, points.names)
     if control is not None and given is not None:
-        from photogram.formats.control_system import check_systems
+        from photogram.formats.control import check_systems
 
         check_systems(project, settings, control, points.control_rows, control.vectors(AXES), free=False)
     return project, source

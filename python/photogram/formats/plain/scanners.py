@@ -13,9 +13,9 @@ import numpy as np
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.schema import CURVES, DEVICE, GRID, TABLES, deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, made
+from photogram.formats.plain.unknowns import Covariances
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message

@@ -13,11 +13,9 @@ from photogram.formats.images import by_camera, to_tables
 from photogram.formats.models import correlated_control, known_cameras, known_points
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
 from photogram.formats.plain.cameras import Exposure, exposure_cells, knots_table, of_cameras
-from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.films import WrittenFilms
-from photogram.formats.plain.moving_photos import line_times_table, moving_columns
 from photogram.formats.plain.observations import observation_tables
-from photogram.formats.plain.rigs import Rigs
+from photogram.formats.plain.rigs import Rigs, line_times_table, moving_columns
 from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings, asked_files, key_tables
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
@@ -29,6 +27,7 @@ from photogram.formats.plain.tables import (
     signs_in_files,
 )
 from photogram.formats.plain.trajectories import lost_smoothness, smoothness_table, trajectory_tables
+from photogram.formats.plain.unknowns import covariance_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.io.files import read_text
@@ -86,7 +85,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         **observation_tables(block),
         **rigs.tables(block),
         **films.tables(),
-        **covariance_tables(block, cameras, rigs, films.covariances()),
+        **covariance_tables(block, cameras, rigs.title, films.covariances()),
         "boards": boards_table(project.boards, block, project.details.get(REGULARISED)),
         "knots": knots_table(cameras),
         "lengths": lengths_table(project.statement.get("lengths", ())),
