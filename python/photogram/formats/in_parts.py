@@ -198,7 +198,7 @@ class Streamed:
         path, source = self._tables.settings.tables["images"], self._source
         buckets = max(-(-path.stat().st_size // BUCKET), 1)
         counts, start = np.zeros(len(self.block.photo_ids)), 0
-        assumed = np.asarray(ASSUMED_SD[source.cameras.cameras[0].unit or "px"])
+        assumed = np.asarray(ASSUMED_SD[source.cameras.rows[0].camera.unit or "px"])
         for number, table in enumerate(source.tables.batches("images", self._size)):
             images = images_of(source.tables, table, source.photos)
             xy, sd = source.converted(images)

@@ -68,8 +68,8 @@ def read(path: Path, options: ReadOptions) -> Project:
     messages = block.messages
     table = pixel_table(path, messages)
     cameras = read_cameras(Tables(Settings(path, tables={"cameras": options.cameras}), messages))
-    for own in zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True):
-        block.camera(*own)
+    for own in cameras.rows:
+        block.camera(own.camera, own.size, own.pixel_mm)
     photos, points = table.names("photo"), table.names("point")
     which = np.array(cameras_of(table, [each.name for each in block.cameras]), dtype=np.int64)
     of_photo = np.zeros(len(photos.names), dtype=np.int64)

@@ -275,7 +275,7 @@ def _with_sensors(path: Path, title: str, options: ReadOptions) -> DbatBuilder:
     if options.cameras is not None:
         settings = Settings(path, tables={"cameras": options.cameras}, image="mm")
         table = read_cameras(Tables(settings, content.messages))
-        for camera, size, pixel in zip(table.cameras, table.sizes, table.pixel_mm, strict=True):
+        for camera, size, pixel, *_ in table.rows:
             if size is None or pixel is None or camera.image_y != "up":
                 raise InputError(phrase("dbat.camera", camera=camera.title), file=options.cameras)
             content.camera(camera, size, pixel)

@@ -19,7 +19,6 @@ from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.numbers import scaled
 from photogram.io.places import Place, at_place, image_size
-from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -148,22 +147,28 @@ _DISTANCES = ("c", "f", "fx", "fy")
 SMALLEST_DISTANCE = 0.1  # Smallest principal distance, relative to the image width
 
 
-@dataclass(frozen=True)
-class Cameras:
-    """The cameras of a project: image sizes, cameras per photo or group, weights.
+class TableCamera(NamedTuple):
+    """A camera with the further cells of its row."""
 
-    Cameras of moving photos have a rolling shutter or a line sensor. Cameras of films may have certificates,
-    by camera name.
-    """
+    camera: Camera
+    size: Size | None
+    pixel_mm: float | None
+    for_each: str  # Photos that share it: all, or each photo or group
+    weights_given: bool
+    line: LineSensor | None
+    shutter: Shutter | None
 
-    cameras: list[Camera] = field(default_factory=list)
-    sizes: list[Size | None] = field(default_factory=list)
-    pixel_mm: list[float | None] = field(default_factory=list)
-    for_each: list[str] = field(default_factory=list)
-    shutters: list[Shutter | None] = field(default_factory=list)
-    lines: list[LineSensor | None] = field(default_factory=list)
-    weights_given: list[bool] = field(default_factory=list)
-    certificates: dict[str, Certificate] = field(default_factory=dict)
+
+class Cameras(NamedTuple):
+    """The rows of the table of cameras, and certificates of cameras of films by name."""
+
+    rows: list[TableCamera]
+    certificates: Mapping[str, Certificate]
+
+    @property
+    def cameras(self) -> list[Camera]:
+        """The cameras."""
+        return [each.camera for each in self.rows]
 
 
 def read_cameras(tables: Tables) -> Cameras:
@@ -173,10 +178,9 @@ def read_cameras(tables: Tables) -> Cameras:
         raise InputError(phrase("error.missing", name="cameras.csv"), file=tables.settings.path)
     if not table.count:
         raise table.head.error(phrase("error.empty-file", content="cameras"))
-    found, certificates, covariances = Cameras(), read_certificates(tables), read_covariances(tables)
-    found.certificates.update(certificates)
-    in_mm, records = [], tables.records("cameras")
-    for row, cells in enumerate(records):
+    certificates, covariances = read_certificates(tables), read_covariances(tables)
+    rows, in_mm = list[TableCamera](), list[str]()
+    for row, cells in enumerate(tables.records("cameras")):
         line = _line_sensor(tables, table, row, cells)
         correlated = bool(covariances.names("camera", cells["camera"]))
         own = _row(table, row, cells, behind_a_lens=line is not None, is_correlated=correlated)
@@ -192,18 +196,16 @@ def read_cameras(tables: Tables) -> Cameras:
             camera = made(table, row, _camera, tables, table, row, own, size, parts)
         else:
             camera = made(table, row, certified, tables, own.name, own.model, certificate)
-        found.cameras.append(camera)
-        found.sizes.append(size)
-        found.pixel_mm.append(cells.get("pixel_mm"))
-        found.for_each.append(cells.get("for_each", "all"))
-        found.weights_given.append("weights" in cells)
-        found.lines.append(line)
-        found.shutters.append(_shutter(tables, table, row, cells, camera, size))
+        shutter = _shutter(tables, table, row, cells, camera, size)
+        further = cells.get("pixel_mm"), cells.get("for_each", "all"), "weights" in cells
+        rows.append(TableCamera(camera, size, *further, line, shutter))
     if both := [name for name in in_mm if covariances.names("camera", name)]:
         raise table.head.error(phrase("plain.mm-covariances", camera=both[0]))
     if in_mm:
         tables.remark("plain.lengths-in-mm", table.path, names=in_mm)
-    return replace(found, cameras=with_knots(tables, covariances.cameras(found.cameras)))
+    cameras = with_knots(tables, covariances.cameras([each.camera for each in rows]))
+    rows = [each._replace(camera=camera) for each, camera in zip(rows, cameras, strict=True)]
+    return Cameras(rows, certificates)
 
 
 def _from_mm(
@@ -351,23 +353,19 @@ def spread_over_photos(
     cameras: Cameras, photo_cameras: Sequence[int], photos: Sequence[str], groups: Sequence[str]
 ) -> tuple[Cameras, list[int]]:
     """Create separate cameras for photos or groups as in the table."""
-    if set(cameras.for_each) == {"all"}:
+    if all(each.for_each == "all" for each in cameras.rows):
         return cameras, list(photo_cameras)
-    found = Cameras()
     places: dict[tuple[int, str], int] = {}
     of_photos = []
     for row, photo, group in zip(photo_cameras, photos, groups, strict=True):
-        each = cameras.for_each[row]
-        own = "" if each == "all" else photo if each == "photo" else group
-        if (row, own) not in places:
-            places[row, own] = len(found.cameras)
-            camera = cameras.cameras[row]
-            found.cameras.append(camera.replace(name=f"{camera.name}/{own}") if own else camera)
-            found.for_each.append("all")
-            for name in ("sizes", "pixel_mm", "weights_given", "shutters", "lines"):
-                getattr(found, name).append(getattr(cameras, name)[row])
-        of_photos.append(places[row, own])
-    return found, of_photos
+        own = {"all": "", "photo": photo}.get(cameras.rows[row].for_each, group)
+        of_photos.append(places.setdefault((row, own), len(places)))
+    rows = []
+    for row, own in places:
+        camera = cameras.rows[row].camera
+        camera = camera.replace(name=f"{camera.name}/{own}") if own else camera
+        rows.append(cameras.rows[row]._replace(camera=camera))
+    return Cameras(rows, cameras.certificates), of_photos
 
 
 def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:

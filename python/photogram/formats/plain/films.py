@@ -302,9 +302,9 @@ def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[M
     covariances. The frame of marks belongs to the positive.
     """
     used = {photos.cameras[row] for row in np.flatnonzero(scanned.photos).tolist()}
-    found = list(cameras.cameras)
+    found = list(cameras.rows)
     for row in used:
-        camera = found[row]
+        camera = found[row].camera
         if camera.image_y == "up" and camera.parameters.get("c", -1.0) > 0:
             covariance = camera.covariance
             if covariance is not None:
@@ -312,11 +312,12 @@ def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[M
                 signs = signs_in_files(names)
                 covariance = names, np.asarray(matrix) * signs * signs[:, np.newaxis]
             parameters = {**camera.parameters, "c": -camera.parameters["c"]}
-            found[row] = camera = camera.replace(parameters=parameters, covariance=covariance)
+            camera = camera.replace(parameters=parameters, covariance=covariance)
             messages.append(Message(phrase("plain.negative-distance", camera=camera.name)))
-        if camera.direction == "backward" and not cameras.weights_given[row]:
-            found[row] = camera.replace(weights="measured")
-    return replace(cameras, cameras=found)
+        if camera.direction == "backward" and not found[row].weights_given:
+            camera = camera.replace(weights="measured")
+        found[row] = found[row]._replace(camera=camera)
+    return cameras._replace(rows=found)
 
 
 class WrittenFilms:

@@ -75,12 +75,13 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     for row in np.flatnonzero(flown).tolist():
         if np.isfinite([*sd[row], *attitude_sd[row]]).any() or row in observed:
             raise table.error(row, phrase("plain.sd-on-trajectory"))
-    which = cameras_of(table, [each.name for each in cameras.cameras])
+    names = [each.camera.name for each in cameras.rows]
+    which = cameras_of(table, names)
     return Photos(
         table,
         table.texts("photo"),
         which,
-        [cameras.cameras[row].name for row in which],
+        [names[row] for row in which],
         centres,
         matrices,
         sd,
@@ -235,15 +236,15 @@ def image_coordinates(
     plain = in_unit(settings, images.xy, pixels=pixels)
 
     def converted(row: int, measured: Floats, own: Floats) -> Floats:
-        if cameras.lines[row] is not None:
+        if cameras.rows[row].line is not None:
             return in_unit(settings, measured, pixels=True)
-        return from_tables(settings, cameras.cameras[row], cameras.sizes[row], own)
+        return from_tables(settings, *cameras.rows[row][:2], own)
 
-    if len(cameras.cameras) == 1 and not scanned.any():
+    if len(cameras.rows) == 1 and not scanned.any():
         return converted(0, images.xy, plain), sd
     found = plain.copy()
     of_images = photo_cameras[images.photos]
-    for row in range(len(cameras.cameras)):
+    for row in range(len(cameras.rows)):
         own = of_images == row
         found[own] = converted(row, images.xy[own], plain[own])
     own = scanned[images.photos]

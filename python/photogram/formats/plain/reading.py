@@ -102,8 +102,8 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     source = ImageSource(tables, photos, cameras, np.asarray(photo_cameras), scanned.photos)
     xy, sd = source.converted(images)
     block = BlockBuilder(settings.path, "plain project")
-    for row, own in enumerate(zip(cameras.cameras, cameras.sizes, cameras.pixel_mm, strict=True)):
-        block.camera(*own, key=row)
+    for row, own in enumerate(cameras.rows):
+        block.camera(own.camera, own.size, own.pixel_mm, key=row)
     block.photos(photos.names, photo_cameras, photos.centres, photos.matrices)
     block.position_sd, block.attitude_sd = photos.position_sd, photos.attitude_sd
     owners = {each.name: row for row, each in enumerate(cameras.cameras)}

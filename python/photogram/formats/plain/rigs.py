@@ -231,7 +231,9 @@ def read_timed(
 ) -> list[Timed]:
     """Read the motion of photos: on trajectories, or of their own."""
     table, lines = photos.table, _line_times(tables)
-    if _COLUMNS.isdisjoint(table.columns) and not any((lines, *cameras.shutters, *cameras.lines)):
+    if _COLUMNS.isdisjoint(table.columns) and not (
+        lines or any(each.shutter or each.line for each in cameras.rows)
+    ):
         return []
     on = named_of(table, "trajectory", trajectories, "trajectory")
     on_rigs, as_sensors = named_of(table, "rig", rigs, "rig"), table.texts("sensor")
@@ -258,8 +260,8 @@ def read_timed(
             "rate": rates[row],
             "sensor": sensor,
             **motions[row],
-            "shutter": cameras.shutters[camera],
-            "line_sensor": cameras.lines[camera],
+            "shutter": cameras.rows[camera].shutter,
+            "line_sensor": cameras.rows[camera].line,
             "lines": lines.get(name),
         }
         given: dict[str, Any] = {field: value for field, value in said.items() if value is not None}
