@@ -3,6 +3,7 @@
 Lines of pages that are replaced:
 
 * `<!-- generated: columns TABLE [FIRST LAST] -->`: all columns of a table of the plain project, or some;
+* `<!-- generated: headings KIND ... -->`: the words of some kinds of headings, by their meaning;
 * `<!-- generated: keys -->`: the keys of `project.toml` by section;
 * `<!-- generated: commands -->`: all commands with their options;
 * `<!-- generated: verdicts -->`: all verdicts with their exit codes and next steps;
@@ -108,6 +109,18 @@ def columns(words: str) -> str:
     return "\n".join(["| column | content | default |", "| --- | --- | --- |", *lines])
 
 
+def headings(kinds: str) -> str:
+    """Return a Markdown table of the words of some kinds of headings, by their meaning."""
+    from photogram.formats.column_words import WORDS
+
+    meanings: dict[str, list[str]] = {}
+    for kind in kinds.split():
+        for word, meaning in WORDS[kind].items():
+            meanings.setdefault(meaning, []).append(f"`{word}`")
+    lines = [f"| `{name}` | {', '.join(words)} |" for name, words in meanings.items() if name]
+    return "\n".join(["| meaning | words |", "| --- | --- |", *lines])
+
+
 def keys(_: str) -> str:
     """Return the declared keys of the settings of a plain project as TOML."""
     from photogram.formats.plain.settings import KEYS
@@ -193,6 +206,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     parts = {
         "columns": columns,
         "commands": commands,
+        "headings": headings,
         "keys": keys,
         "messages": messages,
         "verdicts": verdicts,

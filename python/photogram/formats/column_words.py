@@ -1,117 +1,39 @@
 """Column headings of coordinates, and words for control and check points.
 
-All readers of points with coordinates use this table. Words are without accents and marks (`hohe` is Höhe). A
-heading is known if it is one of the words, or if all its words have one meaning (`X/Easting`, `Punkt-Nr.`).
+`headings.csv` contains the words, without accents and marks (`hohe` is Höhe); all readers of points with
+coordinates use it. Kinds of rows are `column` (without meaning: columns that an adjustment does not need),
+`role` (`?`: control or check, depending on the program; the other role has another word), `accuracy` (of
+several coordinates), `photo`, `pixel` and `filler`. A heading is known if it is one of the words, or if all
+its words but fillers have one meaning (`X/Easting`, `Punkt-Nr.`).
 """
 
 from __future__ import annotations
 
+import csv
+import itertools
 import math
 import re
 import unicodedata
 from collections.abc import Collection, Mapping
+from pathlib import Path
 
-PHOTO_WORDS = frozenset(
-    {"photo", "image", "image name", "imagename", "filename", "file name", "file", "picture"}
-)
-"""Headings of the column of photos."""
-PIXEL_WORDS: Mapping[str, str] = {
-    **dict.fromkeys(("x", "u", "col"), "column"),
-    **dict.fromkeys(("y", "v"), "row"),
-}
-"""Headings of image coordinates, in columns and rows."""
 ROLE = "use"  # Column of the roles: control or check
-_COLUMNS: Mapping[str, Mapping[str, str]] = {
-    "point": {
-        "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target,"
-        " station, mark, ident, track",
-        "de": "punkt, punktnummer, punktname, punktnr, pktnr, ptnr, pkt, nummer, bezeichnung, kennung",
-        "fr": "nom, numero, num, matricule, repere, cible",
-        "es/it/pt": "punto, nombre, nome, ponto, codigo",
-        "nl": "punt, puntnummer, naam",
-    },
-    "x": {
-        "en": "x, e, easting, eastings, east, xcoord",
-        "de": "rechtswert, rechts, rw, ostwert, ost",
-        "fr": "est, abscisse",
-        "es/it/pt": "este, leste",
-        "nl": "oost",
-    },
-    "y": {
-        "en": "y, n, northing, northings, north, ycoord",
-        "de": "hochwert, hoch, hw, nordwert",
-        "de/fr/it": "nord, ordonnee",
-        "es/pt": "norte",
-        "nl": "noord",
-    },
-    "z": {
-        "en": "z, h, height, elevation, elev, altitude, alt, level, rl, zcoord",
-        "de": "hohe, hoehe",
-        "fr": "hauteur, cote",
-        "es/it/pt": "cota, quota, altura, altitud, altezza, elevacion, elevacao",
-        "nl": "hoogte",
-    },
-    "longitude": {
-        "en": "longitude, lon, long, lng",
-        "de": "lange, laenge, langengrad, laengengrad",
-        "es/it/nl": "longitud, longitudine, lengte",
-    },
-    "latitude": {
-        "en": "latitude, lat",
-        "de": "breite, breitengrad",
-        "es/it/nl": "latitud, latitudine, breedte",
-    },
-    "sd": {
-        "en": "sd, s, sigma, std, stddev, stdev, dev, accuracy, acc, precision, uncertainty, rms, rmse, se",
-        "en/de": "deviation, standard deviation, std dev, standardabweichung, stdabw, streuung, genauigkeit",
-        "fr": "ecart type, ecart, incertitude",
-        "es/it/pt": "exactitud, desviacion, precisione, precisao, desvio, incertidumbre",
-        "nl": "nauwkeurigkeit",
-    },
-    ROLE: {
-        "en": "use, usage, used, type, role, kind, category, status, class",
-        "de": "art, typ, punktart, verwendung, funktion, rolle",
-        "fr": "nature, utilisation",
-        "es/it/pt": "tipo, uso, clase, classe, ruolo, papel",
-        "nl": "soort, gebruik",
-    },
-    "check": {"en": "check, checkpoint, check point, is check", "de": "kontrollpunkt, prufpunkt"},
-    "enabled": {"en": "enable, enabled"},
-    "": {
-        # Columns that an adjustment does not need, even if they contain numbers.
-        "en": "code, description, desc, comment, comments, remark, remarks, note, notes, d, feature, order,"
-        " group, date, time, epoch, age, fix, satellites, sats, pdop, hdop, vdop, gdop, antenna,"
-        " antenna height, instrument, operator, photo, image, images, projections, zone, crs, epsg,"
-        " system, datum, unit",
-        "de": "bemerkung, bemerkungen, beschreibung, kommentar, datum, uhrzeit, zeit, zone, ordnung",
-        "fr": "description, remarque, remarques, commentaire, heure, fuseau",
-        "agisoft": "x est, y est, z est, error, x error, y error, z error, error pix, longitude est,"
-        " latitude est, altitude est, x error m, y error m, z error m",
-    },
-}
-_ROLES: Mapping[str, Mapping[str, str]] = {
-    "control": {
-        "en": "control, gcp, gcps, control point, ground control, ground control point, held, 3dgcp, full",
-        "de": "passpunkt, pp, pass, festpunkt",
-        "fr": "appui, point d appui, pa, calage",
-        "es/it/pt": "apoyo, punto de apoyo, appoggio, apoio",
-        "nl": "paspunt",
-    },
-    "check": {
-        "en": "check, chk, checkpoint, check point, ccp, icp, qc, validation, verification, independent",
-        "de": "kp, kontroll, kontrollpunkt, prufpunkt, pruefpunkt, pruf, vergleichspunkt",
-        "fr": "point de verification",
-        "es/it/pt": "chequeo, verificacion, comprobacion, verifica, verificacao, checagem",
-        "nl": "controlepunt",
-    },
-    "off": {
-        "en": "off, unused, ignore, disabled, none, not used, excluded",
-        "de": "aus, gesperrt",
-        "fr": "ignore",
-    },
-    # Control or check, depending on the program; the other role has another word.
-    "?": {"en": "cp", "fr": "controle, point de controle, pc", "es/pt/it": "controllo, punto de control"},
-}
+
+
+def _declared() -> dict[str, dict[str, str]]:
+    """Return the meaning of each word by the kind of its row."""
+    text = (Path(__file__).parent / "headings.csv").read_text(encoding="utf-8")
+    found: dict[str, dict[str, str]] = {}
+    for kind, meaning, _, words in itertools.islice(csv.reader(text.splitlines()), 1, None):
+        for word in words.split(", "):
+            found.setdefault(kind, {}).setdefault(word, meaning)
+    return found
+
+
+WORDS = _declared()  # Meanings of words by kind
+_KNOWN, _KNOWN_ROLES, _TOGETHER = (WORDS[kind] for kind in ("column", "role", "accuracy"))
+PHOTO_WORDS = WORDS["photo"].keys()  # Headings of the column of photos
+PIXEL_WORDS = WORDS["pixel"]  # Headings of image coordinates, in columns and rows
 _METRES: Mapping[float, str] = {
     1.0: "m, meter, metre, meters, metres",
     1000.0: "km",
@@ -140,30 +62,10 @@ KINDS_OF_UNITS: Mapping[str, Mapping[str, float]] = {
 }
 """Units in headings: metres, radians, pixels, seconds."""
 ANGULAR: Mapping[str, str] = {"longitude": "x", "latitude": "y"}
-_SMALL = (
-    "coordinate coordinates coord koordinate coordonnee the of de du la des in value wert point"
-    " utm gk wgs84 etrs89 etrs gauss kruger krueger lokal local map grid ellipsoidal ellipsoid ellips"
-    " ellipsoidische nn nhn nap orthometric geographic geographische geogr u uber ueber"
-    " msl above over sea gcp decimal"
-    " deg degrees dd"
-)
-_FILLERS = frozenset(_SMALL.split())
 _BRACKETS = re.compile(r"[(\[{]([^)\]}]*)[)\]}]")
 _COVERAGE = re.compile(r"\bk\s*=\s*(\d+(?:[.,]\d*)?)")
 _EXPANDED = re.compile(r"u(xyz|xy|[xyzenh])?")
 """U, the expanded uncertainty; the heading contains the coverage factor."""
-
-
-def _looked_up(table: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
-    found = dict[str, str]()
-    for meaning, languages in table.items():
-        for words in languages.values():
-            for word in words.split(","):
-                found.setdefault(" ".join(word.split()), meaning)
-    return found
-
-
-_KNOWN, _KNOWN_ROLES = _looked_up(_COLUMNS), _looked_up(_ROLES)
 
 
 def words_of(text: str) -> list[str]:
@@ -178,19 +80,15 @@ def _meaning(words: list[str]) -> str | None:
     if (whole := _KNOWN.get(" ".join(words))) is not None:
         return whole
     found = {
-        _KNOWN.get(word) for word in words if word not in _FILLERS and not re.fullmatch(r"utm\d*[ns]?", word)
+        _KNOWN.get(word)
+        for word in words
+        if word not in WORDS["filler"] and not re.fullmatch(r"utm\d*[ns]?", word)
     } or {_KNOWN[word] for word in words if word in _KNOWN}
     found = {ANGULAR.get(each or "", each) if len(found) > 1 else each for each in found}
     return found.pop() if len(found) == 1 else None
 
 
 _GLUED = re.compile(r"(?:sigma|sd|std|s|m|rms)(xyz|xy|[xyzenh])")
-_OF_SEVERAL = {
-    "sd": "xyz, x y z, 3d",
-    "sd_xy": "xy, x y, 2d, horizontal, hz, horz, planimetric, lage, lagegenauigkeit, planimetrique, hrms",
-    "sd_z": "vertical, vert, hohengenauigkeit, hoehengenauigkeit, vrms",
-}
-_TOGETHER = {word: column for column, words in _OF_SEVERAL.items() for word in words.split(", ")}
 
 
 def column_of(heading: str) -> str | None:
