@@ -205,7 +205,7 @@ def test_a_layer_without_anything_is_there_all_the_same(wrong, tmp_path):
 def test_a_style_draws_every_kind_of_its_layer(result, name):
     root = ElementTree.fromstring(style(name).partition("\n")[2])
     renderer = root.find("renderer-v2")
-    attribute, symbols = LAYERS[name]
+    symbols, attribute = LAYERS[name], renderer.get("attr")
     assert len(renderer.findall("symbols/symbol")) == len(symbols)
     kinds = {"Point": "marker", "LineString": "line", "Polygon": "fill"}
     table = layers(result)[name].table

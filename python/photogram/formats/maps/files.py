@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.crs_results import Placed
-from photogram.formats.maps.layers import GEOMETRIES, Layer, chosen_crs, map_layers
+from photogram.formats.maps.layers import LAYERS, DrawnLayer, Layer, chosen_crs, map_layers
 from photogram.network.rays import local_axes
 from photogram.results.footprints import metric_covariances
 from photogram.results.network import AdjustedNetwork
@@ -138,59 +138,30 @@ def _write(drawn: Layer, path: Path, driver: str, options: dict[str, str], **mor
             drawn.table,
             path,
             driver=driver,
-            geometry_type=GEOMETRIES[drawn.name],
+            geometry_type=LAYERS[drawn.name][0].geometry,
             layer_options=options,
             **more,
         )
 
 
-_Symbol = tuple[str, str, Mapping[str, str]]
-"""Symbol type, class of its only layer, and its properties."""
-
-BLUE, RED, GREEN = "31,120,180,255", "214,39,40,255", "51,160,44,255"
-GREY, CLEAR = "90,90,90,255", "0,0,0,0"
-
-
-def _marker(shape: str, colour: str, size: float) -> _Symbol:
+def _symbol(row: DrawnLayer) -> tuple[str, str, Mapping[str, str]]:
+    """Return the symbol type of a row, the class of its only layer, and its properties."""
+    if row.shape == "line":
+        own = {"line_color": row.colour, "line_style": "solid"}
+        return "line", "SimpleLine", own | {"line_width": row.size, "line_width_unit": "MM"}
+    if row.shape == "fill":
+        own = {"color": row.colour or "0,0,0,0", "style": "solid" if row.colour else "no"}
+        own |= {"outline_color": row.outline, "outline_style": "solid"}
+        return "fill", "SimpleFill", own | {"outline_width": row.size, "outline_width_unit": "MM"}
     outline = {"outline_color": "255,255,255,255", "outline_width": "0.1", "outline_width_unit": "MM"}
-    own = {"name": shape, "color": colour, **outline, "size": f"{size:g}", "size_unit": "MM"}
+    own = {"name": row.shape, "color": row.colour, **outline, "size": row.size, "size_unit": "MM"}
     return "marker", "SimpleMarker", own
-
-
-def _fill(colour: str, outline: str, width: float) -> _Symbol:
-    own = {"color": colour, "style": "no" if colour == CLEAR else "solid", "outline_color": outline}
-    own |= {"outline_style": "solid", "outline_width": f"{width:g}", "outline_width_unit": "MM"}
-    return "fill", "SimpleFill", own
-
-
-def _line(colour: str) -> _Symbol:
-    own = {"line_color": colour, "line_style": "solid", "line_width": "0.4", "line_width_unit": "MM"}
-    return "line", "SimpleLine", own
-
-
-LAYERS: Mapping[str, tuple[str, Sequence[tuple[str, _Symbol]]]] = {
-    "photos": ("", [("", _marker("triangle", BLUE, 2.6))]),
-    "footprints": ("", [("", _fill("31,120,180,18", BLUE, 0.15))]),
-    "points": (
-        "kind",
-        [
-            ("pass", _marker("circle", GREY, 1.0)),
-            ("control", _marker("equilateral_triangle", RED, 3.0)),
-            ("check", _marker("square", GREEN, 2.6)),
-        ],
-    ),
-    "point_ellipses": ("", [("", _fill(CLEAR, GREY, 0.2))]),
-    "control": ("", [("", _marker("cross", RED, 3.4))]),
-    "control_residuals": ("", [("", _line(RED))]),
-    "check_residuals": ("", [("", _line(GREEN))]),
-    "suspicious": ("", [("", _marker("star", "255,127,0,255", 3.6))]),
-}
-"""The attribute that selects the symbol of a layer, if any, and the symbol of each value."""
 
 
 def style(name: str) -> str:
     """Return the style of a layer."""
-    attribute, symbols = LAYERS[name]
+    rows = LAYERS[name]
+    attribute = "kind" if rows[0].value else ""
     root = Element("qgis", version="3.22.0", styleCategories="Symbology")
     kind = "categorizedSymbol" if attribute else "singleSymbol"
     renderer = SubElement(
@@ -199,11 +170,17 @@ def style(name: str) -> str:
     if attribute:
         renderer.set("attr", attribute)
         categories = SubElement(renderer, "categories")
-        for row, (value, _) in enumerate(symbols):
-            own = {"value": value, "label": value, "symbol": str(row), "render": "true", "type": "string"}
+        for row, each in enumerate(rows):
+            own = {
+                "value": each.value,
+                "label": each.value,
+                "symbol": str(row),
+                "render": "true",
+                "type": "string",
+            }
             SubElement(categories, "category", own)
     drawn = SubElement(renderer, "symbols")
-    for row, (_, (form, layer, properties)) in enumerate(symbols):
+    for row, (form, layer, properties) in enumerate(map(_symbol, rows)):
         symbol = SubElement(drawn, "symbol", type=form, name=str(row), alpha="1", clip_to_extent="1")
         inside = SubElement(symbol, "layer", {"class": layer, "enabled": "1", "locked": "0", "pass": "0"})
         # QGIS from version 3.26 reads the options, before 3.18 the properties.

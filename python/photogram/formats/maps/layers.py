@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from itertools import groupby, starmap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -32,16 +35,29 @@ MOST_ELLIPSES = 20_000  # Default limit of error ellipses of points
 SUSPICIOUS = 3.0  # Smallest test value on the map
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("e", "n", "u")
-GEOMETRIES = {
-    "photos": "Point Z",
-    "footprints": "Polygon Z",
-    "points": "Point Z",
-    "point_ellipses": "Polygon",
-    "control": "Point Z",
-    "control_residuals": "LineString Z",
-    "check_residuals": "LineString Z",
-    "suspicious": "Point Z",
-}
+
+
+class DrawnLayer(NamedTuple):
+    """A row of `layers.csv`: a layer, or the symbol of a value of its attribute `kind`."""
+
+    layer: str
+    geometry: str
+    value: str
+    shape: str  # Of a marker, `fill` or `line`
+    colour: str
+    outline: str
+    size: str  # Size of markers, width of lines: millimetres
+    description: str
+
+
+def _declared() -> Mapping[str, list[DrawnLayer]]:
+    text = (Path(__file__).parent / "layers.csv").read_text(encoding="utf-8")
+    _, *rows = csv.reader(text.splitlines())
+    return {name: list(own) for name, own in groupby(starmap(DrawnLayer, rows), lambda row: row.layer)}
+
+
+LAYERS = _declared()
+"""The declared layers of maps by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,45 +156,27 @@ def map_layers(
             one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]
             spacing = spacing / one[:, :2]
         scale = fitting_scale(own, spacing)
-    parts = [
-        ("photos", "adjusted stations with standard deviations, metres", *_photos(found)),
-        (
-            "footprints",
-            "what photos show of the ground, at the median height of their points",
-            *_footprints(found, sizes),
-        ),
-        ("points", "adjusted points with standard deviations, metres", *_points(found)),
-        (
-            "point_ellipses",
-            f"error ellipses ({100 * confidence:g} %) of{few} points, magnified {scale:g} times",
-            *_ellipses(found, drawn, confidence, scale),
-        ),
-        ("control", "control as it was given, differences adjusted minus given, metres", *_control(found)),
-        (
-            "control_residuals",
-            f"from given to adjusted places of control, magnified {scale:g} times",
-            *_vectors(found, *_given(found, found.control_differences()), scale),
-        ),
-        (
-            "check_residuals",
-            f"from supplied to adjusted places of check points, magnified {scale:g} times",
-            *_vectors(found, *_given(found, found.differences()), scale),
-        ),
-        (
-            "suspicious",
-            f"observations with a test value beyond {SUSPICIOUS:g}, at the place of their point or photo",
-            *_suspicious(found),
-        ),
-    ]
+    parts: dict[str, _Part] = {
+        "photos": _photos(found),
+        "footprints": _footprints(found, sizes),
+        "points": _points(found),
+        "point_ellipses": _ellipses(found, drawn, confidence, scale),
+        "control": _control(found),
+        "control_residuals": _vectors(found, *_given(found, found.control_differences()), scale),
+        "check_residuals": _vectors(found, *_given(found, found.differences()), scale),
+        "suspicious": _suspicious(found),
+    }
+    fields = {"percent": 100 * confidence, "few": few, "scale": scale, "limit": SUSPICIOUS}
     system = None if not found.crs or enu_origin(found.crs) is not None else without_geoid(found.crs)
     shapes = {"Point": shapely.points, "LineString": shapely.linestrings, "Polygon": shapely.polygons}
     layers = []
-    for name, description, corners, columns in parts:
-        geometries = shapes[GEOMETRIES[name].split()[0]](corners) if len(corners) else []
-        scaled = name in ("point_ellipses", "control_residuals", "check_residuals")
+    for name, (corners, columns) in parts.items():
+        declared = LAYERS[name][0]
+        geometries = shapes[declared.geometry.split()[0]](corners) if len(corners) else []
+        title = f"{name}_x{scale:g}" if "{scale" in declared.description else name
         table = geopandas.GeoDataFrame(dict(columns), geometry=list(geometries), crs=system)
         left_out = known - len(drawn) if name == "point_ellipses" else 0
-        layers.append(Layer(name, f"{name}_x{scale:g}" if scaled else name, description, table, left_out))
+        layers.append(Layer(name, title, declared.description.format(**fields), table, left_out))
     return layers
 
 
