@@ -25,6 +25,7 @@ from photogram.diagnosis.control_sets import doubtful
 from photogram.diagnosis.hypotheses import FOOT
 from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain
 from photogram.network.block import Block
+from photogram.network.geometry import Cartesian
 from photogram.network.observations import Position
 from photogram.network.unknowns import LeverArm, Shift
 from photogram.results.network_trial import block_facts
@@ -110,11 +111,11 @@ def _of_catalogue(block: Block, given: list[Position], adjusted: Adjuster) -> It
             fields["vector"] = [f"{v:.3f} +- {s:.3f}" for v, s in zip(arm + value, sd, strict=True)]
             message = phrase(f"mistake.positions.{_code_of_arm(arm, arm + value)}", **fields)
         elif code == "time-offset":
-            facts = block_facts(block, first.photo_positions)
+            facts, axes = block_facts(block, first.photo_positions), Cartesian(block.spheroid)
             flown = dict(zip(block.photo_ids, facts["velocities"] * value, strict=True))
-            meant = [
-                replace(each, position=np.asarray(each.position) - flown[each.photos[0]]) for each in given
-            ]
+            places = axes.positions(np.array([each.position for each in given]))
+            places = axes.from_cartesian(places - [flown[each.photos[0]] for each in given])
+            meant = [replace(each, position=place) for each, place in zip(given, places, strict=True)]
             name = "seconds" if facts["timed"] else "steps"
             message = phrase(f"mistake.positions.{name}", offset=float(value[0]))
         else:

@@ -16,6 +16,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.network.observations import Observation
+from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.unadjusted import Given
 from photogram.results.parts import kind_words, named_observation
@@ -399,8 +400,6 @@ def block_facts(block: Block, places: Floats) -> Facts:
         if width > 0 and height > 0:
             lines = [[0.0, 1 / height, -top / height - 0.5], [1 / width, 0.0, -left / width - 0.5]]
         facts["readouts"].append(lines)
-    if block.geographic:
-        return facts
     seconds = np.full(count, math.nan)
     row = {name: k for k, name in enumerate(block.photo_ids)}
     weighted = np.isfinite(block.photo_position_sd) & (block.photo_position_sd > 0)
@@ -418,11 +417,13 @@ def block_facts(block: Block, places: Floats) -> Facts:
     timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
     times = seconds if timed else np.arange(count, dtype=np.float64)
     velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)
-    strips = strips_of(places) if count > 1 else []
+    axes = local_axes(block)
+    strips = strips_of(axes.positions(places) if block.geographic else places) if count > 1 else []
+    cartesian = axes.cartesian.positions(places)
     for number, strip in enumerate(strips):
         sets[strip] = number
         if len(strip) > 1 and (np.diff(times[strip]) > 0).all():
-            velocities[strip] = np.gradient(places[strip], times[strip], axis=0)
+            velocities[strip] = np.gradient(cartesian[strip], times[strip], axis=0)
     facts["velocities"] = velocities
     if count > 1:
         # Without times, the order of the photos is used.
@@ -432,8 +433,9 @@ def block_facts(block: Block, places: Floats) -> Facts:
     held = np.isfinite(block.point_sd)
     control = np.flatnonzero(held.any(axis=1))
     # Coordinates without standard deviation may be unknown.
-    axes = zip(held.T, block.point_positions.T, places.T, strict=True)
-    facts["centre"] = [float((own[has] if has.any() else photos).mean()) for has, own, photos in axes]
+    coordinates = zip(held.T, block.point_positions.T, places.T, strict=True)
+    if not block.geographic or np.ptp(places[:, 0]) < math.pi:  # Else both sides of the antimeridian
+        facts["centre"] = [float((own[has] if has.any() else of).mean()) for has, own, of in coordinates]
     _, kinds, sizes = np.unique(block.point_sd[control], axis=0, return_inverse=True, return_counts=True)
     if 1 < len(sizes) <= MOST_SETS and (sizes > 1).all():
         control_sets: list[int | None] = [None] * len(block.point_sd)

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::catalogue::{Catalogue, Seen};
+use super::places::Place;
 
 /// Plausible share of the way to the other photo: all of it.
 const SHARE: f64 = 1.0;
@@ -20,18 +21,19 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>) {
         photos.sort_by(|one, other| time(one.0).total_cmp(&time(other.0)));
     }
     // The error is in the observed positions: the next photo has the position that this one should have, except at the ends.
-    let origin = Vector3::from(catalogue.bundle.origin);
-    let observed = |&(photo, _, adjusted): &(usize, usize, Vector3<f64>)| {
-        let own = catalogue.facts.observed.get(photo).map(|&own| Vector3::from(own) - origin);
-        own.filter(|own| own.iter().all(|value| value.is_finite())).unwrap_or(adjusted)
+    let observed = |own: &(usize, Place)| {
+        let coordinates = catalogue.facts.observed.get(own.0);
+        let known = coordinates.filter(|own| own.iter().all(|value| value.is_finite()));
+        known.map_or(own.1.position, |&own| catalogue.position(own))
     };
-    let places: Vec<Vector3<f64>> = photos.iter().map(observed).collect();
+    let positions: Vec<Vector3<f64>> = photos.iter().map(observed).collect();
     let last = photos.len() - 1;
     let next = catalogue.add(("gnss-next", None), &["photos"], &[SHARE])[0];
     let previous = catalogue.add(("gnss-previous", None), &["photos"], &[SHARE])[0];
-    for (k, &(_, first, _)) in photos.iter().enumerate() {
+    for (k, (_, place)) in photos.iter().enumerate() {
         let (start, end) = (k.max(1) - 1, (k + 1).min(last));
-        catalogue.displace_all(Seen::Positions, first, next, &(places[start + 1] - places[start]));
-        catalogue.displace_all(Seen::Positions, first, previous, &(places[end - 1] - places[end]));
+        let ways = [positions[start + 1] - positions[start], positions[end - 1] - positions[end]];
+        catalogue.displace_place(Seen::Positions, place, next, &ways[0]);
+        catalogue.displace_place(Seen::Positions, place, previous, &ways[1]);
     }
 }

@@ -63,7 +63,7 @@ pub(super) struct Catalogue<'a> {
     pub stations: Stations,
     pub facts: &'a Facts,
     /// Standard deviations of the unknowns.
-    sd: &'a [f64],
+    pub sd: &'a [f64],
     count: usize,
     /// Displacements d(unknown) / d(parameter), by the observations that see them: columns and values.
     displaced: HashMap<(Seen, usize), Vec<(usize, f64)>>,
@@ -75,6 +75,8 @@ pub(super) struct Catalogue<'a> {
     pub(super) cameras: Vec<Vec<(usize, usize)>>,
     /// Columns of the readout times of the camera of each photo, with the times of image coordinates.
     pub(super) shutters: Vec<Vec<(usize, [f64; 3])>>,
+    /// Velocities of these photos in coordinates of the object space.
+    pub(super) velocities: Vec<Vector3<f64>>,
     /// Deformations of the images of each photo.
     pub(super) deformations: Vec<Option<Deformations>>,
 }
@@ -98,6 +100,7 @@ impl<'a> Catalogue<'a> {
             single: HashMap::new(),
             cameras: vec![vec![]; photos],
             shutters: vec![vec![]; photos],
+            velocities: vec![Vector3::zeros(); photos],
             deformations: vec![None; photos],
         }
     }
@@ -151,44 +154,6 @@ impl<'a> Catalogue<'a> {
         } else {
             self.displaced.entry((seen, unknown)).or_default().push((column, value));
         }
-    }
-
-    /// The same of the first three unknowns from `first` on.
-    pub fn displace_all(&mut self, seen: Seen, first: usize, column: usize, value: &Vector3<f64>) {
-        (0..3).for_each(|k| self.displace(seen, first + k, column, value[k]));
-    }
-
-    /// Points with observed or fixed coordinates: the point of the network, its place in the model.
-    pub fn control_points(&self, trial: &Trial) -> Vec<(usize, usize)> {
-        let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "control");
-        let mut observed = vec![false; trial.assembled.points.len()];
-        tied.flat_map(|tied| &tied.touches.points).for_each(|&place| observed[place] = true);
-        let given = |place: usize| self.sd[self.bundle.of_point(place)].iter().any(|sd| sd.is_finite());
-        let points = trial.assembled.points.iter().enumerate();
-        let control = points.filter(|(place, _)| given(*place) || observed[*place]);
-        control.map(|(place, &point)| (point, place)).collect()
-    }
-
-    /// Centre of scale, rotation and bending, counted from the origin of the model.
-    pub fn centre(&self) -> Vector3<f64> {
-        let origin = Vector3::from(self.bundle.origin);
-        self.facts.centre.map_or_else(Vector3::zeros, |centre| Vector3::from(centre) - origin)
-    }
-
-    /// Photos whose position was observed, or is fixed, with the first unknown of the position and where it is, counted from the
-    /// origin of the model.
-    pub fn positions(&self) -> Vec<(usize, usize, Vector3<f64>)> {
-        let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "position");
-        let tied: Vec<usize> = tied.flat_map(|tied| tied.touches.photos.iter().copied()).collect();
-        let mut observed = vec![false; self.bundle.cameras.len()];
-        tied.into_iter().for_each(|photo| observed[photo] = true);
-        let of = |(photo, observed): (usize, bool)| {
-            let first = self.bundle.of_block(photo).start;
-            let given = self.sd[first..first + 3].iter().any(|sd| sd.is_finite());
-            let orientation = &self.stations.photos[photo].orientation;
-            (given || observed).then(|| (photo, first, orientation.centre()))
-        };
-        observed.into_iter().enumerate().filter_map(of).collect()
     }
 
     /// Whether attitudes of photos were observed.

@@ -1,9 +1,7 @@
 //! All control, or one set of it: a shift, wrong heights, another scale, another orientation.
 
-use nalgebra::Vector3;
-
 use super::catalogue::{Catalogue, Seen};
-use crate::geometry::ObjectSpace;
+use super::places::Place;
 
 /// Plausible shift of a whole control: another system of heights or coordinates, in units of the object space.
 const SHIFT: f64 = 100.0;
@@ -18,57 +16,44 @@ const MOST_SETS: usize = 8;
 /// Control points that a rotation or a scale takes.
 const FEWEST: usize = 3;
 
-pub(super) fn add(catalogue: &mut Catalogue<'_>, points: &[(usize, usize)]) {
+pub(super) fn add(catalogue: &mut Catalogue<'_>, points: &[(usize, Place)]) {
     if points.is_empty() {
         return;
     }
-    let firsts: Vec<usize> = points.iter().map(|own| catalogue.bundle.of_point(own.1).start).collect();
-    let heights = catalogue.add(("control-heights", None), &["Z"], &[SHIFT]);
-    firsts.iter().for_each(|first| catalogue.displace(Seen::Control, first + 2, heights[0], 1.0));
-    if catalogue.bundle.space != ObjectSpace::Rectangular {
-        return;
-    }
-    shift(catalogue, ("control-shift", None), &firsts, SHIFT);
+    let heights = catalogue.add(("control-heights", None), &catalogue.axis_names()[2..], &[SHIFT]);
+    points.iter().for_each(|own| catalogue.displace(Seen::Control, own.1.first + 2, heights[0], 1.0));
+    let places: Vec<Place> = points.iter().map(|own| own.1).collect();
+    shift(catalogue, ("control-shift", None), &places, SHIFT);
     let sets = &catalogue.facts.control_sets;
-    let set_of = |own: &(usize, usize)| sets.get(own.0).copied().flatten();
+    let set_of = |own: &(usize, Place)| sets.get(own.0).copied().flatten();
     let count = points.iter().filter_map(set_of).max().map_or(0, |last| last + 1);
-    let members = |set: usize| -> Vec<usize> {
-        let own = points.iter().zip(&firsts).filter(|(own, _)| set_of(own) == Some(set));
-        own.map(|(_, &first)| first).collect()
+    let members = |set: usize| -> Vec<Place> {
+        points.iter().filter(|own| set_of(own) == Some(set)).map(|own| own.1).collect()
     };
-    let sets: Vec<Vec<usize>> = (0..count.min(MOST_SETS)).map(members).collect();
+    let sets: Vec<Vec<Place>> = (0..count.min(MOST_SETS)).map(members).collect();
     if sets.len() > 1 {
-        for (set, firsts) in sets.iter().enumerate() {
-            shift(catalogue, ("control-set", Some(set)), firsts, SET_SHIFT);
+        for (set, places) in sets.iter().enumerate() {
+            shift(catalogue, ("control-set", Some(set)), places, SET_SHIFT);
         }
     }
     if points.len() < FEWEST {
         return;
     }
     let centre = catalogue.centre();
-    let places: Vec<Vector3<f64>> = points.iter().map(|own| catalogue.place(own.1) - centre).collect();
+    let axes = catalogue.axes_at(centre);
     let scale = catalogue.add(("control-scale", None), &["scale"], &[SCALE]);
     let names = ["omega", "phi", "kappa"];
     let turns = catalogue.add(("control-rotation", None), &names, &[ROTATION; 3]);
-    for (&first, place) in firsts.iter().zip(&places) {
-        catalogue.displace_all(Seen::Control, first, scale[0], place);
+    for place in &places {
+        let away = place.position - centre;
+        catalogue.displace_place(Seen::Control, place, scale[0], &away);
         for (k, &column) in turns.iter().enumerate() {
-            let axis = Vector3::from_fn(|i, _| f64::from(u8::from(i == k)));
-            catalogue.displace_all(Seen::Control, first, column, &axis.cross(place));
+            catalogue.displace_place(Seen::Control, place, column, &axes.row(k).transpose().cross(&away));
         }
     }
 }
 
-fn shift(catalogue: &mut Catalogue<'_>, of: (&'static str, Option<usize>), firsts: &[usize], size: f64) {
-    let columns = catalogue.add(of, &["X", "Y", "Z"], &[size; 3]);
-    for first in firsts {
-        (0..3).for_each(|k| catalogue.displace(Seen::Control, first + k, columns[k], 1.0));
-    }
-}
-
-impl Catalogue<'_> {
-    /// A point of the model, counted from its origin.
-    pub(super) fn place(&self, place: usize) -> Vector3<f64> {
-        self.stations.points[place].position()
-    }
+fn shift(catalogue: &mut Catalogue<'_>, of: (&'static str, Option<usize>), places: &[Place], size: f64) {
+    let columns = catalogue.add(of, &catalogue.axis_names(), &[size; 3]);
+    places.iter().for_each(|place| catalogue.shift_place(Seen::Control, place, &columns, 1.0));
 }

@@ -2,21 +2,19 @@
 
 use super::catalogue::Catalogue;
 use crate::adjustment::EquationOf;
-use crate::geometry::ObjectSpace;
 
 /// Plausible error of scale.
 const SCALE: f64 = 1e-2;
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>) {
     let bundle = catalogue.bundle;
-    if bundle.space != ObjectSpace::Rectangular {
-        return;
-    }
     let tied = bundle.observations.iter().enumerate();
     let lengths: Vec<(EquationOf, f64)> = tied
         .filter_map(|(number, tied)| match (tied.observation.kind(), &tied.touches.points[..]) {
             ("distance", &[first, second]) => {
-                let length = (catalogue.place(first) - catalogue.place(second)).norm();
+                let length = (catalogue.place_of_point(first).position
+                    - catalogue.place_of_point(second).position)
+                    .norm();
                 let of = EquationOf::Tie { tie: bundle.tied_images() + number, row: 0 };
                 Some((of, length / tied.root[(0, 0)]))
             }

@@ -12,7 +12,7 @@ use super::hypothesis::{About, Hypotheses, Hypothesis};
 use super::judged::{Criteria, Judged};
 use super::{assignment, attitudes, cameras, control, deformations, distances, form, positions, shutter};
 use crate::adjustment::{Leverages, correlation_above, whitening};
-use crate::geometry::{ObjectSpace, PoseNumbers};
+use crate::geometry::PoseNumbers;
 use crate::{Threads, parallel};
 
 /// The errors of sets that are possible for a network.
@@ -26,12 +26,10 @@ fn catalogue<'a>(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Catal
     // Poses that are made of several blocks, or are vectors, have no unknowns of their own that could be displaced.
     if bundle.mounts.is_empty() && matches!(bundle.poses, PoseNumbers::Angles(_)) {
         attitudes::add(&mut catalogue);
-        if bundle.space == ObjectSpace::Rectangular {
-            positions::add(&mut catalogue);
-            assignment::add(&mut catalogue);
-            form::add(&mut catalogue, &points);
-            shutter::add(&mut catalogue, trial);
-        }
+        positions::add(&mut catalogue);
+        assignment::add(&mut catalogue);
+        form::add(&mut catalogue, &points);
+        shutter::add(&mut catalogue, trial);
     }
     catalogue
 }

@@ -3,7 +3,8 @@
 /// Facts beside the network that hypotheses require; each may be empty.
 #[derive(Debug, Clone, Default)]
 pub struct Facts {
-    /// Velocity of each photo in the object space, per second or per any other unit of time; NaN if unknown.
+    /// Velocity of each photo in Cartesian axes (geocentric in geographic space), per second or per any other unit of time; NaN if
+    /// unknown.
     pub velocities: Vec<[f64; 3]>,
     /// Time of each photo, for a drift of positions; NaN if unknown.
     pub times: Vec<f64>,

@@ -1,49 +1,49 @@
 //! The form of the network as control and positions of photos have it: its scale, its bending.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::catalogue::{Catalogue, Seen};
+use super::places::Place;
 
 /// Plausible error of scale.
 const SCALE: f64 = 1e-2;
 /// Observed positions that bending takes.
 const FEWEST: usize = 5;
 
-pub(super) fn add(catalogue: &mut Catalogue<'_>, points: &[(usize, usize)]) {
+pub(super) fn add(catalogue: &mut Catalogue<'_>, points: &[(usize, Place)]) {
     let centre = catalogue.centre();
-    let mut places: Vec<(Seen, usize, Vector3<f64>)> = catalogue
-        .positions()
-        .into_iter()
-        .map(|(_, first, place)| (Seen::Positions, first, place - centre))
-        .collect();
-    places.extend(points.iter().map(|&(_, place)| {
-        (Seen::Control, catalogue.bundle.of_point(place).start, catalogue.place(place) - centre)
-    }));
+    let axes = catalogue.axes_at(centre);
+    let positions = catalogue.positions();
+    let positions = positions.iter().map(|own| (Seen::Positions, own.1));
+    let places: Vec<(Seen, Place)> =
+        positions.chain(points.iter().map(|own| (Seen::Control, own.1))).collect();
     if places.len() < 2 {
         return;
     }
     let scale = catalogue.add(("scale", None), &["scale"], &[SCALE]);
-    for (seen, first, place) in &places {
-        catalogue.displace_all(*seen, *first, scale[0], place);
+    for (seen, place) in &places {
+        catalogue.displace_place(*seen, place, scale[0], &(place.position - centre));
     }
     // Heights bend by d (x / half width)^2 and the same in y: d is the error at the edge, relative to the middle.
-    let half = |axis: usize| places.iter().map(|own| own.2[axis].abs()).fold(0.0, f64::max);
+    let plan: Vec<Vector3<f64>> = places.iter().map(|own| axes * (own.1.position - centre)).collect();
+    let half = |axis: usize| plan.iter().map(|own| own[axis].abs()).fold(0.0, f64::max);
     if places.len() >= FEWEST && half(0) > 0.0 && half(1) > 0.0 {
         let halves = [half(0), half(1)];
-        let mut bend = |code, places: &[(Seen, usize, Vector3<f64>)]| {
+        let mut bend = |code, range: Range<usize>| {
             let columns = catalogue.add((code, None), &["x2", "y2"], &[]);
-            for (seen, first, place) in places {
+            for ((seen, place), plan) in places[range.clone()].iter().zip(&plan[range]) {
                 for axis in 0..2 {
-                    let height = (place[axis] / halves[axis]).powi(2);
-                    catalogue.displace(*seen, first + 2, columns[axis], height);
+                    let height = (plan[axis] / halves[axis]).powi(2);
+                    catalogue.displace(*seen, place.first + 2, columns[axis], height);
                 }
             }
         };
-        bend("bending", &places);
+        bend("bending", 0..places.len());
         // Control behind the positions, which may contradict it.
-        let of_control = &places[places.len() - points.len()..];
-        if (FEWEST..places.len()).contains(&of_control.len()) {
-            bend("control-bending", of_control);
+        if (FEWEST..places.len()).contains(&points.len()) {
+            bend("control-bending", places.len() - points.len()..places.len());
         }
     }
 }

@@ -18,6 +18,7 @@ mod form;
 mod groups;
 mod hypothesis;
 mod judged;
+mod places;
 mod positions;
 mod shutter;
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::catalogue::{Catalogue, Seen};
-use crate::geometry::Pose;
+use super::places::Place;
 
 /// Plausible shift, lever arm and drift (over all photos) in units of the object space.
 const SHIFT: f64 = 1.0;
@@ -14,31 +14,30 @@ const CLOCK: f64 = 1.0;
 /// Sets that are tested.
 const MOST_SETS: usize = 8;
 
-const AXES: [&str; 3] = ["X", "Y", "Z"];
-
 pub(super) fn add(catalogue: &mut Catalogue<'_>) {
     let photos = catalogue.positions();
     if photos.is_empty() {
         return;
     }
     let facts = catalogue.facts;
-    let heights = catalogue.add(("gnss-heights", None), &["Z"], &[HEIGHTS]);
-    let shift = catalogue.add(("gnss-shift", None), &AXES, &[SHIFT; 3]);
+    let axes = catalogue.axis_names();
+    let heights = catalogue.add(("gnss-heights", None), &axes[2..], &[HEIGHTS]);
+    let shift = catalogue.add(("gnss-shift", None), &axes, &[SHIFT; 3]);
     let lever = catalogue.add(("lever-arm", None), &["x", "y", "z"], &[SHIFT; 3]);
-    for &(photo, first, _) in &photos {
-        catalogue.displace(Seen::Positions, first + 2, heights[0], 1.0);
-        let attitude = catalogue.pose(photo).attitude;
-        for k in 0..3 {
-            catalogue.displace(Seen::Positions, first + k, shift[k], 1.0);
-            catalogue.displace_all(Seen::Positions, first, lever[k], &attitude.column(k).into_owned());
+    for (photo, place) in &photos {
+        catalogue.displace(Seen::Positions, place.first + 2, heights[0], 1.0);
+        catalogue.shift_place(Seen::Positions, place, &shift, 1.0);
+        let attitude = catalogue.pose(*photo).attitude;
+        for (k, &column) in lever.iter().enumerate() {
+            catalogue.displace_place(Seen::Positions, place, column, &attitude.column(k).into_owned());
         }
     }
     let velocity = |photo: usize| facts.velocities.get(photo).filter(|own| own.iter().all(|v| v.is_finite()));
     if photos.iter().any(|own| velocity(own.0).is_some()) {
         let clock = catalogue.add(("time-offset", None), &["time"], &[CLOCK]);
-        for &(photo, first, _) in &photos {
-            if let Some(&velocity) = velocity(photo) {
-                catalogue.displace_all(Seen::Positions, first, clock[0], &Vector3::from(velocity));
+        for (photo, place) in &photos {
+            if let Some(&velocity) = velocity(*photo) {
+                catalogue.displace_place(Seen::Positions, place, clock[0], &Vector3::from(velocity));
             }
         }
     }
@@ -47,33 +46,26 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>) {
     let count = photos.iter().filter_map(|own| set_of(own.0)).max().map_or(0, |last| last + 1);
     if (2..=MOST_SETS).contains(&count) {
         let sets: Vec<_> =
-            (0..count).map(|set| catalogue.add(("gnss-set", Some(set)), &AXES, &[SHIFT; 3])).collect();
-        for &(photo, first, _) in &photos {
-            if let Some(set) = set_of(photo) {
-                (0..3).for_each(|k| catalogue.displace(Seen::Positions, first + k, sets[set][k], 1.0));
+            (0..count).map(|set| catalogue.add(("gnss-set", Some(set)), &axes, &[SHIFT; 3])).collect();
+        for (photo, place) in &photos {
+            if let Some(set) = set_of(*photo) {
+                catalogue.shift_place(Seen::Positions, place, &sets[set], 1.0);
             }
         }
     }
 }
 
 /// A drift is linear in time, from -1/2 to 1/2: its parameters are the change from the first to the last photo.
-fn drift(catalogue: &mut Catalogue<'_>, photos: &[(usize, usize, Vector3<f64>)]) {
+fn drift(catalogue: &mut Catalogue<'_>, photos: &[(usize, Place)]) {
     let time = |photo: usize| catalogue.facts.times.get(photo).copied().filter(|time| time.is_finite());
-    let times: Vec<(usize, f64)> =
-        photos.iter().filter_map(|&(photo, first, _)| Some((first, time(photo)?))).collect();
+    let times: Vec<(Place, f64)> =
+        photos.iter().filter_map(|&(photo, place)| Some((place, time(photo)?))).collect();
     let range = |start: f64, pick: fn(f64, f64) -> f64| times.iter().map(|own| own.1).fold(start, pick);
     let (least, most) = (range(f64::INFINITY, f64::min), range(f64::NEG_INFINITY, f64::max));
     if most > least {
-        let columns = catalogue.add(("gnss-drift", None), &AXES, &[SHIFT; 3]);
-        for (first, time) in times {
-            let share = (time - least) / (most - least) - 0.5;
-            (0..3).for_each(|k| catalogue.displace(Seen::Positions, first + k, columns[k], share));
+        let columns = catalogue.add(("gnss-drift", None), &catalogue.axis_names(), &[SHIFT; 3]);
+        for (place, time) in &times {
+            catalogue.shift_place(Seen::Positions, place, &columns, (time - least) / (most - least) - 0.5);
         }
-    }
-}
-
-impl Catalogue<'_> {
-    pub(super) fn pose(&self, photo: usize) -> &Pose {
-        self.stations.photos[photo].orientation.pose()
     }
 }

@@ -1,5 +1,7 @@
 //! A rolling shutter: the lines of an image are read one after the other while the photo moves.
 
+use nalgebra::Vector3;
+
 use super::super::trial::Trial;
 use super::catalogue::{Catalogue, put};
 use crate::adjustment::Equation;
@@ -25,7 +27,11 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
             (catalogue.add((*code, Some(camera)), &["readout"], &[READOUT])[0], line)
         };
         let columns: Vec<(usize, [f64; 3])> = CODES.iter().zip(lines).map(add).collect();
-        photos.into_iter().for_each(|photo| catalogue.shutters[photo].clone_from(&columns));
+        for photo in photos {
+            catalogue.shutters[photo].clone_from(&columns);
+            let velocity = Vector3::from(facts.velocities[photo]);
+            catalogue.velocities[photo] = catalogue.place_of_photo(photo).change(&velocity);
+        }
     }
 }
 
@@ -42,7 +48,7 @@ impl Catalogue<'_> {
         if self.shutters[photo].is_empty() {
             return;
         }
-        let (first, velocity) = (self.bundle.of_block(photo).start, self.facts.velocities[photo]);
+        let (first, velocity) = (self.bundle.of_block(photo).start, &self.velocities[photo]);
         let own = equation.coefficients().filter(|own| (first..first + 3).contains(&own.0));
         let change: f64 = own.map(|(unknown, value)| value * velocity[unknown - first]).sum();
         for &(column, [a, b, c]) in &self.shutters[photo] {
