@@ -325,10 +325,7 @@ impl Bundle {
             let Observation::Position(own) = &tied.observation else { continue };
             if own.shift.is_some() || own.drift.is_some() {
                 let pose = placed.photos[own.photo].orientation.pose();
-                let arm = match own.lever_arm.common() {
-                    Some(common) => placed.commons[common].vector(),
-                    None => own.known_lever_arm(),
-                };
+                let arm = own.lever_arm.value(|common| placed.commons[common].vector());
                 let antenna = pose.position + pose.attitude * arm;
                 all.entry([own.shift, own.drift]).or_default().push((antenna, own.time));
             }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Named, ObservationModel, Precision, Rows, Sites, Touches, deviation};
+use super::{Named, ObservationModel, Rows, Sites, Touches, deviation};
 
 /// Two points of equal height, or with a levelled height difference.
 ///
@@ -18,8 +18,6 @@ pub struct EqualHeight {
 }
 
 impl ObservationModel for EqualHeight {
-    const NAME: &'static str = "equal height";
-
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[p, q], &[difference]) = (of.points, values) else { return None };
         Some(Self { points: [p, q], difference, sd: deviation(&covariance) })
@@ -27,10 +25,6 @@ impl ObservationModel for EqualHeight {
 
     fn touches(&self) -> Touches {
         Touches::points(&self.points)
-    }
-
-    fn precision(&self) -> Precision {
-        Precision::Deviations(vec![self.sd])
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {

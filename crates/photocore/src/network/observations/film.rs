@@ -29,8 +29,6 @@ pub struct Film {
 const MEAN: usize = 3;
 
 impl ObservationModel for Film {
-    const NAME: &'static str = "film";
-
     /// Values: numbers of the components, then their observed values.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let &[Some(placement), Some(size), roll] = of.commons else { return None };
@@ -53,10 +51,6 @@ impl ObservationModel for Film {
 
     fn rows(&self) -> usize {
         self.components.len()
-    }
-
-    fn precision(&self) -> Precision {
-        self.precision.clone()
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
@@ -96,7 +90,6 @@ pub struct Fiducial {
 }
 
 impl ObservationModel for Fiducial {
-    const NAME: &'static str = "fiducial";
     const ROWS: usize = 2;
 
     /// Indices: mark, then film (see [`crate::network::Passage`]); values: reading, approximate position, numbers of the film.
@@ -117,10 +110,6 @@ impl ObservationModel for Fiducial {
         let film = self.film.commons(self.film.cell(self.near));
         let all = film.into_iter().chain([(self.mark, CommonKind::Fiducial)]);
         Touches { commons: all.map(|(own, kind)| (own, Some(kind))).collect(), ..Touches::default() }
-    }
-
-    fn precision(&self) -> Precision {
-        self.precision.clone()
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {

@@ -11,7 +11,7 @@ mod tied;
 
 use nalgebra::DMatrix;
 
-use self::model::{deviation, in_own_axes, nine, own_axes, rotates, rows_of, three};
+use self::model::{deviation, in_own_axes, length, nine, own_axes, rotates, rows_of, three};
 use super::commons::{Common, CommonKind};
 
 pub use adjusted::{AdjustedObservation, KindSums};
@@ -23,115 +23,121 @@ pub use rows::{Rows, Sites};
 pub(super) use tied::{LOCAL, Linear, TiedModel, TiedObservation};
 
 macro_rules! kinds {
-    ($($module:ident::$($name:ident)? $({$($member:ident),*})?;)*) => {
+    ($d:tt $($module:ident { $($name:ident = $said:literal, $precision:ident;)* })*) => {
         $(mod $module;
-        $(pub use $module::$name;)?
-        $(pub use $module::{$($member),*};)?)*
-        kinds! { @kinds $($($name)? $($($member)*)?)* }
-    };
-    (@kinds $($name:ident)*) => {
+        pub use $module::{$($name),*};)*
+
         /// An observation of any type.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Observation {
-            $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
+            $($(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*)*
         }
 
-        $(impl From<$name> for Observation {
+        $($(impl From<$name> for Observation {
             fn from(observation: $name) -> Self {
                 Self::$name(observation)
             }
-        })*
+        })*)*
 
         /// Names of all types, in the order of the results.
-        pub const KINDS: &[&str] = &[$($name::NAME),*];
+        pub const KINDS: &[&str] = &[$($($said),*),*];
 
         impl Observation {
-            /// See [`ObservationModel::NAME`].
+            /// Returns the name of the type in reports.
             pub fn kind(&self) -> &'static str {
                 match self {
-                    $(Self::$name(_) => $name::NAME,)*
+                    $($(Self::$name(_) => $said,)*)*
                 }
             }
 
             /// Returns an observation of the named type (see [`ObservationModel::from_numbers`]); None for an unknown name.
-            pub fn from_numbers(
-                kind: &str,
-                of: &Named<'_>,
-                values: &[f64],
-                covariance: DMatrix<f64>,
-            ) -> Option<Self> {
+            pub fn from_numbers(kind: &str, of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
                 match kind {
-                    $($name::NAME => $name::from_numbers(of, values, covariance).map(Self::from),)*
+                    $($($said => $name::from_numbers(of, values, covariance).map(Self::from),)*)*
                     _ => None,
                 }
             }
 
-            /// See [`ObservationModel::touches`].
-            pub fn touches(&self) -> Touches {
-                match self {
-                    $(Self::$name(own) => own.touches(),)*
-                }
-            }
-
-            /// See [`ObservationModel::rows`].
-            pub fn rows(&self) -> usize {
-                match self {
-                    $(Self::$name(own) => own.rows(),)*
-                }
-            }
-
-            /// See [`ObservationModel::precision`].
+            /// Returns the precision of the components.
             pub fn precision(&self) -> Precision {
                 match self {
-                    $(Self::$name(own) => own.precision(),)*
+                    $($(Self::$name(own) => own.$precision.clone().into(),)*)*
                 }
             }
+        }
 
-            fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-                match self {
-                    $(Self::$name(own) => own.write(sites, rows),)*
+        /// Evaluates an expression with the observation as its own type.
+        macro_rules! each_observation {
+            ($d observation:expr, $d own:ident => $d body:expr) => {
+                match $d observation {
+                    $($(Observation::$name($d own) => $d body,)*)*
                 }
-            }
-
-            /// See [`ObservationModel::moves`].
-            pub(super) fn moves(&self) -> bool {
-                match self {
-                    $(Self::$name(own) => own.moves(),)*
-                }
-            }
-
-            fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-                match self {
-                    $(Self::$name(own) => own.axes(sites),)*
-                }
-            }
-
-            fn components(&self, common: usize) -> usize {
-                match self {
-                    $(Self::$name(own) => own.components(common),)*
-                }
-            }
-
-            fn own_check(&self) -> Result<(), Fault> {
-                match self {
-                    $(Self::$name(own) => own.check(),)*
-                }
-            }
+            };
         }
     };
 }
 
-kinds! {
-    points::{Control, Distance, Difference};
-    equal_height::EqualHeight;
-    on_figure::{OnLevel, OnPlane, OnPlumbLine, OnLine};
-    photos::{Range, Position, Attitude, Relative};
-    unknowns::{Base, Prior};
-    motion::{Velocity, Rate, Smoothness};
-    film::{Fiducial, Film};
+// Each type with its name in reports, and its field of a standard deviation or precision.
+kinds! { $
+    points {
+        Control = "control", precision;
+        Distance = "distance", sd;
+        Difference = "difference", precision;
+    }
+    equal_height {
+        EqualHeight = "equal height", sd;
+    }
+    on_figure {
+        OnLevel = "on level", sd;
+        OnPlane = "on plane", sd;
+        OnPlumbLine = "on plumb line", precision;
+        OnLine = "on line", precision;
+    }
+    photos {
+        Range = "range", sd;
+        Position = "position", precision;
+        Attitude = "attitude", precision;
+        Relative = "relative", precision;
+    }
+    unknowns {
+        Base = "base", sd;
+        Prior = "prior", precision;
+    }
+    motion {
+        Velocity = "velocity", precision;
+        Rate = "rate", precision;
+        Smoothness = "smoothness", precision;
+    }
+    film {
+        Fiducial = "fiducial", precision;
+        Film = "film", precision;
+    }
 }
 
 impl Observation {
+    /// See [`ObservationModel::touches`].
+    pub fn touches(&self) -> Touches {
+        each_observation!(self, own => own.touches())
+    }
+
+    /// See [`ObservationModel::rows`].
+    pub fn rows(&self) -> usize {
+        each_observation!(self, own => own.rows())
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        each_observation!(self, own => own.write(sites, rows));
+    }
+
+    /// See [`ObservationModel::moves`].
+    pub(super) fn moves(&self) -> bool {
+        each_observation!(self, own => own.moves())
+    }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        each_observation!(self, own => own.axes(sites))
+    }
+
     /// Returns an error if the observation is invalid or does not fit the points, photos and shared parameters of the network.
     pub(super) fn check(&self, points: usize, photos: usize, commons: &[Common]) -> Result<(), Fault> {
         let touches = self.touches();
@@ -147,7 +153,7 @@ impl Observation {
                 return Err(Fault::OtherCommon { common, needed });
             }
             // A shared parameter of any type: all its components are observed.
-            let (components, given) = (own.sd.len(), self.components(place));
+            let (components, given) = (own.sd.len(), each_observation!(self, own => own.components(place)));
             if needed.is_none() && components != given {
                 return Err(Fault::Deviations { components, given });
             }
@@ -157,7 +163,7 @@ impl Observation {
         if twice(&touches.points) || twice(&touches.photos) || twice(&named) {
             return Err(Fault::Twice);
         }
-        self.own_check()?;
+        each_observation!(self, own => own.check())?;
         match self.rows() {
             0 => Err(Fault::Nothing),
             rows => self.precision().root(rows).map(|_| ()),

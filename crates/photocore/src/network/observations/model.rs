@@ -1,16 +1,14 @@
 //! Interface of an observation type.
 
-use nalgebra::{DMatrix, SMatrix, SVector};
+use nalgebra::{DMatrix, RowVector3, SMatrix, SVector};
 
-use super::precision::{Fault, Precision};
+use super::precision::Fault;
 use super::rows::{Rows, Sites};
-use crate::geometry::Matrix3;
+use crate::geometry::{Matrix3, Vector3};
 use crate::network::commons::CommonKind;
 
 /// A type of observations of points, photos and shared parameters.
 pub trait ObservationModel: Sized {
-    /// Name of the type in reports.
-    const NAME: &'static str;
     /// Number of components, if it is the same for all observations of the type.
     const ROWS: usize = 1;
 
@@ -34,9 +32,6 @@ pub trait ObservationModel: Sized {
     fn components(&self, _common: usize) -> usize {
         self.rows()
     }
-
-    /// Returns the precision of the components.
-    fn precision(&self) -> Precision;
 
     /// Writes observed minus computed, and the partials of the computed values.
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>);
@@ -119,6 +114,22 @@ impl<T> Quantity<T> {
             Self::Common(index) => Some(*index),
         }
     }
+
+    /// Returns the fixed value.
+    pub(super) fn known(&self) -> Option<&T> {
+        match self {
+            Self::Known(value) => Some(value),
+            Self::Common(_) => None,
+        }
+    }
+
+    /// Returns the fixed value, or that of the shared parameter.
+    pub(in crate::network) fn value(self, of_common: impl FnOnce(usize) -> T) -> T {
+        match self {
+            Self::Known(value) => value,
+            Self::Common(index) => of_common(index),
+        }
+    }
 }
 
 /// Returns three numbers from an index on; None if there are fewer.
@@ -134,6 +145,23 @@ pub(super) fn nine(values: &[f64], first: usize) -> Option<Matrix3> {
 /// Returns the standard deviation of an observation with one component.
 pub(super) fn deviation(covariance: &DMatrix<f64>) -> f64 {
     covariance[(0, 0)].sqrt()
+}
+
+/// Writes the residual of an observed length of a vector, and its partials by an instrument. Returns the partials by the vector, m e.
+pub(super) fn length(
+    sites: &Sites<'_>,
+    rows: &mut Rows<'_>,
+    vector: &Vector3,
+    (observed, instrument): (f64, Option<usize>),
+) -> RowVector3<f64> {
+    let length = vector.norm();
+    let instrument = instrument.map(|_| sites.common(0).vector());
+    let (scale, constant) = instrument.map_or((1.0, 0.0), |own| (own.x, own.y));
+    rows.residual(0, &[observed - scale * length - constant]);
+    if instrument.is_some() {
+        rows.by_offset(0, 0, &RowVector3::new(length, 1.0, 0.0));
+    }
+    scale * (vector / length).transpose()
 }
 
 /// Writes the `selected` components (rows) of a point in the own axes of a plane or line, minus the estimated offsets.

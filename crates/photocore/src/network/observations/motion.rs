@@ -24,7 +24,6 @@ pub struct Velocity {
 }
 
 impl ObservationModel for Velocity {
-    const NAME: &'static str = "velocity";
     const ROWS: usize = 3;
 
     /// Values: velocity, l if fixed; shared parameter: lever arm.
@@ -43,17 +42,10 @@ impl ObservationModel for Velocity {
         true
     }
 
-    fn precision(&self) -> Precision {
-        self.precision.clone()
-    }
-
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         let Some(moving) = sites.moving(0) else { return };
         let attitude = sites.pose(0).attitude;
-        let lever_arm = match self.lever_arm {
-            Quantity::Known(lever_arm) => lever_arm,
-            Quantity::Common(_) => sites.common(0).vector(),
-        };
+        let lever_arm = self.lever_arm.value(|_| sites.common(0).vector());
         let around = moving.rate.cross(&lever_arm);
         let computed = moving.velocity + attitude * around;
         rows.residual(0, (Vector3::from(self.velocity) - computed).as_slice());
@@ -84,7 +76,6 @@ pub struct Rate {
 }
 
 impl ObservationModel for Rate {
-    const NAME: &'static str = "rate";
     const ROWS: usize = 3;
 
     /// Values: rate, then B if fixed, row by row; shared parameters: boresight, bias.
@@ -105,16 +96,10 @@ impl ObservationModel for Rate {
         true
     }
 
-    fn precision(&self) -> Precision {
-        self.precision.clone()
-    }
-
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         let Some(moving) = sites.moving(0) else { return };
-        let (boresight, bias) = match self.boresight {
-            Quantity::Known(boresight) => (boresight, 0),
-            Quantity::Common(_) => (*sites.common(0).attitude(), 1),
-        };
+        let boresight = self.boresight.value(|_| *sites.common(0).attitude());
+        let bias = usize::from(self.boresight.common().is_some());
         let mut computed = boresight.tr_mul(&moving.rate);
         rows.by_rate(0, 0, &boresight.transpose());
         if self.boresight.common().is_some() {
@@ -128,10 +113,7 @@ impl ObservationModel for Rate {
     }
 
     fn check(&self) -> Result<(), Fault> {
-        match &self.boresight {
-            Quantity::Known(boresight) => rotates(boresight),
-            Quantity::Common(_) => Ok(()),
-        }
+        self.boresight.known().map_or(Ok(()), rotates)
     }
 }
 
@@ -151,7 +133,6 @@ pub struct Smoothness {
 }
 
 impl ObservationModel for Smoothness {
-    const NAME: &'static str = "smoothness";
     const ROWS: usize = 3;
 
     /// Values: observed sum, then the factors.
@@ -165,10 +146,6 @@ impl ObservationModel for Smoothness {
 
     fn touches(&self) -> Touches {
         Touches { commons: self.coefficients.iter().map(|&own| (own, None)).collect(), ..Touches::default() }
-    }
-
-    fn precision(&self) -> Precision {
-        self.precision.clone()
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {

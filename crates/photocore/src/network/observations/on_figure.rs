@@ -23,8 +23,6 @@ pub struct OnPlane {
 }
 
 impl ObservationModel for OnPlane {
-    const NAME: &'static str = "on plane";
-
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[point], &[Some(plane)], &[distance]) = (of.points, of.commons, values) else { return None };
         Some(Self { point, plane, distance, sd: deviation(&covariance) })
@@ -32,10 +30,6 @@ impl ObservationModel for OnPlane {
 
     fn touches(&self) -> Touches {
         Touches::points(&[self.point]).and(Some(self.plane), CommonKind::Plane)
-    }
-
-    fn precision(&self) -> Precision {
-        Precision::Deviations(vec![self.sd])
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
@@ -64,8 +58,6 @@ pub struct OnLevel {
 }
 
 impl ObservationModel for OnLevel {
-    const NAME: &'static str = "on level";
-
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[point], &[Some(level)], &[difference]) = (of.points, of.commons, values) else { return None };
         Some(Self { point, level, difference, sd: deviation(&covariance) })
@@ -73,10 +65,6 @@ impl ObservationModel for OnLevel {
 
     fn touches(&self) -> Touches {
         Touches::points(&[self.point]).and(Some(self.level), CommonKind::Level)
-    }
-
-    fn precision(&self) -> Precision {
-        Precision::Deviations(vec![self.sd])
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
@@ -92,7 +80,7 @@ impl ObservationModel for OnLevel {
 
 /// Points on a line: two offsets are observed as zero.
 macro_rules! on_lines {
-    ($($(#[$doc:meta])* $name:ident = $said:literal, $kind:ident, $axes:literal;)*) => {$(
+    ($($(#[$doc:meta])* $name:ident = $kind:ident, $axes:literal;)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq)]
         pub struct $name {
@@ -105,7 +93,6 @@ macro_rules! on_lines {
         }
 
         impl ObservationModel for $name {
-            const NAME: &'static str = $said;
             const ROWS: usize = 2;
 
             fn from_numbers(of: &Named<'_>, _: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -115,10 +102,6 @@ macro_rules! on_lines {
 
             fn touches(&self) -> Touches {
                 Touches::points(&[self.point]).and(Some(self.line), CommonKind::$kind)
-            }
-
-            fn precision(&self) -> Precision {
-                self.precision.clone()
             }
 
             fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
@@ -136,10 +119,10 @@ on_lines! {
     /// A point on a plumb line.
     ///
     /// (X - X0, Y - Y0), with the partials 1 by X, Y and -1 by X0, Y0; in geographic space along east and north at the given position.
-    OnPlumbLine = "on plumb line", PlumbLine, "Of the offsets along X and Y or, in geographic space, east and north.";
+    OnPlumbLine = PlumbLine, "Of the offsets along X and Y or, in geographic space, east and north.";
     /// A point on a straight line.
     ///
     /// T^T (P - p_0) - q, with the first two axes T of the line and the given position p_0. Partials are T^T by P, -I by q, and the first
     /// two rows of `[R^T (P - p_0)]x` by a rotation about the own axes.
-    OnLine = "on line", Line, "Of the offsets along the first two axes of the line.";
+    OnLine = Line, "Of the offsets along the first two axes of the line.";
 }

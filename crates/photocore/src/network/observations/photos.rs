@@ -1,10 +1,10 @@
 //! Observations of photos: GNSS positions, inertial attitudes, relative poses, ranges from a photo to a point.
 
-use nalgebra::{DMatrix, Matrix1x3, SMatrix};
+use nalgebra::{DMatrix, SMatrix};
 
 use super::{
-    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, deviation, nine,
-    rotates, rows_of, three,
+    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, deviation, length,
+    nine, rotates, rows_of, three,
 };
 use crate::geometry::angle_axis::{right_jacobian_inverse, rotation_angle_axis};
 use crate::geometry::{Matrix3, Pose, Vector3};
@@ -39,18 +39,7 @@ impl Position {
     }
 }
 
-impl Position {
-    /// Returns l; zero if it is a shared parameter.
-    pub(in crate::network) fn known_lever_arm(&self) -> Vector3 {
-        match self.lever_arm {
-            Quantity::Known(lever_arm) => lever_arm,
-            Quantity::Common(_) => Vector3::zeros(),
-        }
-    }
-}
-
 impl ObservationModel for Position {
-    const NAME: &'static str = "position";
     const ROWS: usize = 3;
 
     /// Values: coordinates, l if fixed, dt; shared parameters: lever arm, shift, drift.
@@ -74,15 +63,10 @@ impl ObservationModel for Position {
             .and(self.drift, CommonKind::Drift)
     }
 
-    fn precision(&self) -> Precision {
-        self.precision.clone()
-    }
-
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         let pose = sites.pose(0);
         let (observed, axes) = sites.observed(self.coordinates);
-        let lever_arm =
-            self.lever_arm.common().map_or_else(|| self.known_lever_arm(), |_| sites.common(0).vector());
+        let lever_arm = self.lever_arm.value(|_| sites.common(0).vector());
         let mut computed = pose.position + pose.attitude * lever_arm;
         rows.by_centre(0, 0, &axes);
         rows.by_rotation(0, 0, &(-axes * pose.attitude * lever_arm.cross_matrix()));
@@ -124,7 +108,6 @@ pub struct Attitude {
 }
 
 impl ObservationModel for Attitude {
-    const NAME: &'static str = "attitude";
     const ROWS: usize = 3;
 
     /// Values: A_obs, then B if fixed, row by row; shared parameter: boresight.
@@ -143,15 +126,8 @@ impl ObservationModel for Attitude {
         Touches::photos(&[self.photo]).and(self.boresight.common(), CommonKind::Boresight)
     }
 
-    fn precision(&self) -> Precision {
-        self.precision.clone()
-    }
-
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let boresight = match self.boresight {
-            Quantity::Known(boresight) => boresight,
-            Quantity::Common(_) => *sites.common(0).attitude(),
-        };
+        let boresight = self.boresight.value(|_| *sites.common(0).attitude());
         let computed = sites.local_attitude(0) * boresight;
         let (residual, jacobian) = misalignment(&computed, &self.attitude);
         rows.residual(0, residual.as_slice());
@@ -163,10 +139,7 @@ impl ObservationModel for Attitude {
 
     fn check(&self) -> Result<(), Fault> {
         rotates(&self.attitude)?;
-        match &self.boresight {
-            Quantity::Known(boresight) => rotates(boresight),
-            Quantity::Common(_) => Ok(()),
-        }
+        self.boresight.known().map_or(Ok(()), rotates)
     }
 }
 
@@ -191,7 +164,6 @@ pub struct Relative {
 }
 
 impl ObservationModel for Relative {
-    const NAME: &'static str = "relative";
     const ROWS: usize = 6;
 
     /// Values: t_obs, then R_obs row by row.
@@ -203,10 +175,6 @@ impl ObservationModel for Relative {
 
     fn touches(&self) -> Touches {
         Touches::photos(&self.photos)
-    }
-
-    fn precision(&self) -> Precision {
-        self.precision.clone()
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
@@ -250,8 +218,6 @@ pub struct Range {
 }
 
 impl ObservationModel for Range {
-    const NAME: &'static str = "range";
-
     /// Values: length, l.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[photo], &[point], &[instrument]) = (of.photos, of.points, of.commons) else { return None };
@@ -264,25 +230,12 @@ impl ObservationModel for Range {
         Touches { photos, ..Touches::points(&[self.point]) }.and(self.instrument, CommonKind::Instrument)
     }
 
-    fn precision(&self) -> Precision {
-        Precision::Deviations(vec![self.sd])
-    }
-
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         let pose = sites.pose(0);
         let ray = sites.position(0) - pose.position - pose.attitude * self.lever_arm;
-        let distance = ray.norm();
-        let (scale, constant) = match self.instrument {
-            None => (1.0, 0.0),
-            Some(_) => (sites.common(0).vector().x, sites.common(0).vector().y),
-        };
-        let direction = scale * (ray / distance).transpose();
-        rows.residual(0, &[self.length - scale * distance - constant]);
+        let direction = length(sites, rows, &ray, (self.length, self.instrument));
         rows.by_position(0, 0, &direction);
         rows.by_centre(0, 0, &-direction);
         rows.by_rotation(0, 0, &(direction * pose.attitude * self.lever_arm.cross_matrix()));
-        if self.instrument.is_some() {
-            rows.by_offset(0, 0, &Matrix1x3::new(distance, 1.0, 0.0));
-        }
     }
 }

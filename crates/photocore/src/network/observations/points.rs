@@ -1,9 +1,9 @@
 //! Observations of single points and pairs: control points with full covariance, distances, coordinate differences.
 
-use nalgebra::{DMatrix, Matrix1x3, SMatrix};
+use nalgebra::{DMatrix, SMatrix};
 
 use super::{
-    CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, rows_of, three,
+    CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, length, rows_of, three,
 };
 use crate::geometry::Matrix3;
 
@@ -21,7 +21,6 @@ pub struct Control {
 }
 
 impl ObservationModel for Control {
-    const NAME: &'static str = "control";
     const ROWS: usize = 3;
 
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
@@ -31,10 +30,6 @@ impl ObservationModel for Control {
 
     fn touches(&self) -> Touches {
         Touches::points(&[self.point])
-    }
-
-    fn precision(&self) -> Precision {
-        self.precision.clone()
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
@@ -65,8 +60,6 @@ pub struct Distance {
 }
 
 impl ObservationModel for Distance {
-    const NAME: &'static str = "distance";
-
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[p, q], &[instrument], &[length]) = (of.points, of.commons, values) else { return None };
         Some(Self { points: [p, q], length, sd: deviation(&covariance), instrument })
@@ -76,24 +69,11 @@ impl ObservationModel for Distance {
         Touches::points(&self.points).and(self.instrument, CommonKind::Instrument)
     }
 
-    fn precision(&self) -> Precision {
-        Precision::Deviations(vec![self.sd])
-    }
-
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         let difference = sites.position(1) - sites.position(0);
-        let distance = difference.norm();
-        let (scale, constant) = match self.instrument {
-            None => (1.0, 0.0),
-            Some(_) => (sites.common(0).vector().x, sites.common(0).vector().y),
-        };
-        let direction = scale * (difference / distance).transpose();
-        rows.residual(0, &[self.length - scale * distance - constant]);
+        let direction = length(sites, rows, &difference, (self.length, self.instrument));
         rows.by_position(0, 0, &-direction);
         rows.by_position(0, 1, &direction);
-        if self.instrument.is_some() {
-            rows.by_offset(0, 0, &Matrix1x3::new(distance, 1.0, 0.0));
-        }
     }
 }
 
@@ -111,8 +91,6 @@ pub struct Difference {
 }
 
 impl ObservationModel for Difference {
-    const NAME: &'static str = "difference";
-
     /// Values: the vector, with NaN for components that were not observed.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let &[p, q] = of.points else { return None };
@@ -131,10 +109,6 @@ impl ObservationModel for Difference {
 
     fn rows(&self) -> usize {
         self.components.iter().flatten().count()
-    }
-
-    fn precision(&self) -> Precision {
-        self.precision.clone()
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {

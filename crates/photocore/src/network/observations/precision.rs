@@ -19,6 +19,13 @@ pub enum Precision {
     Covariance(DMatrix<f64>),
 }
 
+impl From<f64> for Precision {
+    /// Returns the precision of one component with this standard deviation.
+    fn from(sd: f64) -> Self {
+        Self::Deviations(vec![sd])
+    }
+}
+
 impl Precision {
     /// Returns L of the covariance matrix S = L L^T of `components` components: L^-1 whitens them.
     pub(in super::super) fn root(&self, components: usize) -> Result<DMatrix<f64>, Fault> {

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation};
+use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, length};
 
 /// Joint observation of shared parameters with a full covariance matrix, from a separate adjustment.
 ///
@@ -21,8 +21,6 @@ pub struct Prior {
 }
 
 impl ObservationModel for Prior {
-    const NAME: &'static str = "prior";
-
     /// Values: d or nothing for a single shared parameter; numbers of components for several.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let commons: Vec<usize> = of.commons.iter().copied().collect::<Option<_>>()?;
@@ -46,10 +44,6 @@ impl ObservationModel for Prior {
 
     fn components(&self, common: usize) -> usize {
         self.components[common]
-    }
-
-    fn precision(&self) -> Precision {
-        self.precision.clone()
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
@@ -81,8 +75,6 @@ pub struct Base {
 }
 
 impl ObservationModel for Base {
-    const NAME: &'static str = "base";
-
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[first, Some(second)], &[length]) = (of.commons, values) else { return None };
         Some(Self { first, second, length, sd: deviation(&covariance) })
@@ -92,18 +84,12 @@ impl ObservationModel for Base {
         Touches::default().and(Some(self.second), CommonKind::Sensor).and(self.first, CommonKind::Sensor)
     }
 
-    fn precision(&self) -> Precision {
-        Precision::Deviations(vec![self.sd])
-    }
-
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         let mut difference = sites.common(0).vector();
         if self.first.is_some() {
             difference -= sites.common(1).vector();
         }
-        let distance = difference.norm();
-        let direction = (difference / distance).transpose();
-        rows.residual(0, &[self.length - distance]);
+        let direction = length(sites, rows, &difference, (self.length, None));
         rows.by_offset(0, 0, &direction);
         if self.first.is_some() {
             rows.by_offset(0, 1, &-direction);
