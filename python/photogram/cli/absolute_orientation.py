@@ -19,7 +19,6 @@ from photogram.formats.read_options import ReadOptions
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
     from photogram.absolute_orientation.cards import Deck
-    from photogram.absolute_orientation.orientation import Orientation
     from photogram.absolute_orientation.stream import Document
     from photogram.io.writing import OutputSet
 
@@ -61,6 +60,8 @@ def absolute_orientation(
     if trace and method == "rigorous":
         raise misuse("--trace", "requires", options="--method report or fill-in")
     from photogram import orient
+    from photogram.absolute_orientation import read_similarity
+    from photogram.absolute_orientation.cards import read_restart, restart_record, transformation_records
     from photogram.absolute_orientation.document import point_rows, without_points
     from photogram.absolute_orientation.stream import Document, decimals_for
     from photogram.absolute_orientation.trace import trace_text
@@ -74,11 +75,15 @@ def absolute_orientation(
     documents.declare(job, TEXT, pictures=["residuals"])
     job.writes(*([target] if target else []))
     deck = _read(file, format, zero_missing, ground_unit, model_unit)
+    former, ident = deck.former, deck.identification if ident is None else ident
+    if restart:
+        own = _is_document(restart)
+        former = read_similarity(restart) if own else read_restart(restart, deck.stations, deck.messages)
     result = orient(
         deck.stations,
         method=method,
         start=start,
-        former=_restart(restart, deck) if restart else deck.former,
+        former=former,
         reject=reject or (),
         unit_variance=unit_variance,
         trace=trace is not None,
@@ -93,7 +98,10 @@ def absolute_orientation(
     made |= documents.pictures(lambda: {"residuals": result.plot()})
     made |= {trace: trace_text(result).encode()} if trace else {}
     made |= {} if points else documents.as_json(result)
-    made |= _records(result, part_two, restart_out, deck.identification if ident is None else ident)
+    if part_two and result.usable:
+        made[part_two] = "\n".join([*transformation_records(result.similarity, ident), ""]).encode()
+    if restart_out:
+        made[restart_out] = f"{restart_record(result.similarity, ident)}\n".encode()
     made |= documents.page(job, lambda: document)
     written = list(made)
     with job.outputs() as outputs:
@@ -192,31 +200,10 @@ def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_
     return read_cards(file, zero_missing=zero_missing, ground_unit=ground_unit, model_unit=model_unit)
 
 
-def _restart(path: Path, deck: Deck) -> Similarity | None:
-    from photogram.absolute_orientation import read_similarity
-    from photogram.absolute_orientation.cards import read_restart
-
-    return read_similarity(path) if _is_document(path) else read_restart(path, deck.stations, deck.messages)
-
-
 def _is_document(path: Path) -> bool:
     from photogram.io.files import read_lines
 
     return any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
-
-
-def _records(
-    result: Orientation, part_two: Path | None, restart: Path | None, ident: str
-) -> dict[Path, bytes]:
-    """Return the files of step 12; an unusable orientation gets only the restart."""
-    from photogram.absolute_orientation.cards import restart_record, transformation_records
-
-    made = {}
-    if part_two and result.usable:
-        made[part_two] = "\n".join([*transformation_records(result.similarity, ident), ""]).encode()
-    if restart:
-        made[restart] = f"{restart_record(result.similarity, ident)}\n".encode()
-    return made
 
 
 def _stream(

@@ -81,14 +81,12 @@ def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | D
             continue
         if not left:
             raise InputError(phrase("command.no-day"), file=path)
-        found.append(DatedCamera(_day(left.pop(0)), camera_from(path, name), source=path.stem))
+        text = left.pop(0)
+        try:
+            day = date.fromisoformat(text)
+        except ValueError:
+            raise misuse("--day", "form", form="a date such as 1983-05-11", value=text) from None
+        found.append(DatedCamera(day, camera_from(path, name), source=path.stem))
     if left:
         raise misuse("--day", "day-without-file", day=left[0])
     return found
-
-
-def _day(text: str) -> date:
-    try:
-        return date.fromisoformat(text)
-    except ValueError:
-        raise misuse("--day", "form", form="a date such as 1983-05-11", value=text) from None

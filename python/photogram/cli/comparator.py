@@ -81,10 +81,16 @@ def comparator(
     texts = [one.to_json() for one in calibrations] if documents.json is not None else []
     json = b"[" + b",\n".join(texts) + b"]\n" if several else b"".join(texts)
     code = worst(calibration.verdict for calibration in calibrations)
+
+    def summarize() -> None:
+        for one in calibrations:
+            remarks = [message.text for message in one.messages]
+            print_document(one.document(), "listing.txt", "variance", "linear", remarks=remarks)
+
     job.finish(
         files,
         {documents.json: json} if documents.json is not None else {},
-        summary=lambda: _summarize(calibrations),
+        summary=summarize,
         code=code,
     )
 
@@ -130,13 +136,6 @@ def _pdf(job: Job, calibration: Calibration, run_date: str) -> dict[str, bytes]:
     except ModuleNotFoundError:
         job.remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
         return {}
-
-
-def _summarize(calibrations: list[Calibration]) -> None:
-    """Print verdict, analysis of variance, linear parameters and problems of each."""
-    for calibration in calibrations:
-        remarks = [message.text for message in calibration.messages]
-        print_document(calibration.document(), "listing.txt", "variance", "linear", remarks=remarks)
 
 
 @with_job("comparator correct")

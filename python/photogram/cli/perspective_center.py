@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from photogram.cli.console import print_document, print_remark
 from photogram.cli.documents import OfPrograms
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input
-
-if TYPE_CHECKING:
-    from photogram.perspective_center import Run
 
 
 @with_job("perspective-center", example=("perspective_center", "grid.deck"), ending="-resected")
@@ -30,6 +27,7 @@ def perspective_center(
     The run stops at the first set that cannot be read or solved. The sets before it are written to --out.
     """
     from photogram.perspective_center import run_deck
+    from photogram.perspective_center.document import set_document
     from photogram.perspective_center.listing import listing
     from photogram.perspective_center.plot import run_sketch
     from photogram.statistics.verdict import worst
@@ -44,22 +42,20 @@ def perspective_center(
         unknown=unknown,
     )
     stopped, results = run.stop is not None, run.results
+
+    def summarize() -> None:
+        for result in results:
+            print_document(set_document(result), "listing.txt", "parameters")
+        for message in run.messages:
+            print_remark(message)
+
     job.finish(
         documents.as_json(run),
         documents.inside({"listing.txt": listing(run).encode()} if results or not stopped else {}),
         documents.pictures(lambda: {"residuals": run_sketch(run.results)}),
         documents.page(job, run.document) if results else {},
-        summary=lambda: _summarize(run),
+        summary=summarize,
         code=0 if stopped else worst((each.verdict for each in results), strict=strict),
     )
     if run.stop is not None:
         raise run.stop.error
-
-
-def _summarize(run: Run) -> None:
-    from photogram.perspective_center.document import set_document
-
-    for result in run.results:
-        print_document(set_document(result), "listing.txt", "parameters")
-    for message in run.messages:
-        print_remark(message)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -69,7 +68,12 @@ def stellar_camera(
         files |= documents.page(job, result.document, mark)
         asked |= documents.as_json(result, mark)
     code = worst((result.verdict for result in results), strict=strict)
-    job.finish(files, asked, summary=lambda: _summarize(results), code=code)
+
+    def summarize() -> None:
+        for result in results:
+            print_document(result.document(), "the report", remarks=result.messages)
+
+    job.finish(files, asked, summary=summarize, code=code)
 
 
 @with_job("stellar-camera exposures", example=("exposures", "night.toml"))
@@ -154,11 +158,6 @@ def places(
         "magnitude": stars.magnitudes,
     }
     job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
-
-
-def _summarize(results: Sequence[Result]) -> None:
-    for result in results:
-        print_document(result.document(), "the report", remarks=result.messages)
 
 
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import orjson
 
 from photogram.arguments.arrays import argument_error, is_covariance, number, shaped, truth_value
-from photogram.arguments.fields import Checked, check_fields
+from photogram.arguments.fields import Checked, check_fields, option
 from photogram.arguments.types import Floats
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial, design
 from photogram.comparator.readings import Session
@@ -112,20 +113,15 @@ class Correction:
         Comparator, date and range of the calibration; None if unknown.
     """
 
-    scale_x: float
-    scale_y: float
-    nonorthogonality_rad: float
+    scale_x: float = option(MISSING, 0, is_open=True)
+    scale_y: float = option(MISSING, 0, is_open=True)
+    nonorthogonality_rad: float = option(MISSING, -math.pi / 2, math.pi / 2, is_open=True)
     polynomial: Polynomial | None = None
     covariance: Floats = field(default_factory=lambda: np.zeros((PARAMETERS, PARAMETERS)), repr=False)
     identity: Identity | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for name in ("scale_x", "scale_y"):
-            number(name, getattr(self, name), "positive")
-        if not abs(self.nonorthogonality_rad) < math.pi / 2:
-            angles = {"low": -math.pi / 2, "high": math.pi / 2}
-            raise argument_error("nonorthogonality_rad", "range", value=self.nonorthogonality_rad, **angles)
         if self.polynomial is not None:
             for value in (*self.polynomial.frame.centre_um, *self.polynomial.scaled_um.ravel().tolist()):
                 if not math.isfinite(value):

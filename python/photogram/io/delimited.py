@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from photogram.io.files import decoded, read_beginning, read_lines, read_text, r
 from photogram.io.numbers import marks_of
 from photogram.io.places import Place
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    import pyarrow
 
 DELIMITERS = ("\t", ";", ",", "|")  # Possible delimiters in a header, in order of priority
 LONGEST_RECORD = 100_000  # Characters of a record; the module `csv` rejects cells above 131,072
@@ -371,32 +374,25 @@ def _of_reader(path: Path, header: _Header, reader: _photocore.TableReader, firs
 def _parquet(
     path: Path, spelling: Spelling, numbers: Collection[str], size: int | None
 ) -> Iterator[ColumnTable]:
+    """Yield a table of Parquet in batches, at least one."""
     import pyarrow
+    from pyarrow import parquet
 
     first = 1
     try:
-        for part in _parts_of_parquet(path, size):
-            yield _of_arrow(path, part, spelling, numbers, first)
-            first += len(part)
+        with parquet.ParquetFile(path) as file:
+            if size is None or not file.metadata.num_rows:
+                yield _of_arrow(path, file.read(), spelling, numbers, first)
+                return
+            for batch in file.iter_batches(max(size // ROW, 1)):
+                yield _of_arrow(path, pyarrow.Table.from_batches([batch]), spelling, numbers, first)
+                first += len(batch)
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
 
 
-def _parts_of_parquet(path: Path, size: int | None) -> Iterator[Any]:
-    """Yield a table of Arrow in batches, at least one."""
-    import pyarrow
-    from pyarrow import parquet
-
-    with parquet.ParquetFile(path) as file:
-        if size is None or not file.metadata.num_rows:
-            yield file.read()
-            return
-        for batch in file.iter_batches(max(size // ROW, 1)):
-            yield pyarrow.Table.from_batches([batch])
-
-
 def _of_arrow(
-    path: Path, table: Any, spelling: Spelling, numbers: Collection[str], first: int
+    path: Path, table: pyarrow.Table, spelling: Spelling, numbers: Collection[str], first: int
 ) -> ColumnTable:
     """Return a table from the table of Arrow, from its first record."""
     from pyarrow import types

@@ -78,9 +78,15 @@ class Sheet:
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
     """Return a function that writes columns and metadata to an open file."""
+    import pyarrow
     from pyarrow import PythonFile, parquet, types  # Import is slow
 
-    table = _table(columns, about)
+    arrays, fields = [_array(each.values) for each in columns], []
+    for each, array in zip(columns, arrays, strict=True):
+        texts = {"unit": each.unit, "description": each.description, "order": " ".join(each.order)}
+        metadata = {key: text for key, text in texts.items() if text}
+        fields.append(pyarrow.field(each.name, array.type, metadata=metadata))
+    table = pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields, metadata=dict(about)))
     repeated = [each.name for each in columns if isinstance(each.values, NameColumn)]
     few = [name for name in repeated if types.is_dictionary(table.schema.field(name).type)]
 
@@ -137,19 +143,6 @@ def unpacked(triangles: np.ndarray) -> np.ndarray:
     matrices = np.empty((len(triangles), k, k))
     matrices[:, rows, columns] = matrices[:, columns, rows] = triangles
     return matrices
-
-
-def _table(columns: Sequence[Column], about: Mapping[str, str]) -> pyarrow.Table:
-    import pyarrow
-
-    arrays = [_array(each.values) for each in columns]
-    fields = []
-    for each, array in zip(columns, arrays, strict=True):
-        said = {"unit": each.unit, "description": each.description, "order": " ".join(each.order)}
-        fields.append(
-            pyarrow.field(each.name, array.type, metadata={key: text for key, text in said.items() if text})
-        )
-    return pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields, metadata=dict(about)))
 
 
 def _array(values: Any) -> pyarrow.Array:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.arguments.arrays import argument_error, names, number, text, truth_value
+from photogram.arguments.arrays import argument_error, names, text
+from photogram.arguments.fields import check_fields, option
 from photogram.arguments.objects import kind_error, require
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -56,16 +57,14 @@ class InnerConstraints:
     photos: Sequence[str] | None = ()
     scale: bool = True
     attitudes: Sequence[str] | None = ()
-    radius: float | None = None
+    radius: float | None = option(None, 0, is_open=True)
 
     def __post_init__(self) -> None:
         for name in ("points", "photos", "attitudes"):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, tuple(names(name, value)))
-        truth_value("scale", self.scale)
-        if self.radius is not None:
-            number("radius", self.radius, "positive")
+        check_fields(self)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, number, object_name, one_of, shaped
-from photogram.arguments.fields import check_fields
+from photogram.arguments.arrays import argument_error, object_name, one_of, shaped
+from photogram.arguments.fields import check_fields, option
 from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -99,14 +99,13 @@ class Readings:
         (hx, hy) mm, half ranges of the scanner polynomials.
     """
 
-    pitch: float = 1.0
+    pitch: float = option(1.0, 0, is_open=True)
     origin: tuple[float, float] = (0.0, 0.0)
     down: bool = False
     half_range: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
         check_fields(self, "readings")
-        number("pitch of readings", self.pitch, "positive")
         shaped("origin of readings", self.origin, (2,), "finite")
         shaped("half_range of readings", self.half_range, (2,), "positive")
 

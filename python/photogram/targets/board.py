@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +18,12 @@ from photogram.arguments.arrays import (
     frozen,
     names,
     number,
-    one_of,
     shaped,
     text,
     whole_number,
 )
 from photogram.arguments.equality import Valued
+from photogram.arguments.fields import check_fields
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.delimited import read_columns
@@ -32,7 +32,7 @@ from photogram.io.places import Place, at_place
 from photogram.io.toml import read_toml
 from photogram.io.tree import Tree
 from photogram.io.yaml_text import read_yaml_text
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.summaries import Brief, Rows
 from photogram.targets.options import Shape
 from photogram.words import phrase
@@ -86,7 +86,7 @@ class Board(Valued, Brief):
     columns: int = 0
     rows: int = 0
     spacing: tuple[float, float] | float | None = None
-    unit: str = "m"
+    unit: str = field(default="m", metadata={"check": text})
     tag_size: float | None = None
     tag_spacing: float | None = None
     points: ArrayLike | None = None
@@ -97,10 +97,7 @@ class Board(Valued, Brief):
     point_sd: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        one_of("kind of a board", self.kind, get_args(BoardKind))
-        if self.shape is not None:
-            one_of("shape of a board", self.shape, get_args(Shape))
-        text("unit", self.unit)
+        check_fields(self)
         if self.kind == "points":
             self._check_points()
         else:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self, get_args
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, number, one_of, shaped, value_field
+from photogram.arguments.arrays import argument_error, shaped, value_field
 from photogram.arguments.equality import Valued
-from photogram.arguments.fields import array, check_arrays
+from photogram.arguments.fields import array, check_arrays, check_fields, option
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -44,7 +44,7 @@ class Start(Valued, Brief):
     poses: ArrayLike = field(metadata=array("views", 4, 4, missing=True))
     sensors: ArrayLike | None = field(default=None, metadata=array("cameras", 4, 4))
     references: ArrayLike | None = field(default=None, metadata=array("cameras", index="cameras"))
-    sd0: float | None = None
+    sd0: float | None = option(None, 0, is_open=True)
     sync: Synchronisation = "known"
     regularise: Regularisation | None = None
     bend: tuple[float, float] = (0.0, 0.0)
@@ -57,11 +57,7 @@ class Start(Valued, Brief):
     sd_bend: ArrayLike = field(default=np.inf, metadata=array(2))
 
     def __post_init__(self) -> None:
-        one_of("sync", self.sync, get_args(Synchronisation))
-        if self.regularise is not None:
-            one_of("regularise", self.regularise, get_args(Regularisation))
-        if self.sd0 is not None:
-            number("sd0", self.sd0, "positive")
+        check_fields(self)
         count = len(self.corners.camera_names)
         cameras = [each for each in self.cameras if isinstance(each, Camera) and each.unit == "px"]
         if len(cameras) != count or len(self.cameras) != count:
