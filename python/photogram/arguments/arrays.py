@@ -36,6 +36,10 @@ RULES: dict[str, Callable[[Any], Any]] = {
     "not-negative": lambda values: (values >= 0) & np.isfinite(values),
     "not-zero": lambda values: (values != 0) & np.isfinite(values),
     "sd": lambda values: values >= 0,  # Infinite if free
+    "check-sd": lambda values: np.isnan(values) | ((values >= 0) & ~np.isinf(values)),
+    "not-infinite": lambda values: ~np.isinf(values),
+    # Larger angles, in radians, do not have the digits that an attitude needs.
+    "angle": lambda values: np.isnan(values) | (np.abs(values) <= 1e6),
 }
 """Rules of numbers: functions that return which values are valid."""
 

@@ -153,11 +153,11 @@ class Block(Valued, Brief):
     """
 
     photo_ids: Names = field(default=NONE)
-    photo_positions: Array = field(metadata=array("photos", 3, rule="not-infinite"))
-    photo_attitudes: Array = field(metadata=array("photos", 3, rule="angle"))
+    photo_positions: Array = field(metadata=array("photos", 3, rule="not-infinite", missing=True))
+    photo_attitudes: Array = field(metadata=array("photos", 3, rule="angle", missing=True))
     principal_distances: OptionalArray = field(default=NONE, metadata=array("photos", rule="not-zero"))
     point_ids: Names = field(default=NONE)
-    point_positions: Array = field(metadata=array("points", 3, rule="not-infinite"))
+    point_positions: Array = field(metadata=array("points", 3, rule="not-infinite", missing=True))
     image_photos: IndexArray = field(metadata=array("images", index="photos"))
     image_points: IndexArray = field(metadata=array("images", index="points"))
     image_xy: Array = field(metadata=array("images", 2, rule="finite"))
@@ -171,9 +171,11 @@ class Block(Valued, Brief):
     linear_unit: str = field(default="m", metadata={"check": text})
     refraction: Refraction | None = None
     photo_positions_observed: OptionalArray = field(
-        default=NONE, metadata=array("photos", 3, rule="not-infinite")
+        default=NONE, metadata=array("photos", 3, rule="not-infinite", missing=True)
     )
-    photo_attitudes_observed: OptionalArray = field(default=NONE, metadata=array("photos", 3, rule="angle"))
+    photo_attitudes_observed: OptionalArray = field(
+        default=NONE, metadata=array("photos", 3, rule="angle", missing=True)
+    )
     observations: Records = field(default=NO_RECORDS)
     cameras: Sequence[Camera] = ()
     photo_cameras: NamedIndices = field(default=NONE, metadata=array("photos", index="cameras"))
@@ -181,7 +183,9 @@ class Block(Valued, Brief):
     timed: Sequence[Timed] = ()
     passages: Sequence[Passage] = ()
     frame: Frame = field(default_factory=Frame)
-    point_check_sd: OptionalArray = field(default=NONE, metadata=array("points", 3, rule="check-sd"))
+    point_check_sd: OptionalArray = field(
+        default=NONE, metadata=array("points", 3, rule="check-sd", missing=True)
+    )
     rejected_points = frozenset[str]()
     """Points whose image observations were all rejected; copied with the block, but not a field."""
 

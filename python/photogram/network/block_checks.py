@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from photogram.arguments.arrays import (
     shaped,
 )
 from photogram.arguments.fields import checks_of
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import fields
 from photogram.network.films import check_scans
@@ -35,15 +35,6 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram import Block
 
-_ANGLES = 1e6  # Radians; larger angles do not have the digits that an attitude needs
-BLOCK_RULES: dict[str, Callable[[Floats], Bools]] = {
-    **RULES,
-    "not-infinite": lambda values: ~np.isinf(values),
-    "angle": lambda values: np.isnan(values) | (np.abs(values) <= _ANGLES),
-    "not-zero": lambda values: np.isfinite(values) & (values != 0),
-    "check-sd": lambda values: np.isnan(values) | ((values >= 0) & ~np.isinf(values)),
-}
-_WITH_NAN = ("not-infinite", "angle", "check-sd")
 _IMAGES = frozenset({"image_photos", "image_points", "image_xy", "image_sd"})
 _ALONE = _IMAGES | {"title", "linear_unit", "refraction", "frame", "point_check_sd"}
 """Fields that observations, mounted photos, trajectories and image transformations do not depend on."""
@@ -108,9 +99,9 @@ def _check_field(block: Block, declared: Any, counts: Mapping[str, int]) -> None
     elif limit:
         block._set(name, indices(name, value, counts[rows], counts[limit]))
     elif value is not None or declared.default is not None or (rule == "not-zero" and not block.cameras):
-        numbers = shaped(name, value, (counts[rows], *columns), missing=rule in _WITH_NAN)
+        numbers = shaped(name, value, (counts[rows], *columns), missing=rules["missing"])
         block._set(name, numbers)
-        refuse(block, name, rows, ~BLOCK_RULES[rule](numbers), rule)
+        refuse(block, name, rows, ~RULES[rule](numbers), rule)
 
 
 def refuse(block: Block, name: str, rows: str, bad: Bools, rule: str) -> None:
