@@ -230,6 +230,7 @@ def _limited(check: Check, limits: Mapping[str, Any], of: str, *, optional: bool
     code = "range" if high < math.inf else "least" if low else "not-negative"
     code = "positive" if limits.get("open") and (low, high) == (0, math.inf) else code
     code = "whole-range" if code == "range" and of == "int" else code
+    shown = {} if code in ("positive", "not-negative") else {"low": low, "high": high}
 
     def limited(name: str, value: Any) -> Any:
         if value is None and optional:
@@ -237,7 +238,7 @@ def _limited(check: Check, limits: Mapping[str, Any], of: str, *, optional: bool
         value = check(name, value)
         if (low, high) != (-math.inf, math.inf):
             inside = low < value < high if limits["open"] else low <= value <= high
-            require(inside, name, code, low=low, high=high, value=value)
+            require(inside, name, code, **shown, value=value)
         return value
 
     return limited
