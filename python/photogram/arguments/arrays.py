@@ -12,7 +12,7 @@ import math
 import random
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, TypeVar
@@ -27,6 +27,7 @@ LARGEST_SD = math.sqrt(sys.float_info.max)  # Larger standard deviations have an
 _SYMMETRIC = 1e-9  # Largest asymmetry of a covariance matrix, relative to its diagonal
 _ROUNDING = 1e-6  # Tolerance for correlations that were written with all digits and read again
 
+_Kind = TypeVar("_Kind")
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 RULES: dict[str, Callable[[Any], Any]] = {
@@ -136,13 +137,18 @@ def _no_array(name: str, of: str, value: object) -> InputError:
     return argument_error(name, "array", of=of, value=value)
 
 
-def elements(name: str, value: object, count: int | None = None) -> list[Any]:
-    """Return the elements of a sequence, possibly of a required number."""
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+def elements(
+    name: str, value: object, kind: type[_Kind] | None = None, count: int | None = None
+) -> tuple[_Kind, ...]:
+    """Return the elements of a sequence, possibly of a required class and number."""
+    if isinstance(value, str | bytes | Set) or not isinstance(value, Iterable):
         raise argument_error(name, "list", value=value)
-    found = np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else list(value)
+    found = tuple(np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else value)
     if count is not None and len(found) != count:
         raise argument_error(name, "count", count=count, actual=len(found))
+    for row, each in enumerate(found if kind else ()):
+        if not isinstance(each, kind):  # type: ignore[arg-type]
+            raise argument_error(f"{name}[{row}]", "kind", kind=kind.__name__, value=each)
     return found
 
 
@@ -269,10 +275,11 @@ def truth_value(name: str, value: object) -> bool:
     return bool(value)
 
 
-def one_of(name: str, value: object, choices: Sequence[str]) -> None:
-    """Reject values that are not among some words."""
+def one_of(name: str, value: object, choices: Sequence[str]) -> str:
+    """Return one of some words."""
     if not (isinstance(value, str) and value in choices):
         raise argument_error(name, "choice", names=list(choices), value=value)
+    return value
 
 
 def value_field(value: object) -> str | float | Phrase:

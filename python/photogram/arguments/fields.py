@@ -156,23 +156,18 @@ def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | N
     }
     kind: Any = eval(of, {"Literal": Literal}) if of.startswith("Literal[") else _named(of, names)
     if get_origin(kind) is Literal:
-        return partial(_word, get_args(kind))
+        return lambda name, value: arrays.one_of(name, value, get_args(kind))
     if _is_own_class(kind):
-
-        def instance(name: str, value: Any) -> Any:
-            require_kind(name, value, kind, optional=optional)
-            return value
-
-        return instance
+        return lambda name, value: require_kind(name, value, kind, optional=optional)
     if (match := _TUPLE.fullmatch(of)) is None:
         match = _SEQUENCE.fullmatch(of)
         return simple.get(of) if match is None else partial(_sequence, _named(match[1], names))
     inner = [simple[each] for each in match[1].split(", ")]
 
     def elements(name: str, value: Any) -> tuple[Any, ...]:
-        values = arrays.elements(name, value, None if match[2] else len(inner))
+        values = arrays.elements(name, value, count=None if match[2] else len(inner))
         if inner == [_text] and {*map(type, values)} <= {str}:  # Names of a hundred thousand stars
-            return value if isinstance(value, tuple) else tuple(values)
+            return values
         checks = inner * len(values) if match[2] else inner
         pairs = zip(checks, values, strict=True)
         return tuple(check(f"{name}[{row}]", each) for row, (check, each) in enumerate(pairs))
@@ -199,13 +194,6 @@ def _text(name: str, value: Any) -> str:
     raise argument_error(name, "text", value=value)
 
 
-def _word(words: Sequence[str], name: str, value: Any) -> Any:
-    from photogram.arguments.arrays import one_of
-
-    one_of(name, value, words)
-    return value
-
-
 def _is_own_class(kind: Any) -> bool:
     """Return whether a type is a class of the package, and not a protocol."""
     is_class = isinstance(kind, type) and kind.__module__.startswith("photogram.")
@@ -214,11 +202,8 @@ def _is_own_class(kind: Any) -> bool:
 
 def _sequence(kind: Any, name: str, value: Any) -> Any:
     from photogram.arguments.arrays import elements
-    from photogram.arguments.objects import instances
 
-    found = elements(name, value)
-    if _is_own_class(kind):
-        instances(name, found, kind)
+    found = elements(name, value, kind if _is_own_class(kind) else None)
     return value if isinstance(value, Sequence) else found
 
 

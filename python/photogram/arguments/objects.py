@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from pathlib import Path
-from typing import TypeVar
 
 from photogram.arguments.arrays import argument_error
 from photogram.errors import InputError
 from photogram.messages import unknown_name
 from photogram.words import Phrase
-
-_Kind = TypeVar("_Kind")
 
 
 def kind_error(name: str, kind: str, value: object) -> InputError:
@@ -20,20 +17,11 @@ def kind_error(name: str, kind: str, value: object) -> InputError:
     return argument_error(name, "kind", kind=kind, value=value)
 
 
-def require_kind(name: str, value: object, kind: type, *, optional: bool = False) -> None:
-    """Reject an argument that is not an instance of a class."""
+def require_kind(name: str, value: object, kind: type, *, optional: bool = False) -> object:
+    """Return an argument; reject one that is not an instance of a class."""
     if not (isinstance(value, kind) or (optional and value is None)):
         raise kind_error(name, f"{kind.__name__} or None" if optional else kind.__name__, value)
-
-
-def instances(name: str, values: object, kind: type[_Kind]) -> tuple[_Kind, ...]:
-    """Return a tuple of instances of a class."""
-    if not isinstance(values, Sequence):
-        raise argument_error(name, "list", value=values)
-    for row, value in enumerate(values):
-        if not isinstance(value, kind):
-            raise kind_error(f"{name}[{row}]", kind.__name__, value)
-    return tuple(values)
+    return value
 
 
 def path_of(name: str, value: object) -> Path:

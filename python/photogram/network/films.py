@@ -13,9 +13,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, object_name, one_of, shaped
+from photogram.arguments.arrays import argument_error, elements, object_name, one_of, shaped
 from photogram.arguments.fields import check_fields, option
-from photogram.arguments.objects import instances, kind_error, require
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -139,7 +139,7 @@ class Pattern:
         require(good, f"numbers of the pattern {self.kind}", "positive", value=own.tolist())
         object.__setattr__(self, "numbers", own)
         needed = {"w1 w2": 1, "ebner": 5}.get(self.kind, int(np.prod(own[4:])))
-        weights = instances(f"weights of the pattern {self.kind}", self.weights, Weights)
+        weights = elements(f"weights of the pattern {self.kind}", self.weights, Weights)
         actual = len(weights)
         require(actual == needed, f"weights of the pattern {self.kind}", "count", count=needed, actual=actual)
 

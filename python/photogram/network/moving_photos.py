@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, number, numbers, object_name, shaped
+from photogram.arguments.arrays import argument_error, elements, number, numbers, object_name, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields
-from photogram.arguments.objects import instances, kind_error, require
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -313,7 +313,7 @@ class Timed:
 
 def checked_timed(timed: object, photos: Sequence[str]) -> tuple[Timed, ...]:
     """Return validated timed photos without repetition."""
-    checked = instances("timed", timed, Timed)
+    checked = elements("timed", timed, Timed)
     require_photos("timed", [each.photo for each in checked], photos)
     return checked
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, names, shaped
+from photogram.arguments.arrays import argument_error, elements, names, shaped
 from photogram.arguments.fields import check_fields
-from photogram.arguments.objects import instances, kind_error
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.unknowns import Numbers, Unknown
@@ -102,7 +102,7 @@ class Figure(Passage):
 
 def checked_passages(passages: object, points: Sequence[str], photos: Sequence[str]) -> tuple[Passage, ...]:
     """Return validated image transformations of points and photos in a block."""
-    checked = instances("passages", passages, Passage)
+    checked = elements("passages", passages, Passage)
     for row, each in enumerate(checked):
         if not each.KIND:
             raise kind_error(f"passages[{row}]", "a Figure or a Scan", each)

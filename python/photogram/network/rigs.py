@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.arguments.arrays import object_name
+from photogram.arguments.arrays import elements, object_name
 from photogram.arguments.fields import check_fields
-from photogram.arguments.objects import instances
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.moving_photos import Timed, require_photos
@@ -45,7 +44,7 @@ class Mount:
 
 def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
     """Return validated mounts that are consistent with each other and with a block."""
-    checked = instances("mounts", mounts, Mount)
+    checked = elements("mounts", mounts, Mount)
     frames = {each.frame for each in checked}
     require_photos("mounts", [each.photo for each in checked], photos)
     require_photos("mounts", sorted(frames), photos)

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, names, shaped
-from photogram.arguments.objects import instances, kind_error, require
+from photogram.arguments.arrays import argument_error, elements, names, shaped
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
@@ -177,7 +177,7 @@ def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
 
 def checked_cameras(cameras: object) -> tuple[Camera, ...]:
     """Return validated cameras with unique names and one unit."""
-    checked = instances("cameras", cameras, Camera)
+    checked = elements("cameras", cameras, Camera)
     different("cameras", [each.name for each in checked if each.name])
     if len(of_unit := {each.unit: f"{each.title} in {each.unit}" for each in checked}) > 1:
         raise InputError(phrase("block.camera-units", cameras=list(of_unit.values())))
