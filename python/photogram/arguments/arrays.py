@@ -146,8 +146,8 @@ def elements(
     found = tuple(np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else value)
     if count is not None and len(found) != count:
         raise argument_error(name, "count", count=count, actual=len(found))
-    for row, each in enumerate(found if kind else ()):
-        if not isinstance(each, kind):  # type: ignore[arg-type]
+    for row, each in enumerate(() if kind is None else found):
+        if kind is not None and not isinstance(each, kind):
             raise argument_error(f"{name}[{row}]", "kind", kind=kind.__name__, value=each)
     return found
 

@@ -165,7 +165,7 @@ def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | N
     inner = [simple[each] for each in match[1].split(", ")]
 
     def elements(name: str, value: Any) -> tuple[Any, ...]:
-        values = arrays.elements(name, value, count=None if match[2] else len(inner))
+        values: tuple[Any, ...] = arrays.elements(name, value, count=None if match[2] else len(inner))
         if inner == [_text] and {*map(type, values)} <= {str}:  # Names of a hundred thousand stars
             return values
         checks = inner * len(values) if match[2] else inner

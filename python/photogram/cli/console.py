@@ -14,7 +14,7 @@ from rich.markup import escape
 from photogram.cli.process import stream_fault
 from photogram.extras import EXTRAS, missing
 from photogram.messages import printable
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.show.page import Document
@@ -79,14 +79,6 @@ def print_written(paths: Iterable[Path]) -> None:
         output.print_block(f"written: {', '.join(names)}")
     if pages:
         output.print(f"open in a browser: {', '.join(pages)}")
-
-
-def print_withheld(message: Phrase, paths: Iterable[Path]) -> None:
-    """Print why files are withheld, and which of them are from an earlier run."""
-    errors.print(f"[bold red]error:[/] {escape(str(message))}")
-    for path in paths:
-        if path.exists():
-            print_remark(phrase("command.earlier-run", file=path))
 
 
 def print_remark(text: object) -> None:

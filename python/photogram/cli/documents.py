@@ -7,9 +7,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from photogram.cli.console import SUMMARY, print_document, print_text, print_withheld
+from rich.markup import escape
+
+from photogram.cli.console import SUMMARY, errors, print_document, print_remark, print_text
 from photogram.cli.job import Job
-from photogram.cli.options import Only, OutputFile, OutputFolder, Without, misuse
+from photogram.cli.options import OutputFile, OutputFolder, Without, misuse
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import Phrase, phrase
 
@@ -68,7 +70,9 @@ class Documents:
         paths = self.inside(files)
         if usable:
             return paths
-        print_withheld(message, paths)
+        errors.print(f"[bold red]error:[/] {escape(str(message))}")
+        for path in filter(Path.exists, paths):
+            print_remark(phrase("command.earlier-run", file=path))
         return {}
 
     def declare(self, job: Job, *names: str, pictures: Iterable[str] | None = ()) -> None:
@@ -209,7 +213,6 @@ class Documents:
 OF_NETWORKS = ("xlsx", "parquet", "crs", "map", "ply", "ply_origin")
 OfPrograms = Annotated[Documents, Without(*OF_NETWORKS)]
 PageAndJson = Annotated[Documents, Without("plots", "plot_format", *OF_NETWORKS)]
-FilesAndJson = Annotated[Documents, Only("out", "json")]
 
 
 def check_maps(chart: Path | None) -> None:
