@@ -42,7 +42,7 @@ SELDOM = (
 OF_OTHERS = (
     "photogram.diagnosis.conventions",
     "photogram.film.certificate",
-    "photogram.formats.blocks_exchange.files",
+    "photogram.formats.blocks_exchange",
     "photogram.formats.isis.assembling",
     "photogram.giant.printout",
     "photogram.targets.first_calibration",

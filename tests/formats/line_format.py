@@ -15,8 +15,9 @@ import numpy as np
 from photogram import Attitudes, Camera
 from photogram.formats import Format, Project, ReadOptions
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.cards import cards, has_suffix
+from photogram.formats.cards import cards
 from photogram.formats.images import lens_with, named_pixels, sizes_of
+from photogram.formats.recognition import has_suffix
 from photogram.io.places import image_size, one_word
 
 FILE, TITLE = "block.lines", "file of lines"

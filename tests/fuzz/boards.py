@@ -15,7 +15,7 @@ import photogram
 from photogram.arguments.types import Floats
 from photogram.cli import calibrate as calibrating
 from photogram.formats import to_files
-from photogram.formats.targets.calibrations import adjusted_project
+from photogram.formats.targets import adjusted_project
 from photogram.targets import read
 from photogram.targets.options import CornerBasis, Shape
 

@@ -7,7 +7,7 @@ from given_targets import left_table, rig_small
 from golden_data import shared
 from message_codes import described, refusal, refused
 from photogram import InputError, formats
-from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
+from photogram.formats.targets import adjusted_project, calibration_of, project_of
 from photogram.targets import read
 
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from message_codes import refusal
 from photogram import Camera, RankError, adjust, formats
 from photogram.cli import app
-from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
+from photogram.formats.targets import adjusted_project, calibration_of, project_of
 from photogram.targets import Board, Calibrated, Calibration, Corners, cross_validate, read, simulate_corners
 from photogram.targets.motion import errors_of_speeds, moving
 from photogram.targets.vision import of_vectors

@@ -11,7 +11,7 @@ from test_splined_adjustment import lens
 from golden_data import shared
 from message_codes import refusal
 from photogram import formats
-from photogram.formats.targets.calibrations import adjusted_project, calibration_of
+from photogram.formats.targets import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, cross_validate, projection_uncertainty, read
 from photogram.targets.mrcal import mrcal_models
 from photogram.targets.output import rig_of

@@ -249,7 +249,7 @@ def result_at(
 ) -> tuple[Result, Project | None]:
     """Return a saved result, or the adjusted project of a path."""
     from photogram import Result, read_result
-    from photogram.formats.results import is_result
+    from photogram.formats.recognition import results as is_result
 
     if is_result(path):
         if replace(reading, sd={}) != ReadOptions() or choices or unknowns != Unknowns() or keep_all:

@@ -189,7 +189,7 @@ def _read(
     if not (path / "project.toml").exists():
         return read(path, options, progress=progress)
     from photogram import formats
-    from photogram.formats.targets.calibrations import calibration_of
+    from photogram.formats.targets import calibration_of
 
     found = calibration_of(formats.read(path))
     names = ("shape", "sd0", "regularise", "offsets", "sync")
@@ -231,7 +231,7 @@ def _files(found: Calibrated, formats: Sequence[str], need: float | None) -> dic
     """Return all files of the output folder, also the cameras for other programs."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
-    from photogram.formats.targets.calibrations import adjusted_project
+    from photogram.formats.targets import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets import camera_files

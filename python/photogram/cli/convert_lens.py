@@ -84,7 +84,7 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
     """Return a camera that counts from the centre of the first pixel, and its size."""
     from photogram.errors import InputError
     from photogram.formats import read
-    from photogram.formats.targets.calibrations import MIDDLE, shifted
+    from photogram.formats.targets import MIDDLE, shifted
     from photogram.targets.mrcal import read_lens
 
     if path.suffix == ".cameramodel":

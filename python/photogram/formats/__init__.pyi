@@ -5,6 +5,7 @@ from .crs import from_frame as from_frame
 from .crs import to_frame as to_frame
 from .crs_results import Placed as Placed
 from .crs_results import placed as placed
+from .format import FORMATS as FORMATS
 from .format import Format as Format
 from .metadata.merged import Metadata as Metadata
 from .metadata.merged import PhotoRecord as PhotoRecord
@@ -15,7 +16,6 @@ from .micmac import write_marks as write_marks
 from .project import Frame as Frame
 from .project import Project as Project
 from .read_options import ReadOptions as ReadOptions
-from .registry import FORMATS as FORMATS
 from .registry import adjusting as adjusting
 from .registry import cannot_hold as cannot_hold
 from .registry import read as read

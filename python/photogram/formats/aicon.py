@@ -13,15 +13,14 @@ blanks, one record per line, `#` before comments; millimetres and radians.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.cards import Card, cards, has_suffix, one_file
-from photogram.formats.format import Format
+from photogram.formats.cards import Card, cards, one_file
+from photogram.formats.format import FORMATS
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import at_place
@@ -31,7 +30,6 @@ from photogram.network.cameras import Camera
 from photogram.network.observations import Distance
 from photogram.words import Phrase, phrase
 
-TITLE = "AICON block"
 IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
 _NOT_ORIENTED = 1
 
@@ -40,7 +38,7 @@ class _Reader(BlockBuilder):
     """A block, with the photos and points that are inactive in the files."""
 
     def __init__(self, path: Path, control_sd: tuple[float, ...] | None) -> None:
-        super().__init__(path, TITLE)
+        super().__init__(path, FORMATS["aicon"].title)
         self.control_sd = control_sd
         self.inactive: dict[str, set[str]] = {"photos": set(), "points": set()}
 
@@ -168,6 +166,3 @@ def _bars(path: Path, block: _Reader) -> None:
         if not (length > 0 and sd > 0) or first == second:
             raise card.place.error(phrase("aicon.length"))
         block.observations.append(Distance(first, second, length, sd))
-
-
-FORMAT = Format(name="aicon", title=TITLE, recognises=partial(has_suffix, IMAGES), read=read)

@@ -59,11 +59,6 @@ def cards(path: Path) -> Iterator[Card]:
         yield Card(Place(path, record, line))
 
 
-def has_suffix(suffix: str, path: Path) -> bool:
-    """Return whether a file, or a file in a folder, has a suffix in any case."""
-    return any(each.suffix.lower() == suffix for each in (path.iterdir() if path.is_dir() else (path,)))
-
-
 def one_file(path: Path, suffix: str) -> Path | None:
     """Return the only file of a suffix in a folder, in any case; None without."""
     found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]

@@ -6,7 +6,6 @@ the Large" use numbers as names.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,10 +16,11 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.format import Format
+from photogram.formats.format import FORMATS
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
+from photogram.formats.recognition import bundle_of
 from photogram.io.files import read_lines
 from photogram.io.packed_numbers import pieces
 from photogram.messages import Message
@@ -34,30 +34,14 @@ if TYPE_CHECKING:
 
 FILE, LIST = "bundle.out", "list.txt"
 PROBLEM = "problem.txt"
-_FIRST = re.compile(
-    rb"[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+[0-9]+[ \t\r]*\n[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+\S+[ \t]+\S+"
-)
-"""Start of a problem: three counts, and the first image."""
 
 
-def _begin(path: Path) -> bytes:
-    """Return the unpacked start of a file; empty if it is not a readable file."""
-    try:
-        return next(pieces(path), b"") if path.is_file() else b""
-    except InputError:
-        return b""
-
-
-def _place(path: Path) -> Path:
-    return path / FILE if path.is_dir() else path
-
-
-def _read_bundler(path: Path, options: ReadOptions) -> Project:
+def read_bundler(path: Path, options: ReadOptions) -> Project:
     """Read a Bundle file of version 0.3, and the list of photos in its folder."""
     from photogram.collection.formats import bundler
 
     del options
-    place = _place(path)
+    place = bundle_of(path)
     found = bundler.FORMAT.read(place, pieces(place))
     count = len(found.photo_parameters)
     names = [str(row) for row in range(count)]
@@ -70,10 +54,10 @@ def _read_bundler(path: Path, options: ReadOptions) -> Project:
         if bad := [line for row, line in enumerate(lines) if last[line] != row or not line.isprintable()]:
             raise InputError(phrase("bundler.names", name=bad[0]), file=beside)
         names = lines
-    return project_of(found, place, BUNDLER.title, names)
+    return project_of(found, place, FORMATS["bundler"].title, names)
 
 
-def _write_bundler(project: Project) -> Mapping[str, bytes]:
+def write_bundler(project: Project) -> Mapping[str, bytes]:
     """Return `bundle.out` and `list.txt`."""
     from photogram.collection.formats import bundler
 
@@ -81,16 +65,19 @@ def _write_bundler(project: Project) -> Mapping[str, bytes]:
     return {FILE: bundler.FORMAT.to_bytes(found), LIST: "".join(f"{name}\n" for name in names).encode()}
 
 
-def _read_bal(path: Path, options: ReadOptions) -> Project:
+def read_bal(path: Path, options: ReadOptions) -> Project:
     """Read a problem, optionally packed; photos and points have numbers."""
     from photogram.collection.formats import bal
 
     del options
     found = bal.FORMAT.read(path, pieces(path))
-    return project_of(found, path, BAL.title, [str(row) for row in range(len(found.photo_parameters))])
+    return project_of(
+        found, path, FORMATS["bal"].title, [str(row) for row in range(len(found.photo_parameters))]
+    )
 
 
-def _write_bal(project: Project) -> Mapping[str, bytes]:
+def write_bal(project: Project) -> Mapping[str, bytes]:
+    """Return the problem."""
     from photogram.collection.formats import bal
 
     return {PROBLEM: bal.FORMAT.to_bytes(collection_of(project)[0])}
@@ -197,27 +184,3 @@ def _moved(
         elif camera.model == "radial" and size is not None:
             found[own] = np.column_stack([found[own, 0] - size[0] / 2, size[1] / 2 - found[own, 1]])
     return found
-
-
-BUNDLER = Format(
-    name="bundler",
-    title="Bundle file",
-    recognises=lambda path: _begin(_place(path)).startswith(b"# Bundle file"),
-    read=_read_bundler,
-    write=_write_bundler,
-    files=(FILE, "*.out"),
-    holds=frozenset({"points", "lenses"}),
-    cannot_hold=cannot_hold,
-    pixels=True,
-)
-BAL = Format(
-    name="bal",
-    title='problem of "Bundle Adjustment in the Large"',
-    recognises=lambda path: _FIRST.match(_begin(path)[:1000]) is not None,
-    read=_read_bal,
-    write=_write_bal,
-    files=(PROBLEM, "problem-*.txt", "*.bal"),
-    holds=frozenset({"points", "lenses"}),
-    cannot_hold=cannot_hold,
-    pixels=True,
-)

@@ -1,28 +1,32 @@
-"""Definition of a format: recognition, reader and writer of its files."""
+"""Formats of projects, as declared in `formats.csv`.
+
+Each row declares a format: the attributes of :class:`Format`, with `MODULE:NAME` of this package for
+functions, `pixels` and `geographic` in the column `coordinates`, and `all` for a format that contains all
+parts of projects. Modules of readers and writers are imported at the first call.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
 
-from photogram.formats.project import Project
-from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.result import Result
-from photogram.words import Phrase
 
-__all__ = ["Format", "later"]
+if TYPE_CHECKING:
+    from photogram.formats.project import Project
+    from photogram.formats.read_options import ReadOptions
+    from photogram.results.result import Result
+    from photogram.words import Phrase
+
+__all__ = ["FORMATS", "Format", "later"]
 
 
-def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that imports its module at the first call."""
-
-    def call(*arguments: Any) -> Any:
-        return getattr(import_module(module), name)(*arguments)
-
-    return call
+def later(name: str) -> Callable[..., Any]:
+    """Return the function `MODULE:NAME` of this package, whose module is imported at the first call."""
+    return lambda *arguments: resolve_name(f"photogram.formats.{name}")(*arguments)
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,8 @@ class Format:
 
     name: str
     title: str
-    recognises: Callable[[Path], bool]
-    read: Callable[[Path, ReadOptions], Project] | None
+    recognises: Callable[[Path], Any] = lambda _: False
+    read: Callable[[Path, ReadOptions], Project] | None = None
     write: Callable[[Project], Mapping[str, bytes]] | None = None
     cannot_hold: Callable[[Project], Sequence[Phrase | str]] = lambda _: ()
     results: Callable[[Project, Result], Mapping[str, bytes]] | None = None
@@ -80,3 +84,22 @@ class Format:
     geographic: bool = False
     adjusting: Callable[[Project, Callable[..., Result]], Callable[..., Result]] | None = None
     holds: frozenset[str] | None = None
+
+
+def _declared() -> Iterator[Format]:
+    text = (Path(__file__).parent / "formats.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        functions = ("recognises", "read", "write", "cannot_hold", "results", "adjusting")
+        yield Format(
+            name=row["name"],
+            title=row["title"],
+            **{name: later(row[name]) for name in functions if row[name]},
+            files=tuple(row["files"].split()),
+            folders=tuple(row["folders"].split()),
+            **dict.fromkeys(row["coordinates"].split(), True),
+            holds=None if row["holds"] == "all" else frozenset(row["holds"].split()),
+        )
+
+
+FORMATS: dict[str, Format] = {each.name: each for each in _declared()}
+"""Formats by name, in the order of the help."""

@@ -9,22 +9,12 @@ import numpy as np
 
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
-from photogram.formats.format import Format
+from photogram.formats.format import FORMATS
 from photogram.formats.project import Frame, Project
 from photogram.formats.read_options import ReadOptions
-from photogram.giant.files import present_files, to_bytes
+from photogram.giant.files import to_bytes
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
-
-TITLE = "GIANT project"
-
-
-def _recognises(path: Path) -> bool:
-    if not path.is_dir():
-        return False
-    present = present_files(path)
-    # Many folders contain files named cameras and images; only GIANT projects have COMMON.
-    return bool(present["COMMON"] and present["IMAGES"])
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -43,7 +33,7 @@ def read(path: Path, options: ReadOptions) -> Project:
     return Project(
         block=block,
         path=path,
-        title=TITLE,
+        title=FORMATS["giant"].title,
         sizes=(None,) * count,
         pixel_mm=(None,) * count,
         starts=np.array(block.point_positions),
@@ -72,14 +62,3 @@ def cannot_hold(project: Project) -> list[Phrase]:
     except InputError as error:
         return [phrase("lost.project", reason=message_of(error))]
     return [phrase("lost.giant-digits")]
-
-
-FORMAT = Format(
-    name="giant",
-    title=TITLE,
-    recognises=_recognises,
-    read=read,
-    write=write,
-    cannot_hold=cannot_hold,
-    geographic=True,
-)

@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.format import Format
+from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, lens_with, named_pixels, sizes_of, to_corner
 from photogram.formats.models import (
     attitude_matrices,
@@ -23,6 +23,7 @@ from photogram.formats.models import (
 )
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
+from photogram.formats.recognition import opensfm
 from photogram.io.files import read_lines
 from photogram.io.json import read_json, to_json
 from photogram.io.numbers import finite_number
@@ -35,7 +36,6 @@ from photogram.network.cameras import Camera
 from photogram.network.observations import Observations, Position
 from photogram.words import Phrase, phrase
 
-TITLE = "OpenSfM reconstruction"
 MODEL, TRACKS = "reconstruction.json", "tracks.csv"
 UNKNOWN_DOP = 15.0  # Metres: default of OpenSfM
 NO_HEIGHT = 1e4  # Metres: standard deviation of heights that are not observed
@@ -44,19 +44,12 @@ _FIRST = 8
 _NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))
 
 
-def place_of(path: Path) -> Path | None:
-    """Return the folder of a path, of `opensfm` in it, or of a model file."""
-    if path.is_file():
-        return path.parent if path.name == MODEL else None
-    return next((each for each in (path, path / "opensfm") if (each / MODEL).is_file()), None)
-
-
 def read(path: Path, options: ReadOptions) -> Project:
     """Read the largest or the requested model of a file, with its tracks."""
-    folder = place_of(path)
+    folder = opensfm(path)
     if folder is None:
         raise InputError(phrase("format.files", name=MODEL), file=path)
-    block = BlockBuilder(folder / MODEL, TITLE)
+    block = BlockBuilder(folder / MODEL, FORMATS["opensfm"].title)
     messages = block.messages
     model = _model(read_json(folder / MODEL), options.model, messages)
     block.frame = _frame(model)
@@ -330,16 +323,3 @@ def _tracks_file(project: Project, sizes: Any, which: list[int], shots: set[int]
         name = block.photo_ids[photo].replace("\t", " ")
         lines.append(f"{name}\t{block.point_ids[point]}\t{feature}\t{x!r}\t{y!r}\t0.0004\t0\t0\t0\t-1\t-1")
     return ("\n".join(lines) + "\n").encode()
-
-
-FORMAT = Format(
-    name="opensfm",
-    title=TITLE,
-    recognises=lambda path: place_of(path) is not None,
-    read=read,
-    write=write,
-    files=(MODEL,),
-    holds=frozenset({"names", "points", "frame", "topocentric", "lenses", "shared-cameras", "gnss"}),
-    cannot_hold=cannot_hold,
-    pixels=True,
-)

@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.columns import PLAIN, in_units
-from photogram.formats.format import Format
+from photogram.formats.format import FORMATS
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.models import known_cameras
 from photogram.formats.plain.cameras import read_cameras
@@ -29,7 +29,6 @@ from photogram.io.delimited import read_columns, read_head
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
-TITLE = "table of pixels"
 FILE = "images.csv"
 CAMERAS = "cameras.csv"
 _NEEDED = ("photo", "point", "column", "row")
@@ -50,9 +49,8 @@ def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
     return found + 0.5 if pixel_origin == "center" else found
 
 
-def _recognises(path: Path) -> bool:
-    if not path.is_file() or path.suffix.lower() not in (".csv", ".tsv", ".txt"):
-        return False
+def has_pixels(path: Path) -> bool:
+    """Return whether the header of a table has the columns of photos, points and pixels."""
     spelling = partial(PLAIN.spelled, _KNOWN)
     try:
         return set(_NEEDED) <= set(spelling(read_head(path, _NEEDED, spelling)))
@@ -64,7 +62,7 @@ def read(path: Path, options: ReadOptions) -> Project:
     """Read a table; cameras are in `--camera FILE`, selected by a column `camera`."""
     if options.cameras is None:
         raise InputError(phrase("format.cameras"), file=path)
-    block = BlockBuilder(path, TITLE)
+    block = BlockBuilder(path, FORMATS["pixels"].title)
     messages = block.messages
     table = pixel_table(path, messages)
     cameras = read_cameras(Tables(Settings(path, tables={"cameras": options.cameras}), messages))
@@ -128,14 +126,6 @@ def write(project: Project) -> Mapping[str, bytes]:
     }
 
 
-FORMAT = Format(
-    name="pixels",
-    title=TITLE,
-    recognises=_recognises,
-    read=read,
-    write=write,
-    files=(FILE, "*.csv"),
-    cannot_hold=lambda _: [phrase("lost.all-but-images")],
-    pixels=True,
-    geographic=True,
-)
+def cannot_hold(_: Project) -> list[Phrase]:
+    """Return that all but the observations and cameras is lost."""
+    return [phrase("lost.all-but-images")]

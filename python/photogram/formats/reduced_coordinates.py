@@ -7,7 +7,6 @@ PATB has an image file in micrometres, an orientation with matrices, and control
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,8 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.cards import END, Card, cards, has_suffix, one_file
-from photogram.formats.format import Format
+from photogram.formats.cards import END, Card, cards, one_file
+from photogram.formats.format import FORMATS
 from photogram.formats.images import checked_rotation
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras, known_points
 from photogram.formats.names import numbered
@@ -43,7 +42,6 @@ BETTER = 3.0  # Smallest ratio of misfits for which rotations are transposed
 LEAST, MOST = 2.0, 3000.0  # Smallest and largest principal distance of cameras, millimetres
 NOMINAL = 100.0
 """Principal distance in millimetres for an unknown pixel size; it does not affect the rays."""
-HOLDS = frozenset({"names", "shared-cameras", "control"})
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}
 LARGEST = 1e4  # Largest angle, radians
 SIDE = -0.02  # Largest u3 of unit directions that a perspective camera can image
@@ -218,19 +216,18 @@ def by_photo(project: Project, reduced: ReducedImages) -> Sequence[list[tuple[st
     return found
 
 
-PATB = "PATB block"
 IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
 MICROMETRES = 1e-3
 DIGITS = 6  # Digits of principal distances in millimetres; files have three of micrometres
 
 
-def _read_patb(path: Path, options: ReadOptions) -> Project:
+def read_patb(path: Path, options: ReadOptions) -> Project:
     """Read the image file, and orientation, control and names if present."""
     folder = path if path.is_dir() else path.parent
     images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
         raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
-    block = ReducedBuilder(images, PATB, options, _names(folder / NAMES))
+    block = ReducedBuilder(images, FORMATS["patb"].title, options, _names(folder / NAMES))
 
     def add(photo: str, card: Card) -> None:
         c = card.number(1, "the principal distance") * MICROMETRES
@@ -287,14 +284,15 @@ def _orientation(path: Path, block: ReducedBuilder) -> None:
         block.pose(block.name(head), centre, matrix, head.place)
 
 
-def _lost_in_patb(project: Project) -> list[Phrase]:
+def lost_in_patb(project: Project) -> list[Phrase]:
+    """Return parts of a project that the files of PATB cannot contain."""
     found = [*lost_of_reduced(project, reduced_images(project, DIGITS)), phrase("lost.patb-digits")]
     if any((held[0] != held[1]) for _, held in given_control(project).values()):
         found.append(phrase("lost.horizontal-control"))
     return found
 
 
-def _write_patb(project: Project) -> Mapping[str, bytes]:
+def write_patb(project: Project) -> Mapping[str, bytes]:
     """Return image file, orientation, control, and names if they are not numbers."""
     block, reduced = project.block, reduced_images(project, DIGITS)
     numbers = numbered([*block.photo_ids, *block.point_ids])
@@ -332,11 +330,10 @@ def _oriented(project: Project, reduced: ReducedImages, numbers: Mapping[str, in
     return lines
 
 
-BINGO = "BINGO block"
 IMAGE_DAT, ORIENTATION_DAT, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
 
 
-def _read_bingo(path: Path, options: ReadOptions) -> Project:
+def read_bingo(path: Path, options: ReadOptions) -> Project:
     """Read `image.dat` and the orientation; the default angle unit is gon."""
     folder = path if path.is_dir() else path.parent
     images = folder / IMAGE_DAT if path.is_dir() else path
@@ -345,7 +342,7 @@ def _read_bingo(path: Path, options: ReadOptions) -> Project:
         raise InputError(phrase("format.cameras"), file=images)
     given = read_cameras(Tables(Settings(images, tables={"cameras": table}, image="mm"), []))
     known = {each.name: each for each in given.cameras}
-    block = ReducedBuilder(images, BINGO, options)
+    block = ReducedBuilder(images, FORMATS["bingo"].title, options)
 
     def add(photo: str, card: Card) -> None:
         camera = card.words[1] if len(card.words) > 1 else ""
@@ -363,7 +360,8 @@ def _read_bingo(path: Path, options: ReadOptions) -> Project:
     return block.reduced_project("mm")
 
 
-def _lost_in_bingo(project: Project) -> list[Phrase]:
+def lost_in_bingo(project: Project) -> list[Phrase]:
+    """Return parts of a project that the files of BINGO cannot contain."""
     found = lost_of_reduced(project, reduced_images(project))
     if any(name != word for name, word in _words(project).items()):
         found.append(phrase("lost.blanks"))
@@ -387,7 +385,7 @@ def _words(project: Project) -> dict[str, str]:
     return found
 
 
-def _write_bingo(project: Project) -> Mapping[str, bytes]:
+def write_bingo(project: Project) -> Mapping[str, bytes]:
     """Return images, orientation, and tables of cameras and of control."""
     block, reduced, words = project.block, reduced_images(project), _words(project)
     lines: list[str] = []
@@ -408,25 +406,3 @@ def _write_bingo(project: Project) -> Mapping[str, bytes]:
     if table := control_table(project):
         files["control.csv"] = csv_text({**table, "point": [words[name] for name in table["point"]]})
     return files
-
-
-PATB_FORMAT = Format(
-    name="patb",
-    title=PATB,
-    recognises=partial(has_suffix, IMAGES),
-    read=_read_patb,
-    write=_write_patb,
-    files=(f"block{IMAGES}", f"*{IMAGES}"),
-    holds=HOLDS,
-    cannot_hold=_lost_in_patb,
-)
-BINGO_FORMAT = Format(
-    name="bingo",
-    title=BINGO,
-    recognises=lambda path: (path / IMAGE_DAT).is_file() if path.is_dir() else path.name.lower() == IMAGE_DAT,
-    read=_read_bingo,
-    write=_write_bingo,
-    files=(IMAGE_DAT,),
-    holds=HOLDS,
-    cannot_hold=_lost_in_bingo,
-)

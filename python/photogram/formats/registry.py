@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Any
 
 from photogram.arguments.fields import options_of
 from photogram.errors import InputError, PhotogramError, message_of
-from photogram.formats.format import Format, later
+from photogram.formats.format import FORMATS, Format, later
 from photogram.formats.models import (
     check_images,
     in_pixels,
@@ -42,36 +41,9 @@ __all__ = [
     "to_files",
 ]
 
-FORMATS: dict[str, Format] = {
-    each.name: each
-    for each in (
-        resolve_name(f"photogram.formats.{home}")
-        for home in (
-            "plain:FORMAT",
-            "colmap.models:FORMAT",
-            "colmap.models:TEXT",
-            "opensfm:FORMAT",
-            "blocks_exchange:FORMAT",
-            "agisoft:FORMAT",
-            "collections:BUNDLER",
-            "collections:BAL",
-            "pixels:FORMAT",
-            "reduced_coordinates:PATB_FORMAT",
-            "reduced_coordinates:BINGO_FORMAT",
-            "dbat.script:FORMAT",
-            "aicon:FORMAT",
-            "giant:FORMAT",
-            "isis:FORMAT",
-            "targets:FORMAT",
-            "results:FORMAT",
-        )
-    )
-}
-"""Formats by name, in the order of the help."""
-
 
 def _written(name: str, project: Project) -> Mapping[str, bytes]:
-    from photogram.formats.targets.calibrations import rig_of_project
+    from photogram.formats.targets import rig_of_project
     from photogram.targets.camera_formats import CAMERA_FORMATS
 
     return CAMERA_FORMATS[name](rig_of_project(project))
@@ -82,10 +54,8 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
         name: Format(
             name=name,
             title=title,
-            recognises=lambda _: False,
-            read=None,
             write=partial(_written, name),
-            cannot_hold=later("photogram.formats.targets.calibrations", "lost_beside_cameras"),
+            cannot_hold=later("targets:lost_beside_cameras"),
             pixels=True,
             geographic=True,
         )

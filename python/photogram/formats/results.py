@@ -12,7 +12,7 @@ import numpy as np
 from photogram.adjustment.options import AdjustOptions, DatumName
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
-from photogram.formats.format import Format
+from photogram.formats.format import FORMATS
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.results.result import Result
@@ -22,9 +22,7 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.collection.result import AdjustedCollection
 
-__all__ = ["FORMAT", "TITLE", "is_result", "read_result"]
-
-TITLE = "result as data (Parquet)"
+__all__ = ["read_project", "read_result"]
 
 
 def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
@@ -70,12 +68,7 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
         raise InputError(phrase("results.contradiction", reason=str(error)), file=folder / SUMMARY) from None
 
 
-def is_result(path: Path) -> bool:
-    """Return whether a folder contains a result."""
-    return path.is_dir() and (path / SUMMARY).is_file() and (path / "state.parquet").is_file()
-
-
-def _project(path: Path, options: ReadOptions) -> Project:
+def read_project(path: Path, options: ReadOptions) -> Project:
     """Read the adjusted block of a result, with its adjustment settings."""
     del options
     result = read_result(path)
@@ -88,7 +81,7 @@ def _project(path: Path, options: ReadOptions) -> Project:
     return Project(
         block=result.restarted(),
         path=path,
-        title=TITLE,
+        title=FORMATS["results"].title,
         sizes=(None,) * count,
         pixel_mm=(None,) * count,
         starts=np.array(result.point_positions),
@@ -100,6 +93,3 @@ def _project(path: Path, options: ReadOptions) -> Project:
         ),
         features={} if result.features is None else result.features.definitions,
     )
-
-
-FORMAT = Format(name="results", title=TITLE, recognises=is_result, read=_project)

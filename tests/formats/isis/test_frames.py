@@ -8,10 +8,10 @@ import pytest
 import support_data
 
 from photogram import adjust, formats
-from photogram.formats import ReadOptions
+from photogram.formats import FORMATS, ReadOptions
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
-from photogram.formats.isis import FORMAT, ControlMeasures, ControlNetwork, ControlPoints, network_text
+from photogram.formats.isis import ControlMeasures, ControlNetwork, ControlPoints, network_text
 from photogram.formats.isis.outcome import Outcome, contents_of
 
 
@@ -73,7 +73,7 @@ def test_pointing_is_found_by_fixed_points(tmp_path, kind):
     # The records of the pair are exact; priors of a degree hardly pull.
     assert np.abs(outcome.residuals).max() < 1e-4
     assert len(result.block.photo_ids) == (50 if kind == "PUSH_FRAME" else 2)
-    files = FORMAT.results(adjusted(project, result), result)
+    files = FORMATS["isis"].results(adjusted(project, result), result)
     for k, document in enumerate(documents):
         found = np.array(json.loads(files[f"support/{k}.json"])["instrument_pointing"]["quaternions"])
         truth = np.array(document["instrument_pointing"]["quaternions"])
@@ -91,5 +91,5 @@ def test_cubes_are_adjusted_and_stay_as_they_are(tmp_path):
     project = formats.read(path, ReadOptions(cubes=tmp_path / "images.lis", jigsaw=words))
     result = adjust(project.block)
     assert result.converged
-    files = FORMAT.results(adjusted(project, result), result)
+    files = FORMATS["isis"].results(adjusted(project, result), result)
     assert set(files) == {"images.csv", "points.csv", "residuals.csv", "bundleout.txt", "own.net"}

@@ -10,10 +10,11 @@ import pytest
 
 from photogram import adjust
 from photogram.comparator import Place
+from photogram.formats import FORMATS
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.isd import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
-from photogram.formats.isis import FORMAT, binary_network, read_network
+from photogram.formats.isis import binary_network, read_network
 from photogram.formats.isis.assembling import full_matrices
 from photogram.formats.isis.network import is_binary
 from photogram.formats.isis.outcome import Outcome, contents_of
@@ -30,7 +31,7 @@ WAYS = ("", " OVEREXISTING=yes OVERHERMITE=yes")
 def written(project):
     """Adjust a project, and return the result with the files beside it."""
     result = adjust(project.block)
-    return result, FORMAT.results(adjusted(project, result), result)
+    return result, FORMATS["isis"].results(adjusted(project, result), result)
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +149,7 @@ def test_measures_that_were_taken_out_are_rejected(pair):
     outcome = Outcome(contents_of(project.details), result)
     # A point with one ray left is none.
     assert np.flatnonzero(outcome.rejected).tolist() == [10, 11]
-    files = FORMAT.results(adjusted(project, result), result)
+    files = FORMATS["isis"].results(adjusted(project, result), result)
     _, found = rows(files["residuals.csv"], 3)
     assert [each[10] for each in found] == [""] * 94 + ["*"] * 2
     assert found[-1][0] == "point_05"

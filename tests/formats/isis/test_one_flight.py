@@ -9,10 +9,9 @@ from test_frames import moved, network
 
 from message_codes import refused
 from photogram import adjust, formats
-from photogram.formats import ReadOptions
+from photogram.formats import FORMATS, ReadOptions
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
-from photogram.formats.isis import FORMAT
 from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.formats.isis.solving import observation_number, one_flight
 
@@ -91,7 +90,7 @@ def test_images_of_one_observation_share_their_coefficients(observed, words):
     # Of one image: angles of degree 0 are weighted, all others are free.
     unknown = 3 if "angles" in words else 9
     assert result.degrees_of_freedom == 2 * len(own.block.image_xy) + 3 - unknown
-    files = FORMAT.results(adjusted(own, result), result)
+    files = FORMATS["isis"].results(adjusted(own, result), result)
     rows = files["images.csv"].decode().splitlines()[2:]
     assert len(rows) == 2
     # Behind the file, its residuals and where it was in the middle of its table.

@@ -14,16 +14,17 @@ from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder, FrameOf, Rig
 from photogram.formats.colmap import content
 from photogram.formats.colmap.files import binary_files, read_model, text_files
-from photogram.formats.format import Format
+from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras
 from photogram.formats.names import NAMES, NamedValues, names_file, numbered, renamed
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
+from photogram.formats.recognition import colmap
 from photogram.io.json import to_json
 from photogram.io.parquet import packed
 from photogram.io.places import Place, at_place
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
@@ -33,33 +34,21 @@ from photogram.network.unknowns import Sensor
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase
 
-TITLE = "COLMAP model"
 MAX_DIFFERENCE, NORMALISED = 1e-2, 1e-6
 """Differences of the length of a quaternion from 1: the largest, and the largest without a remark."""
-
-
-def place_of(path: Path) -> Path | None:
-    """Return the folder of a model: a path itself, or `sparse/0` or `sparse` in it."""
-    for folder in (path, path / "sparse" / "0", path / "sparse"):
-        if any(
-            (folder / f"cameras{end}").is_file() and (folder / f"images{end}").is_file()
-            for end in (".bin", ".txt")
-        ):
-            return folder
-    return None
 
 
 def read(path: Path, options: ReadOptions) -> Project:
     """Read a model."""
     del options
-    folder = place_of(path)
+    folder = colmap(path)
     if folder is None:
         raise InputError(phrase("colmap.files"), file=path)
     return renamed(_project(read_model(folder), path), folder / NAMES)
 
 
 def _project(model: content.Model, path: Path) -> Project:
-    block, images = BlockBuilder(path, TITLE), model.images
+    block, images = BlockBuilder(path, FORMATS["colmap"].title), model.images
     for each in model.cameras:
         block.camera(_camera(each), (each.width, each.height), key=each.number, place=each.place)
     for image in images:
@@ -440,28 +429,3 @@ def _centre_and_rotation(result: Result) -> Floats:
     jacobian[3:, 3:] = -Y_DOWN
     found: Floats = jacobian @ result.photo_rotation_covariances @ jacobian.T
     return found
-
-
-HOLDS = frozenset({"names", "points", "lenses", "shared-cameras", "rigs"})
-FORMAT = Format(
-    name="colmap",
-    title=TITLE,
-    recognises=lambda path: path.is_dir() and place_of(path) is not None,
-    read=read,
-    write=write,
-    holds=HOLDS,
-    cannot_hold=cannot_hold,
-    pixels=True,
-    results=covariance_files,
-    folders=("sparse",),
-)
-TEXT = replace(
-    FORMAT,
-    name="colmap_text",
-    title=f"{TITLE} as text",
-    recognises=lambda _: False,
-    write=write_as_text,
-    results=None,
-    folders=(),
-)
-"""Formats for writing only: text is read and recognised by the other format."""

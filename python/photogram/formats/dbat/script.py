@@ -21,7 +21,6 @@ from photogram.formats.dbat.tables import (
     untitled,
     whole_numbers,
 )
-from photogram.formats.format import Format
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
@@ -338,7 +337,8 @@ def _the_file(path: Path) -> Path | None:
     return None
 
 
-def _recognises(path: Path) -> bool:
+def recognises(path: Path) -> bool:
+    """Return whether a path is a script, an export or tables."""
     if path.is_dir():
         return is_folder(path) or _the_file(path) is not None
     return _is_script(path) or is_export(path) or is_measurements(path)
@@ -355,6 +355,3 @@ def read(path: Path, options: ReadOptions) -> Project:
     else:
         take = read_measurements if is_measurements(path) else read_export
     return take(path, options).dbat_project(options)
-
-
-FORMAT = Format(name="dbat", title="PhotoModeler or DBAT block", recognises=_recognises, read=read)

@@ -5,5 +5,3 @@ from .network import ControlPoints as ControlPoints
 from .network import read_network as read_network
 from .writing import binary_network as binary_network
 from .writing import network_text as network_text
-
-TITLE: str

@@ -13,7 +13,7 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import filled_lines
 from photogram.formats.csm.cubes import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.isis import TITLE
+from photogram.formats.format import FORMATS
 from photogram.formats.isis.network import ControlNetwork, read_network
 from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.solving import Settings, observations_of, one_flight, read_settings, solving
@@ -216,7 +216,7 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     axes = Cartesian(spheroid)
     centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
     matrices = axes.to_local(np.array([matrix for _, matrix in found]), centres)
-    block = BlockBuilder(contents.path, TITLE)
+    block = BlockBuilder(contents.path, FORMATS["isis"].title)
     block.messages += messages
     of_photos = list[int]()
     for image in contents.different:

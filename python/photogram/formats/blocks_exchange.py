@@ -12,8 +12,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.blocks_exchange import FILE, TITLE
 from photogram.formats.builder import BlockBuilder
+from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, lens_with, sizes_of, to_corner
 from photogram.formats.models import attitude_matrices, known_cameras, known_points
 from photogram.formats.project import Frame, Project, Size
@@ -64,7 +64,7 @@ class _Reader:
     """The contents of a file in the order of reading."""
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
-        self.block, self.options = BlockBuilder(path, TITLE), options
+        self.block, self.options = BlockBuilder(path, FORMATS["blocks_exchange"].title), options
         self.systems: dict[str, str] = {}
         self.groups: list[_Group] = []
         self.positions = 0  # Number of observed positions
@@ -352,7 +352,7 @@ def write(project: Project) -> Mapping[str, bytes]:
             lines += _written_photo(project, photo, rotations[photo].tolist(), gnss)
         lines.append("</Photogroup>")
     lines += ["</Photogroups>", *_points(project), "</Block>", "</BlocksExchange>", ""]
-    return {FILE: "\n".join(lines).encode()}
+    return {FORMATS["blocks_exchange"].files[0]: "\n".join(lines).encode()}
 
 
 def _text(text: str) -> str:

@@ -9,10 +9,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.format import FORMATS
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES
 from photogram.formats.project import Project, Unused
 from photogram.formats.read_options import ReadOptions
-from photogram.formats.targets import TITLE
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -58,7 +58,7 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
     return Project(
         block=block,
         path=path or Path("corners"),
-        title=TITLE,
+        title=FORMATS["targets"].title,
         sizes=tuple(corners.sizes),
         pixel_mm=(None,) * len(calibration.cameras),
         starts=np.asarray(block.point_positions),

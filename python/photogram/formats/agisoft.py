@@ -11,10 +11,10 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.formats.agisoft import FILE, TITLE
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.crs import GEOCENTRIC as EARTH
 from photogram.formats.crs import GEOGRAPHIC
+from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, known_size, lens_with, to_corner
 from photogram.formats.models import (
     KnownPoints,
@@ -50,7 +50,7 @@ class _Similarity(NamedTuple):
 def read(path: Path, options: ReadOptions) -> Project:
     """Read the first or the requested chunk of a document."""
     root = read_stream(path, {}, "document")
-    block = BlockBuilder(path, TITLE)
+    block = BlockBuilder(path, FORMATS["agisoft"].title)
     block.remarks_on_systems = False  # Metashape defines heights of its systems
     block.lacks.append(Phrase("read.ties"))
     chunks = [*root.all("chunk"), *_members(root, "chunks", "chunk")]
@@ -317,7 +317,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         "</document>",
         "",
     ]
-    return {FILE: "\n".join(lines).encode()}
+    return {FORMATS["agisoft"].files[0]: "\n".join(lines).encode()}
 
 
 @dataclass(frozen=True)
