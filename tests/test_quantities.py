@@ -9,7 +9,7 @@ import pytest
 
 from photogram import InputError, adjust, formats
 from photogram.cli.console import SHOWN, print_document
-from photogram.formats.adjusted import excel_file, table_files
+from photogram.formats.results import excel_file, table_files
 from photogram.io import json
 from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES

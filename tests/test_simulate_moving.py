@@ -30,7 +30,7 @@ from photogram import (
     simulate,
 )
 from photogram.adjustment.prediction import at_adjusted
-from photogram.formats.self_check import agreement
+from photogram.formats.description import agreement
 from photogram.network import LineScanner, Polynomial, RollingShutter, Spline, Trajectory
 from photogram.network.projecting import projected_images
 

@@ -56,7 +56,7 @@ def watched() -> Clock:
     clock.watch(after_adjustment, "diagnosed", "verdict")
     # A property that is kept when it is first read: what computes it is watched.
     clock.watch(vars(Judged)["verdict"], "func", "verdict")
-    clock.watch(import_module("photogram.formats.adjusted"), "project_files", "tables")
+    clock.watch(import_module("photogram.formats.results"), "project_files", "tables")
     clock.watch(Job, "write", "tables")
     clock.watch(import_module("photogram.show.forms"), "text", "report")
     clock.watch(Documents, "page", "page with pictures")

@@ -10,7 +10,7 @@ import pytest
 from message_codes import refused
 from photogram import InputError, adjust
 from photogram.formats import Project, read, to_files
-from photogram.formats.adjusted import adjusted
+from photogram.formats.results import adjusted
 from photogram.network import Fiducial, KnownFilm
 from test_film import project
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from photogram import Attitudes, Result, adjust, diagnose
 from photogram.cli import app
 from photogram.formats import ReadOptions, read, to_files
-from photogram.formats.adjusted import table_files
+from photogram.formats.results import table_files
 from photogram.network.film_reduction import as_seen, camera_images
 
 ARCHIVE = files("photogram") / "examples" / "archive"

@@ -10,7 +10,7 @@ from test_plain_project import EXAMPLE, written
 from message_codes import fields_of, refused
 from photogram import Attitudes, Camera, InputError, adjust, formats
 from photogram.formats import Frame, supplements
-from photogram.formats.self_check import agreement
+from photogram.formats.description import agreement
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 

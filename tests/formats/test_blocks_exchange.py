@@ -10,7 +10,7 @@ from test_plain_project import EXAMPLE, written
 
 from message_codes import refused
 from photogram import Attitudes, adjust, formats
-from photogram.formats.self_check import agreement
+from photogram.formats.description import agreement
 from photogram.words import option_sd
 
 FILES = ("matrix_pixels_ydown_v2.1.xml", "angles_millimetres_yup_v3.2.xml")

@@ -9,7 +9,7 @@ from test_plain_project import EXAMPLE, written
 from message_codes import has_code, refused
 from photogram import InputError, adjust, formats
 from photogram.formats import ReadOptions
-from photogram.formats.self_check import agreement
+from photogram.formats.description import agreement
 
 GALVESTON = EXAMPLE.parent / "galveston"
 

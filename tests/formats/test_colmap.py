@@ -21,7 +21,7 @@ from test_plain_project import EXAMPLE, written
 from message_codes import refused
 from photogram import Attitudes, Camera, InnerConstraints, adjust, formats
 from photogram.formats.colmap.content import MODELS
-from photogram.formats.self_check import agreement
+from photogram.formats.description import agreement
 
 
 @pytest.mark.parametrize("dress", ["text", "text_legacy", "binary"])
@@ -286,9 +286,9 @@ def pycolmap():
 
 def test_the_package_has_the_models_in_this_order(pycolmap):
     own = {str(name): int(model) for name, model in pycolmap.CameraModelId.__members__.items()}
-    for number, (name, count) in enumerate(MODELS.items()):
+    for number, (name, parameters) in enumerate(MODELS.items()):
         assert own[name] == number
-        assert len(pycolmap.Camera.create_from_model_name(1, name, 500.0, 1000, 800).params) == count
+        assert len(pycolmap.Camera.create_from_model_name(1, name, 500.0, 1000, 800).params) == len(parameters)
 
 
 @pytest.mark.parametrize("target", ["colmap", "colmap_text"])

@@ -11,7 +11,7 @@ from damaged import check_damaged
 from message_codes import fields_of, refused
 from photogram import Attitudes, formats
 from photogram.formats import ReadOptions
-from photogram.formats.self_check import agreement
+from photogram.formats.description import agreement
 from test_roma import read as read_roma
 
 

@@ -23,7 +23,7 @@ from message_codes import fields_of, raises, refused
 from photogram import InputError, Position, adjust, formats
 from photogram.formats import supplements
 from photogram.formats.names import with_names
-from photogram.formats.self_check import agreement
+from photogram.formats.description import agreement
 
 
 def only(place, tracks="tracks.csv"):

@@ -58,7 +58,7 @@ def adjust(
     and all other observations (standard deviations, redundancy numbers, test values), and the adjusted
     project.
     """
-    from photogram.formats.adjusted import project_files
+    from photogram.formats.results import project_files
     from photogram.formats.description import described
 
     if not statement:

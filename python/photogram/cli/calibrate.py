@@ -230,7 +230,7 @@ def _appraised(
 def _files(found: Calibrated, formats: Sequence[str], need: float | None) -> dict[str, bytes]:
     """Return all files of the output folder, also the cameras for other programs."""
     from photogram.formats import to_files
-    from photogram.formats.adjusted import table_files
+    from photogram.formats.results import table_files
     from photogram.formats.targets import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame

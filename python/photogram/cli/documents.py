@@ -129,7 +129,7 @@ class Documents:
         if self.parquet is not None:
             files |= {self.parquet / name: content for name, content in result._files().items()}
         if self.xlsx is not None and isinstance(result, Result):
-            from photogram.formats.adjusted import excel_file
+            from photogram.formats.results import excel_file
 
             files[self.xlsx] = excel_file(result)
         if self.map is not None and isinstance(result, Result):

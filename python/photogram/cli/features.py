@@ -63,7 +63,7 @@ def features(
     metrology`.
     """
     from photogram import features as fitted
-    from photogram.formats.adjusted import feature_files
+    from photogram.formats.results import feature_files
     from photogram.results.features import features_members, features_section
     from photogram.show.forms import to_json
     from photogram.show.judgement import judged

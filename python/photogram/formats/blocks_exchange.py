@@ -13,12 +13,12 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
+from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, lens_with, sizes_of, to_corner
 from photogram.formats.models import attitude_matrices, known_cameras, known_points
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
-from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place, image_size, one_word, positive
 from photogram.lazy_dataclasses import dataclass
@@ -194,8 +194,7 @@ def _rotation(element: Element) -> Floats:
         angles = np.radians([[element.number(name) for name in ("Omega", "Phi", "Kappa")]])
         if (most := np.abs(angles).max()) > 1e4:
             raise element.error(phrase("format.angles", most=1e4, unit="rad", value=float(most)))
-        found: Floats = Attitudes.of("omega_phi_kappa", angles).values("matrix_to_photo")[0]
-        return found
+        return np.asarray(Attitudes.of("omega_phi_kappa", angles).values("matrix_to_photo")[0])
     raise element.error(phrase("blocks-exchange.rotation"))
 
 

@@ -113,14 +113,12 @@ def enu_origin(crs: str) -> tuple[float, float, float] | None:
 
 def east_north_up(origin: tuple[float, float, float]) -> Floats:
     """Return (3, 3) rows: east, north and up at a position, geocentric."""
-    found: Floats = local_frames([[*np.radians(origin[1::-1]), 0.0]])[0]
-    return found
+    return np.asarray(local_frames([[*np.radians(origin[1::-1]), 0.0]])[0])
 
 
 def _geocentric_of(origin: tuple[float, float, float]) -> Floats:
     latitude, longitude, height = origin
-    found: Floats = _transformed(GEOGRAPHIC, GEOCENTRIC, np.array([[longitude, latitude, height]]))[0]
-    return found
+    return np.asarray(_transformed(GEOGRAPHIC, GEOCENTRIC, np.array([[longitude, latitude, height]]))[0])
 
 
 def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
@@ -322,5 +320,4 @@ def turn_to_frame(crs: str, xyz: Floats, frame: Frame) -> Floats:
     """Return (n, 3, 3) rotations of local attitudes of a system into a frame."""
     if frame.kind != "topocentric" or frame.origin is None:
         raise InputError(phrase("crs.attitudes", crs=crs, frame=frame.phrase))
-    found: Floats = east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1)
-    return found
+    return np.asarray(east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1))

@@ -41,8 +41,7 @@ def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
     if camera.image_y == "down":
         return corner
     width, height = known_size(camera, size)
-    found: Floats = np.column_stack([corner[:, 0] - width / 2, height / 2 - corner[:, 1]])
-    return found
+    return np.asarray(np.column_stack([corner[:, 0] - width / 2, height / 2 - corner[:, 1]]))
 
 
 def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
@@ -125,8 +124,7 @@ def checked_rotation(place: Failing, matrix: Floats, tolerance: float = 1e-6) ->
     """Return a rotation matrix of a file, orthonormalised; reject other matrices."""
     if not is_rotation(matrix, tolerance):
         raise place.error(phrase("format.rotation"))
-    found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
-    return found
+    return np.asarray(matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2)
 
 
 _TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")

@@ -315,8 +315,7 @@ def in_topocentric(project: Project) -> Project:
     middle = geographic_to_geocentric(origin, spheroid)[0]
 
     def carried(positions: Floats) -> Floats:
-        found: Floats = (geographic_to_geocentric(positions, spheroid) - middle) @ axes.T
-        return found
+        return np.asarray((geographic_to_geocentric(positions, spheroid) - middle) @ axes.T)
 
     def turned(positions: Floats, attitudes: Floats) -> Floats:
         local = axes @ local_frames(positions).transpose(0, 2, 1)

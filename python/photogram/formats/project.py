@@ -139,7 +139,6 @@ class Project(Brief):
 
     def positions(self) -> Floats:
         """Return (n, 3) positions of control and check points, else from the file."""
-        found: Floats = np.where(
-            np.isnan(self.block.point_positions), self.starts, self.block.point_positions
+        return np.asarray(
+            np.where(np.isnan(self.block.point_positions), self.starts, self.block.point_positions)
         )
-        return found

@@ -15,6 +15,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import END, Card, cards, one_file
+from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import checked_rotation
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras, known_points
@@ -25,7 +26,6 @@ from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
-from photogram.formats.self_check import agreement
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.io.numbers import scaled

@@ -11,7 +11,7 @@ import pytest
 from photogram import adjust
 from photogram.comparator import Place
 from photogram.formats import FORMATS
-from photogram.formats.adjusted import adjusted
+from photogram.formats.results import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.isd import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
 from photogram.formats.isis import binary_network, read_network

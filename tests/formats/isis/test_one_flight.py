@@ -10,7 +10,7 @@ from test_frames import moved, network
 from message_codes import refused
 from photogram import adjust, formats
 from photogram.formats import FORMATS, ReadOptions
-from photogram.formats.adjusted import adjusted
+from photogram.formats.results import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.formats.isis.solving import observation_number, one_flight

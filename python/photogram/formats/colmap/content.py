@@ -14,31 +14,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import _photocore
 from photogram.arguments.types import Indices
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field, fields
 
-MODELS: dict[str, int] = {
-    "SIMPLE_PINHOLE": 3,
-    "PINHOLE": 4,
-    "SIMPLE_RADIAL": 4,
-    "RADIAL": 5,
-    "OPENCV": 8,
-    "OPENCV_FISHEYE": 8,
-    "FULL_OPENCV": 12,
-    "FOV": 5,
-    "SIMPLE_RADIAL_FISHEYE": 4,
-    "RADIAL_FISHEYE": 5,
-    "THIN_PRISM_FISHEYE": 12,
-    "RAD_TAN_THIN_PRISM_FISHEYE": 16,
-    "SIMPLE_DIVISION": 4,
-    "DIVISION": 5,
-    "SIMPLE_FISHEYE": 3,
-    "FISHEYE": 4,
-    "EUCM": 6,
-    "EQUIRECTANGULAR": 2,
-}
-"""Names in the order of their numbers, and their number of parameters; camera models have small letters."""
+_NAMES = (
+    "SIMPLE_PINHOLE PINHOLE SIMPLE_RADIAL RADIAL OPENCV OPENCV_FISHEYE FULL_OPENCV FOV SIMPLE_RADIAL_FISHEYE"
+    " RADIAL_FISHEYE THIN_PRISM_FISHEYE RAD_TAN_THIN_PRISM_FISHEYE SIMPLE_DIVISION DIVISION SIMPLE_FISHEYE"
+    " FISHEYE EUCM EQUIRECTANGULAR"
+)
+_KNOWN = dict(_photocore.camera_models())
+MODELS = {name: [own for own, _ in _KNOWN[name.lower()][1]] for name in _NAMES.split()}
+"""Names in the order of their numbers, with their parameters; camera models have small letters."""
 NO_POINT = -1
 CAMERA = "CAMERA"
 SENSORS = (CAMERA, "IMU")  # Types of sensors in the order of their numbers
@@ -88,7 +76,7 @@ class Camera:
     model: str = _form("model", "MODEL")
     width: int = _form("Q", "WIDTH")
     height: int = _form("Q", "HEIGHT")
-    parameters: tuple[float, ...] = _form("d", "parameter", lambda own: MODELS.get(own["model"], 0))
+    parameters: tuple[float, ...] = _form("d", "parameter", lambda own: len(MODELS.get(own["model"], ())))
     place: Place = Place()
 
 

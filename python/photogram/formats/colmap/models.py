@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder, FrameOf, Rig
@@ -78,11 +77,9 @@ def _project(model: content.Model, path: Path) -> Project:
 
 
 def _camera(camera: content.Camera) -> Camera:
-    model = camera.model.lower()
-    names = [name for name, _ in dict(_photocore.camera_models())[model][1]]
-    values = dict(zip(names, camera.parameters, strict=True))
+    values = dict(zip(content.MODELS[camera.model], camera.parameters, strict=True))
     with at_place(camera.place):
-        return Camera(model, values, name=str(camera.number), unit="px")
+        return Camera(camera.model.lower(), values, name=str(camera.number), unit="px")
 
 
 def _check_model(model: content.Model) -> None:
@@ -427,5 +424,4 @@ def _centre_and_rotation(result: Result) -> Floats:
     """
     jacobian = np.eye(6)
     jacobian[3:, 3:] = -Y_DOWN
-    found: Floats = jacobian @ result.photo_rotation_covariances @ jacobian.T
-    return found
+    return np.asarray(jacobian @ result.photo_rotation_covariances @ jacobian.T)

@@ -343,8 +343,7 @@ def matrices_of(settings: Settings, values: Floats) -> Floats:
     to_photo = turned if settings.rotation == "object_to_photo" else turned.transpose(0, 2, 1)
     if settings.photo == "y_down":
         to_photo = Y_DOWN @ to_photo
-    photo_to_object: Floats = to_photo.transpose(0, 2, 1)
-    return photo_to_object
+    return np.asarray(to_photo.transpose(0, 2, 1))
 
 
 def covariances_of(
