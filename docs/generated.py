@@ -4,6 +4,7 @@ Lines of pages that are replaced:
 
 * `<!-- generated: columns TABLE [FIRST LAST] -->`: all columns of a table of the plain project, or some;
 * `<!-- generated: headings KIND ... -->`: the words of some kinds of headings, by their meaning;
+* `<!-- generated: jigsaw [otherwise] -->`: the settings of jigsaw, or those that photogram replaces;
 * `<!-- generated: keys -->`: the keys of `project.toml` by section;
 * `<!-- generated: commands -->`: all commands with their options;
 * `<!-- generated: verdicts -->`: all verdicts with their exit codes and next steps;
@@ -121,6 +122,19 @@ def headings(kinds: str) -> str:
     return "\n".join(["| meaning | words |", "| --- | --- |", *lines])
 
 
+def jigsaw(kind: str) -> str:
+    """Return a Markdown table of the settings of jigsaw, or of those that photogram replaces."""
+    from photogram.formats.isis.solving import DECLARED
+
+    otherwise = kind == "otherwise"
+    heads = ("name", "in photogram") if otherwise else ("name", "values", "default")
+    lines = ["".join(f"| {each} " for each in heads) + "|", "| --- " * len(heads) + "|"]
+    for own in (each for each in DECLARED if (each.kind == "otherwise") is otherwise):
+        names = ", ".join(f"`{name}`" for name in own.names)
+        lines.append(f"| {names} | {own.content} |{'' if otherwise else f' {own.default} |'}")
+    return "\n".join(lines)
+
+
 def keys(_: str) -> str:
     """Return the declared keys of the settings of a plain project as TOML."""
     from photogram.formats.plain.settings import KEYS
@@ -207,6 +221,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
         "columns": columns,
         "commands": commands,
         "headings": headings,
+        "jigsaw": jigsaw,
         "keys": keys,
         "messages": messages,
         "verdicts": verdicts,

@@ -288,7 +288,9 @@ def test_the_package_has_the_models_in_this_order(pycolmap):
     own = {str(name): int(model) for name, model in pycolmap.CameraModelId.__members__.items()}
     for number, (name, parameters) in enumerate(MODELS.items()):
         assert own[name] == number
-        assert len(pycolmap.Camera.create_from_model_name(1, name, 500.0, 1000, 800).params) == len(parameters)
+        assert len(pycolmap.Camera.create_from_model_name(1, name, 500.0, 1000, 800).params) == len(
+            parameters
+        )
 
 
 @pytest.mark.parametrize("target", ["colmap", "colmap_text"])

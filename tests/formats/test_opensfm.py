@@ -22,8 +22,8 @@ from test_plain_project import EXAMPLE, written
 from message_codes import fields_of, raises, refused
 from photogram import InputError, Position, adjust, formats
 from photogram.formats import supplements
-from photogram.formats.names import with_names
 from photogram.formats.description import agreement
+from photogram.formats.names import with_names
 
 
 def only(place, tracks="tracks.csv"):

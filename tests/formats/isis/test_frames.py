@@ -9,10 +9,10 @@ import support_data
 
 from photogram import adjust, formats
 from photogram.formats import FORMATS, ReadOptions
-from photogram.formats.results import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import ControlMeasures, ControlNetwork, ControlPoints, network_text
 from photogram.formats.isis.outcome import Outcome, contents_of
+from photogram.formats.results import adjusted
 
 
 def moved(document, kilometres, turn=0.0):

@@ -11,13 +11,13 @@ import pytest
 from photogram import adjust
 from photogram.comparator import Place
 from photogram.formats import FORMATS
-from photogram.formats.results import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.isd import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
 from photogram.formats.isis import binary_network, read_network
 from photogram.formats.isis.assembling import full_matrices
 from photogram.formats.isis.network import is_binary
 from photogram.formats.isis.outcome import Outcome, contents_of
+from photogram.formats.results import adjusted
 from photogram.network import geocentric_to_geographic
 
 SETTINGS = (

@@ -10,10 +10,10 @@ from test_frames import moved, network
 from message_codes import refused
 from photogram import adjust, formats
 from photogram.formats import FORMATS, ReadOptions
-from photogram.formats.results import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.formats.isis.solving import observation_number, one_flight
+from photogram.formats.results import adjusted
 
 SERIALS = ("MRO/HIRISE/903418200:19968/RED4/0", "MRO/HIRISE/903418200:19968/RED5/0")
 

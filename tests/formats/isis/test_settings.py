@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from message_codes import refused
-from photogram.formats.isis.solving import OTHERWISE, PARAMETERS, REFUSED, Settings, deviations, read_settings
+from photogram.formats.isis.solving import PARAMETERS, REFUSED, Settings, deviations, read_settings
 
 
 def test_defaults_are_those_of_jigsaw():
@@ -25,12 +25,12 @@ def test_every_setting_changes_its_field(name):
     words |= {"multiplier": "7.5"}
     words |= {"angles": "all", "positions": "all", "twist": "no", "axes": "rectangular", "held": "held.lis"}
     own = PARAMETERS[name]
-    value = words.get(own.field, "7.5" if own.place is not None else "yes")
+    value = words.get(own.field, "7.5" if len(own.names) > 1 else "yes")
     found = read_settings(f"{name.lower()} = {value}")
     changed = [each for each in vars(found) if getattr(found, each) != getattr(Settings(), each)]
     assert changed == [own.field]
-    if own.place is not None:
-        assert getattr(found, own.field)[own.place] == 7.5
+    if len(own.names) > 1:
+        assert getattr(found, own.field)[own.names.index(name)] == 7.5
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,18 @@ def test_what_is_no_setting_is_refused(words, sentence):
         read_settings(words)
 
 
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_the_declared_default_is_that_of_the_field(name):
+    own, defaults = PARAMETERS[name], Settings()
+    if own.kind == "path":
+        assert getattr(defaults, own.field) is None
+    else:
+        assert read_settings(f"{name}={own.default}") == defaults
+
+
 def test_the_page_tells_of_every_setting():
     page = (Path(__file__).parents[3] / "docs" / "planetary.md").read_text(encoding="utf-8")
     section = page[page.index("## Settings") : page.index("## Files")]
-    told = set(re.findall(r"`([A-Z][A-Z0-9_]+)`", section))
-    assert told == {*PARAMETERS, *OTHERWISE, *REFUSED}
+    assert "<!-- generated: jigsaw -->" in section
+    assert "<!-- generated: jigsaw otherwise -->" in section
+    assert set(REFUSED) <= set(re.findall(r"`([A-Z][A-Z0-9_]+)`", section))

@@ -12,7 +12,7 @@ from photogram.formats.csm.isd import to_angles
 from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.network import POINT_TYPES
 from photogram.formats.isis.outcome import Image, Outcome
-from photogram.formats.isis.solving import PARAMETERS, Settings
+from photogram.formats.isis.solving import PARAMETERS
 from photogram.io.csv_text import csv_text
 from photogram.network.motion import about
 from photogram.network.trajectories import Trajectory
@@ -21,7 +21,6 @@ from photogram.show.forms import table_text
 from photogram.show.page import Column, Table
 
 KM = 1000.0
-_WORDS = {"first": "ANGLES", "second": "VELOCITIES", "third": "ACCELERATIONS", "all": "ALL", "none": "NONE"}
 _AXES = ("Latitude", "Longitude", "Radius")
 _CELLS = ("initial", "correction", "final", "apriori sigma", "adj sigma")
 _COEFFICIENTS = (("X", "Y", "Z"), ("RA", "DEC", "TWIST"))
@@ -141,7 +140,7 @@ def _report(outcome: Outcome, images: Mapping[Image, list[Parameter]], points: _
             "Linear Units": "kilometers",
             "Angular Units": "decimal degrees",
         },
-        "INPUT: SETTINGS": {name: _setting(settings, name) for name in PARAMETERS},
+        "INPUT: SETTINGS": {name: own.text(settings, name) for name, own in PARAMETERS.items()},
         "JIGSAW: RESULTS": _counts(outcome),
     }
     for title, values in facts.items():
@@ -180,19 +179,6 @@ def _lines(columns: _Columns) -> list[str]:
         for head, values in columns
     ]
     return table_text(Table("", made))
-
-
-def _setting(settings: Settings, name: str) -> str:
-    """Return the value of a setting in the words of jigsaw."""
-    parameter = PARAMETERS[name]
-    value = getattr(settings, parameter.field)
-    if parameter.place is not None:
-        value = value[parameter.place]
-    if isinstance(value, bool):
-        return "YES" if value else "NO"
-    if parameter.field == "positions" and value == "first":
-        return "POSITION"
-    return "NONE" if value is None else _WORDS.get(value, str(value).upper())
 
 
 def _counts(outcome: Outcome) -> dict[str, object]:

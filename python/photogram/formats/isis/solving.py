@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import itertools
 import math
 import re
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -17,7 +19,7 @@ from photogram.formats.csm.isd import Isd, Polynomials, Positions, Turns, fitted
 from photogram.formats.csm.photos import trajectory_of
 from photogram.io.column_table import FALSE, TRUE
 from photogram.io.files import read_lines
-from photogram.lazy_dataclasses import dataclass, field, fields, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import unknown_name
 from photogram.network.motion import given_poses
 from photogram.network.trajectories import Polynomial, Trajectory
@@ -209,99 +211,100 @@ Sigmas = tuple[float | None, float | None, float | None]
 Axes = Literal["latitudinal", "rectangular"]
 
 MOST = 8  # The highest degree of a polynomial
-
-
-def _yes(text: str) -> bool:
-    if text.lower() not in TRUE | FALSE:
-        raise InputError(phrase("format.unknown", what="value", value=text, names=["yes", "no"]))
-    return text.lower() in TRUE
-
-
-def _degree(text: str) -> int:
-    if not re.fullmatch(r"\d+", text) or int(text) > MOST:
-        raise InputError(phrase("isis.degree", most=MOST, value=text))
-    return int(text)
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise InputError(phrase("format.positive", name="the number", value=text))
-    return value
-
-
-def _sigma(text: str) -> float | None:
-    return None if text.lower() in ("none", "null", "") else _positive(text)
-
-
-def _word(**words: str) -> Callable[[str], str]:
-    def found(text: str) -> str:
-        if text.lower() not in words:
-            raise InputError(
-                phrase("format.unknown", what="value", value=text, names=[word.upper() for word in words])
-            )
-        return words[text.lower()]
-
-    return found
-
-
-_SOLVED = {"velocities": "second", "accelerations": "third", "all": "all", "none": "none"}
-
-
-def _setting(names: str, read: Callable[[str], Any], default: Any) -> Any:
-    """Declare a field with its names in jigsaw and the reader of their values."""
-    return field(default=default, metadata={"names": names.split(), "read": read})
-
-
 _FREE: Sigmas = (None, None, None)
+
+
+class Parameter(NamedTuple):
+    """A setting of `jigsaw.csv`, or three that are one field.
+
+    Kinds `otherwise` are settings that photogram replaces; `field` is the code of the remark.
+    """
+
+    names: list[str]
+    kind: str
+    words: Mapping[str, str]  # Values by their words, the first of a value is written
+    field: str
+    default: str
+    content: str
+
+    def value(self, text: str) -> Any:
+        """Return the value of a text."""
+        word = text.lower()
+        match self.kind:
+            case "flag" | "word" if word not in (self.words or TRUE | FALSE):
+                names = [each.upper() for each in self.words] or ["yes", "no"]
+                raise InputError(phrase("format.unknown", what="value", value=text, names=names))
+            case "flag":
+                return word in TRUE
+            case "word":
+                return self.words[word]
+            case "degree":
+                if not re.fullmatch(r"\d+", text) or int(text) > MOST:
+                    raise InputError(phrase("isis.degree", most=MOST, value=text))
+                return int(text)
+            case "path":
+                return Path(text)
+            case "sigma" if word in ("none", "null", ""):
+                return None
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not 0 < value < math.inf:
+            raise InputError(phrase("format.positive", name="the number", value=text))
+        return value
+
+    def text(self, settings: Settings, name: str) -> str:
+        """Return the value of one of the names in settings, in the words of jigsaw."""
+        value = getattr(settings, self.field)
+        value = value[self.names.index(name)] if len(self.names) > 1 else value
+        if isinstance(value, bool):
+            return "YES" if value else "NO"
+        word = next((word for word, own in self.words.items() if own == value), str(value))
+        return "NONE" if value is None else word.upper()
+
+
+def _declared() -> Iterator[Parameter]:
+    text = (Path(__file__).parent / "jigsaw.csv").read_text(encoding="utf-8")
+    for names, kind, words, *rest in itertools.islice(csv.reader(text.splitlines()), 1, None):
+        known = dict(word.split("=") for word in words.split())
+        yield Parameter(names.split(), kind, known, *rest)
+
+
+DECLARED = tuple(_declared())
+PARAMETERS: Mapping[str, Parameter] = {
+    name: each for each in DECLARED if each.kind != "otherwise" for name in each.names
+}
+OTHERWISE: Mapping[str, str] = {
+    name: each.field for each in DECLARED if each.kind == "otherwise" for name in each.names
+}
+"""Settings by name, and codes of remarks on settings that photogram replaces."""
+REFUSED = ("SOLVETARGETBODY",)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Adjusted parameters and their weights; defaults are the defaults of jigsaw."""
+    """Adjusted parameters and their weights, as in `jigsaw.csv`; defaults are the defaults of jigsaw."""
 
-    # Degrees of the polynomials fitted to the angles of an image, and of the adjusted ones
-    ck_degree: int = _setting("CKDEGREE", _degree, 2)
-    ck_solve_degree: int = _setting("CKSOLVEDEGREE", _degree, 2)
-    # Free coefficients, and whether coefficients of the third angle are free
-    angles: Solved = _setting("CAMSOLVE", _word(**_SOLVED, angles="first"), "first")
-    twist: bool = _setting("TWIST", _yes, True)
-    # Whether polynomials are added to the angles of the table instead
-    over_existing: bool = _setting("OVEREXISTING", _yes, False)
-    # The same for positions
-    spk_degree: int = _setting("SPKDEGREE", _degree, 2)
-    spk_solve_degree: int = _setting("SPKSOLVEDEGREE", _degree, 2)
-    positions: Solved = _setting("SPSOLVE", _word(**_SOLVED, position="first", positions="first"), "none")
-    over_hermite: bool = _setting("OVERHERMITE", _yes, False)
-    radius: bool = _setting("RADIUS", _yes, False)  # Whether radii of free points are free
-    # Coordinates in which points are adjusted
-    axes: Axes = _setting(
-        "CONTROL_POINT_COORDINATE_TYPE_BUNDLE",
-        _word(latitudinal="latitudinal", rectangular="rectangular"),
-        "latitudinal",
-    )
-    # Degrees: coefficients of degree 0, 1 and 2, by scaled time
-    angle_sigmas: Sigmas = _setting(
-        "CAMERA_ANGLES_SIGMA CAMERA_ANGULAR_VELOCITY_SIGMA CAMERA_ANGULAR_ACCELERATION_SIGMA", _sigma, _FREE
-    )
-    # Metres: as for angles
-    position_sigmas: Sigmas = _setting(
-        "SPACECRAFT_POSITION_SIGMA SPACECRAFT_VELOCITY_SIGMA SPACECRAFT_ACCELERATION_SIGMA", _sigma, _FREE
-    )
-    # Metres: latitude, longitude, radius of all points, and X, Y, Z
-    latitude_sigmas: Sigmas = _setting(
-        "POINT_LATITUDE_SIGMA POINT_LONGITUDE_SIGMA POINT_RADIUS_SIGMA", _sigma, _FREE
-    )
-    rectangular_sigmas: Sigmas = _setting("POINT_X_SIGMA POINT_Y_SIGMA POINT_Z_SIGMA", _sigma, _FREE)
-    # Whether images of one observation share their coefficients
-    observations: bool = _setting("OBSERVATIONS", _yes, False)
-    held: Path | None = _setting("HELDLIST", Path, None)  # List of images with fixed poses; None: no image
-    # Whether measures with large residuals are rejected, and the limit in standard deviations
-    rejects: bool = _setting("OUTLIER_REJECTION", _yes, False)
-    multiplier: float = _setting("REJECTION_MULTIPLIER", _positive, 3.0)
+    ck_degree: int = 2
+    ck_solve_degree: int = 2
+    angles: Solved = "first"
+    twist: bool = True
+    over_existing: bool = False
+    spk_degree: int = 2
+    spk_solve_degree: int = 2
+    positions: Solved = "none"
+    over_hermite: bool = False
+    radius: bool = False
+    axes: Axes = "latitudinal"
+    angle_sigmas: Sigmas = _FREE  # Of coefficients of degree 0, 1 and 2, by scaled time
+    position_sigmas: Sigmas = _FREE
+    latitude_sigmas: Sigmas = _FREE
+    rectangular_sigmas: Sigmas = _FREE
+    observations: bool = False
+    held: Path | None = None
+    rejects: bool = False
+    multiplier: float = 3.0
     remarks: tuple[Phrase, ...] = ()  # Remarks on settings replaced by others
 
     @property
@@ -319,35 +322,6 @@ def _count(solved: Solved, degree: int) -> int:
     return degree + 1 if solved == "all" else ("none", "first", "second", "third").index(solved)
 
 
-class _Parameter(NamedTuple):
-    """A field of settings, its reader, and its index in a field of three."""
-
-    field: str
-    read: Callable[[str], Any]
-    place: int | None = None
-
-
-PARAMETERS: Mapping[str, _Parameter] = {
-    name: _Parameter(own.name, own.metadata["read"], place if len(own.metadata["names"]) > 1 else None)
-    for own in fields(Settings)
-    if own.metadata
-    for place, name in enumerate(own.metadata["names"])
-}
-"""Field of each jigsaw name."""
-
-OTHERWISE: Mapping[str, str] = {
-    "MAXITS": "iterations",
-    "SIGMA0": "convergence",
-    "ERRORPROPAGATION": "covariance-computed",
-    "CONTROL_POINT_COORDINATE_TYPE_REPORTS": "coordinates-written",
-    "UPDATE": "labels",
-    **dict.fromkeys(("BUNDLEOUT_TXT", "IMAGESCSV", "OUTPUT_CSV", "RESIDUALS_CSV"), "written"),
-    **dict.fromkeys(("FROMLIST", "CNET", "ONET", "FILE_PREFIX"), "paths"),
-}
-"""Remarks on settings replaced by others."""
-REFUSED = ("SOLVETARGETBODY",)
-
-
 def read_settings(text: str) -> Settings:
     """Read settings from a jigsaw command line or a file.
 
@@ -360,10 +334,10 @@ def read_settings(text: str) -> Settings:
     for name, value, where in _words(text):
         try:
             if (own := PARAMETERS.get(name)) is not None:
-                found = own.read(value)
-                if own.place is not None:
-                    three = given.get(own.field, _FREE)
-                    found = (*three[: own.place], found, *three[own.place + 1 :])
+                found = own.value(value)
+                if len(own.names) > 1:
+                    three = dict(zip(own.names, given.get(own.field, _FREE), strict=True))
+                    found = tuple((three | {name: found}).values())
                 given[own.field] = found
             else:
                 remarks |= _elsewhere(name, value)
@@ -401,6 +375,6 @@ def _elsewhere(name: str, value: str) -> dict[str, Phrase]:
     if name not in REFUSED:
         known = [*PARAMETERS, *OTHERWISE, *REFUSED]
         raise InputError(unknown_name("setting of jigsaw", name, known))
-    if _yes(value):
+    if value.lower() not in FALSE:
         raise InputError(phrase("isis.refused", name=name))
     return {}
