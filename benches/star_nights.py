@@ -28,13 +28,13 @@ import numpy as np
 from photogram import AdjustmentError, InputError
 from photogram.io.angles import ARCSEC
 from photogram.stellar import Air, Site
-from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import STRETCH
-from photogram.stellar.night_calibration import CalibratedNight, Night, calibrate_night
-from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.pointing import attitude_of
+from photogram.stellar.night_calibration import calibrate_night
+from photogram.stellar.night_result import CalibratedNight, Night
+from photogram.stellar.places import apparent_places, attitude_of, sidereal_time
 from photogram.stellar.sky_calibration import Exposure, project_sky
+from photogram.stellar.sky_cameras import BrownCamera
 
 FAINTEST, FALSE, MISSED, SD = 6.0, 0.30, 0.10, 0.1
 WIDTH, HEIGHT = 6000.0, 4000.0

@@ -16,7 +16,7 @@ from views import BLUE, GREEN, GREY, LIGHT, RED, Floats, View, circle, svg
 
 from photogram import _photocore
 from photogram.stellar import GRAD, Site
-from photogram.stellar.pointing import terrestrial
+from photogram.stellar.places import terrestrial
 
 FIGURE = Path(__file__).with_name("stellar-frames.svg")
 

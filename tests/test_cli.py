@@ -400,7 +400,7 @@ def test_a_package_of_an_extra_that_is_not_there_is_named(
     for name in loaded:
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, package, None)
-    for module in ("photogram.perspective_center.plot", "photogram.planning.networks"):
+    for module in ("photogram.perspective_center.document", "photogram.planning.networks"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     result = run(*command)
     assert result.exit_code == 1

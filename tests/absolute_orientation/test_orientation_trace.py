@@ -8,7 +8,7 @@ import pytest
 from orientation_golden import array, cases, csv_of, load, stations
 
 from photogram import InputError, orient
-from photogram.absolute_orientation.trace import trace_text
+from photogram.absolute_orientation.orientation import trace_text
 
 PRINTS = [
     "sense switch 1, after statement 2: tan K",

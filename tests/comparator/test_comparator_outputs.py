@@ -90,7 +90,7 @@ def test_feature_18_nodes_beyond_the_measurement_are_marked():
 
 
 def test_feature_18_the_net_is_drawn_at_fixed_nodes_and_10_000_times():
-    from photogram.comparator.pictures.correction import distorted_grid
+    from photogram.comparator.pictures import distorted_grid
 
     calibration = calibrate(noisy(30, correction=bent()), QUICK)
     polynomial = calibration.nonlinear.polynomial
@@ -121,8 +121,7 @@ def _widths(panel):
 
 
 def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
-    from photogram.comparator.pictures import sketches
-    from photogram.comparator.pictures.ellipses import total_ellipses
+    from photogram.comparator.pictures import sketches, total_ellipses
 
     made = sketches(full)
     operators = list(full.pointing.operators)

@@ -13,8 +13,8 @@ import pytest
 
 from photogram import InputError
 from photogram.perspective_center import read_deck, run_deck
+from photogram.perspective_center.document import run_sketch
 from photogram.perspective_center.listing import listing
-from photogram.perspective_center.plot import run_sketch
 
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = files("photogram") / "examples" / "perspective_center" / "grid.deck"

@@ -9,7 +9,7 @@ import star_plates as plates
 from message_codes import coded
 from photogram import AdjustmentError, InputError
 from photogram.stellar import INDEX, calibrate
-from photogram.stellar.report_iteration import DIVERGED, SETTLED, stop_reason
+from photogram.stellar.iteration import DIVERGED, SETTLED, stop_reason
 
 
 @pytest.mark.parametrize("as_published", [False, True])

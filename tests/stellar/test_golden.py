@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.stellar import ARCSEC, GRAD, INDEX, NAMES, Air, Site, calibrate, refraction
 from photogram.stellar.curves import distortion_curves
 from photogram.stellar.movement import constraints, modify
-from photogram.stellar.pointing import transformed_angles
+from photogram.stellar.places import transformed_angles
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 from message_codes import coded, has_code
 from photogram import InputError
 from photogram.stellar import BrownCamera, attitude_of, calibrate_night, read_night
-from photogram.stellar.pointing import axis_of, roll_of
+from photogram.stellar.places import axis_of, roll_of
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "exposures" / "night.toml"))
 

@@ -12,7 +12,7 @@ from photogram.stellar import INDEX, calibrate, calibrate_exposures, calibrate_n
 from photogram.stellar.lens_choice import equal
 from photogram.stellar.lens_choice import test_scale as scale_of
 from photogram.stellar.lens_choice import test_terms as terms_of
-from photogram.stellar.night_tables import lens_tests
+from photogram.stellar.night_document import lens_tests
 
 FRAME = (6000.0, 4000.0)
 

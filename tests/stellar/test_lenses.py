@@ -17,8 +17,8 @@ from photogram.stellar import (
     project_sky,
     sidereal_time,
 )
-from photogram.stellar.night_plots import sketches
-from photogram.stellar.night_tables import lenses as lens_table
+from photogram.stellar.night_document import lenses as lens_table
+from photogram.stellar.plots import night_sketches
 from photogram.stellar.sky_calibration import partials
 
 allsky = load("all_sky_camera")
@@ -173,7 +173,7 @@ def test_partials_of_every_lens_are_those_of_its_images(lens, common_scale):
 def test_pictures_of_a_fisheye(lens):
     """The curve over the angle, and what the terms change: nothing where there are none."""
     night, _ = allsky.night(lens, 7)
-    left, right = sketches(calibrate_night(night))["distortion"].panels
+    left, right = night_sketches(calibrate_night(night))["distortion"].panels
     (curve,), (_, terms) = left.marks, right.marks
     theta = np.radians(curve.places[:, 0])
     assert curve.places[-1, 1] > 900

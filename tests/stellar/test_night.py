@@ -32,7 +32,7 @@ from photogram.stellar import (
 )
 from photogram.stellar.identification import stars_near
 from photogram.stellar.night_file import inputs
-from photogram.stellar.pointing import axis_of, pole_matrix, terrestrial
+from photogram.stellar.places import axis_of, pole_matrix, terrestrial
 
 TRUTH = MAKER["CAMERA"].values
 

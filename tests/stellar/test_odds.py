@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram.stellar.matching import Search, match
-from photogram.stellar.odds import ACCEPTED, chance, expected_false
+from photogram.stellar.matching import ACCEPTED, Search, chance, expected_false, match
 
 NIGHTS = runpy.run_path(str(Path(__file__).parents[2] / "benches" / "star_nights.py"))
 FRAME = (6000.0, 4000.0)

@@ -11,8 +11,8 @@ from message_codes import codes, fields_of, has_code
 from photogram import InputError
 from photogram.cli import app
 from photogram.stellar import Catalogue, attitude_of, calibrate_night, read_night
-from photogram.stellar.hints import _HOUR
-from photogram.stellar.pointing import turn_between
+from photogram.stellar.night_run import _HOUR
+from photogram.stellar.places import turn_between
 
 
 def spoil(folder, old, new, count=0):

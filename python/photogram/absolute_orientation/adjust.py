@@ -24,8 +24,6 @@ from photogram.results.parts import Iteration
 from photogram.statistics.limits import externally_studentized, global_test
 from photogram.words import phrase
 
-__all__ = ["Method", "Start", "UnitVariance", "orient"]
-
 Method = Literal["rigorous", "report", "fill-in"]
 Start = Literal["auto", "report", "closed-form"]
 UnitVariance = Literal["estimated", "unity"]

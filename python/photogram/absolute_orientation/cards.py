@@ -25,15 +25,6 @@ from photogram.messages import Message
 from photogram.network.geometry import rotation_matrix
 from photogram.words import phrase
 
-__all__ = [
-    "Deck",
-    "read_cards",
-    "read_restart",
-    "read_transformation",
-    "restart_record",
-    "transformation_records",
-]
-
 MISSING = ("", "-")
 
 

@@ -6,23 +6,23 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from photogram import _photocore
-from photogram.absolute_orientation.tables import (
-    control,
-    cycles,
-    model_residuals,
-    parameters,
-    points,
-    rejected,
-    rotation,
-)
+from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
 from photogram.io import json
+from photogram.results.network_tables import iteration_table
 from photogram.show.forms import record
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
-from photogram.show.page import Document, Drawing, Fact, Facts, Section, conventions, significant
-from photogram.show.quantity import members
+from photogram.show.page import Document, Drawing, Fact, Facts, Section, about, conventions, significant
+from photogram.show.quantity import Axis, Quantity, Table, chosen, column, members
+from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names, Panel, around
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import INK, PURPLE, VERMILION, round_length
 from photogram.statistics.findings import Findings, Tested
+from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
@@ -175,3 +175,194 @@ def orientation_findings(result: Orientation) -> Findings:
         take_out=Phrase("advice.leave-station-out"),
         if_usable=if_usable,
     )
+
+
+LISTED = 300  # Maximum number of transformed points in printed tables
+
+
+def control(result: Orientation) -> Table:
+    """Return used control: residuals, redundancy, tests, adjusted coordinates."""
+    numbers, ground, model = (
+        _axes("XYZ", unit) for unit in ("", result.stations.ground_unit, result.stations.model_unit)
+    )
+    seen, marked = result.redundancy >= TESTABLE, np.abs(result.tested) > result.limit
+    of_w, of_t = (marked, None) if result.decided_by_w else (None, marked)
+    columns = [
+        _names(result),
+        Quantity(*(result.residuals, model, "deviation", "residual", "residual"), head="Residual", figures=4),
+        Quantity(
+            *(result.residuals_ground, ground, "deviation", "residual_ground", "residual_ground"),
+            head="Residual",
+            figures=4,
+        ),
+        Quantity(result.model_residuals, _axes("xyz", model[0].unit), "deviation", member="residual_model"),
+        column("redundancy", result.redundancy, "Redundancy", axes=numbers, decimals=3),
+        column("standardized", result.standardized, "w", axes=numbers, decimals=2, seen=seen, marked=of_w),
+        column("studentized", result.studentized, "t", axes=numbers, decimals=2, seen=seen, marked=of_t),
+        Quantity(result.adjusted_control, ground, "value", member="adjusted"),
+        Quantity(result.control_covariances, member="covariance"),
+    ]
+    about = "Given minus transformed: u = s X - A^T (x - B) in units of the model, and u / s on the ground."
+    rows = np.flatnonzero(result.took_part)
+    shown = np.argwhere(result.used[rows])
+    return Table("control", "Control", chosen(columns, rows), _test(result), about, shown=shown)
+
+
+def _test(result: Orientation) -> str:
+    law = "none" if not math.isfinite(result.limit) else "normal" if result.decided_by_w else "student"
+    tests, freedom = int(np.isfinite(result.tested).sum()), result.degrees_of_freedom - 1
+    return about(f"orientation.{law}", freedom=freedom, limit=result.limit, tests=tests)
+
+
+def model_residuals(result: Orientation) -> Table:
+    """Return the residuals of the used control in the axes of the model."""
+    residuals = Quantity(
+        result.model_residuals, _axes("xyz", result.stations.model_unit), "deviation", head="v{}", figures=4
+    )
+    columns = chosen([_names(result, member=""), residuals], np.flatnonzero(result.took_part))
+    about = "v = s A X + B - x with the adjusted control X."
+    return Table("model_residuals", "Residuals in the model", columns, "", about)
+
+
+def rejected(result: Orientation) -> Table:
+    """Return unused control: given minus transformed."""
+    there = result.stations.given & ~result.used
+    rows = np.flatnonzero(there.any(axis=1))
+    differences = np.where(there, result.differences, np.nan)
+    columns = [
+        _names(result),
+        Quantity(
+            *(differences, _axes("XYZ", result.stations.ground_unit), "deviation", "d", "residual_ground"),
+            head="Given - transformed",
+            figures=4,
+        ),
+    ]
+    shown = np.argwhere(there[rows])
+    return Table("rejected", "Control that took no part", chosen(columns, rows), shown=shown)
+
+
+def parameters(result: Orientation) -> Table:
+    """Return the seven parameters with their standard deviations, one per row."""
+    similarity, stations = result.similarity, result.stations
+    axes = (
+        *(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa")),
+        Axis.of("s", f"{stations.model_unit} / {stations.ground_unit}"),
+        *(Axis.of(name, stations.model_unit) for name in ("b1", "b2", "b3")),
+    )
+    of, covariance = np.arange(7), similarity.covariance
+    sd = np.full(7, np.nan) if covariance is None else np.sqrt(np.diag(covariance))
+    values = np.array([*similarity.angles, similarity.scale, *similarity.translation])
+    units = ["deg, sd arcsec" if axis.angle else axis.unit for axis in axes]
+    columns = [
+        Quantity([axis.name for axis in axes], kind="name", head="Parameter"),
+        Quantity(values, axes, "value", head="Value", figures=10, of=of),
+        Quantity(sd, axes, "deviation", head="sd", words={0.0: "held"} if result.scale_held else None, of=of),
+        Quantity(units, kind="name", head="Unit"),
+    ]
+    about = "x = s A X + B, from the ground to the model."
+    return Table("parameters", "Parameters", columns, "", about, sd)
+
+
+def rotation(result: Orientation) -> Table:
+    """Return the rotation matrix A."""
+    matrix = Quantity(result.similarity.rotation, _axes("XYZ"), head="{}", decimals=12)
+    return Table("rotation_matrix", "Rotation matrix A", [matrix])
+
+
+def points(result: Orientation) -> Table:
+    """Return the stations without control, transformed."""
+    ids, positions, covariances = result.transform_points()
+    sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    axes = _axes("XYZ", result.stations.ground_unit)
+    columns = [
+        Quantity(np.array(ids, dtype=object), kind="name", name="id", head="Point"),
+        Quantity(positions, axes, "value", "", head="{}"),
+        Quantity(sd, axes, "deviation", "sd", head="sd {}"),
+    ]
+    more = len(ids) > LISTED
+    note = f"The first {LISTED} of {len(ids)}; the JSON document contains all." if more else ""
+    shown = np.arange(LISTED) if more else None
+    return Table("points", "Transformed points", columns, note, deviations=sd, shown=shown)
+
+
+def cycles(result: Orientation) -> Table:
+    """Return the iterations, or the cycles of the report's methods."""
+    if result.cycles is None:
+        columns = iteration_table(result.iterations)
+    else:
+        axis, corrections = (Axis.of("", "rad"),), np.array(result.cycles)
+        head = "Largest correction of an angle"
+        columns = [
+            Quantity(np.arange(1, len(corrections) + 1), member="number", head="Cycle"),
+            Quantity(corrections, axis, "deviation", member="largest_correction_rad", head=head),
+        ]
+    return Table("cycles", "Iterations", columns)
+
+
+def _names(result: Orientation, member: str = "id") -> Quantity:
+    return Quantity(np.array(result.stations.ids, dtype=object), (), "name", "id", member, head="Station")
+
+
+def _axes(names: str, unit: str = "") -> tuple[Axis, ...]:
+    return tuple(Axis.of(name, unit) for name in names)
+
+
+LONGEST_RESIDUAL = 0.12  # As a part of the larger side of the plan
+
+
+def control_plot(
+    stations: Stations,
+    rows: NDArray[np.intp],
+    plan: Floats,
+    residuals: Floats,
+    used: NDArray[np.bool_],
+    rms: float,
+) -> Plot:
+    """Plot control residuals: arrows in plan, bars for elevations."""
+    unit = stations.ground_unit
+    size = float(np.ptp(plan, axis=0).max())
+    largest = float(np.nanmax(np.abs(residuals)))
+    factor = LONGEST_RESIDUAL * size / largest if largest > 0 else 0.0
+    high = float(np.clip(5.5 * np.ptp(plan[:, 1]) / (np.ptp(plan[:, 0]) or 1.0), 2.0, 8.0))
+    vectors, ends = _residuals(plan, residuals * factor)
+    names = [stations.ids[row] for row in rows.tolist()]
+    length = round_length(LONGEST_RESIDUAL * size / factor) if factor else 0.0
+    panel = Panel(
+        around(np.vstack([plan, ends]), 0.1),
+        [*_stations(used, plan), *vectors, Names(plan, names, [INK] * len(names), ends)],
+        f"Residuals of control, rms {rms:.3g} {unit}",
+        f"X, {unit}",
+        f"Y, {unit}",
+        equal=True,
+        bars=[(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else [],
+        legend="below",
+    )
+    return Plot(6.5, high + 1.8, [panel])
+
+
+def _stations(used: NDArray[np.bool_], plan: Floats) -> list[Mark]:
+    full, plan_only = used.all(axis=1), ~used[:, 2]
+    kinds = (
+        ("full control", full, "^"),
+        ("horizontal control", plan_only, "s"),
+        ("height control", ~(full | plan_only), "o"),
+    )
+    return [
+        Markers(plan[chosen], shape, 6.0, face="none", label=name)
+        for name, chosen, shape in kinds
+        if chosen.any()
+    ]
+
+
+def _residuals(plan: Floats, enlarged: Floats) -> tuple[list[Mark], Floats]:
+    """Return marks of scaled residuals, and points along them to be avoided by names."""
+    flat, high = np.isfinite(enlarged[:, :2]).any(axis=1), np.isfinite(enlarged[:, 2])
+    steps = np.nan_to_num(enlarged)
+    up = np.column_stack([np.zeros(len(plan)), steps[:, 2]])
+    marks: list[Mark] = []
+    if flat.any():
+        marks.append(Arrows(plan[flat], steps[flat, :2], VERMILION, 0.004, label="plan residual", layer=3.0))
+    bars = np.stack([plan[high], plan[high] + up[high]], axis=1)
+    marks.append(Line(bars, PURPLE, 3.0, label="height residual (up: positive)"))
+    parts = np.linspace(0.25, 1.0, 4)[:, np.newaxis, np.newaxis]
+    return marks, np.concatenate([plan + parts * steps[:, :2], plan + parts * up]).reshape(-1, 2)

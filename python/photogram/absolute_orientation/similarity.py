@@ -20,9 +20,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import rotation_angles
 from photogram.words import phrase
 
-__all__ = ["Similarity", "read_similarity"]
-
-
 ORTHOGONAL = 1e-6  # Largest element of A A^T - I of a matrix read from a file
 
 

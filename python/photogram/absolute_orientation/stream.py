@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import orjson
 
-from photogram.absolute_orientation.csv_files import header
 from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
-from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
+from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS, header
 from photogram.arguments.arrays import number
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
@@ -30,8 +29,6 @@ from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["CHUNK", "Document", "decimals_for", "transform_file"]
 
 
 CHUNK = 100_000  # Points transformed at a time

@@ -63,8 +63,8 @@ def absolute_orientation(
     from photogram.absolute_orientation import read_similarity
     from photogram.absolute_orientation.cards import read_restart, restart_record, transformation_records
     from photogram.absolute_orientation.document import point_rows, without_points
+    from photogram.absolute_orientation.orientation import trace_text
     from photogram.absolute_orientation.stream import Document, decimals_for
-    from photogram.absolute_orientation.trace import trace_text
     from photogram.messages import Message
 
     if job.is_example:
@@ -193,7 +193,7 @@ def relative(
 def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_unit: str) -> Deck:
     from photogram.absolute_orientation import read_cards, read_csv
     from photogram.absolute_orientation.cards import Deck
-    from photogram.absolute_orientation.csv_files import is_csv
+    from photogram.absolute_orientation.stations import is_csv
 
     if format_ == "csv" or (format_ == "auto" and is_csv(file)):
         return Deck(read_csv(file, ground_unit=ground_unit, model_unit=model_unit), None, "")

@@ -153,8 +153,7 @@ def correct(
     Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (standard deviation of the calibration),
     and in_range (no outside the calibrated range). Points far outside are rejected.
     """
-    from photogram.comparator.apply import correct_table
-    from photogram.comparator.correction import Correction
+    from photogram.comparator.correction import Correction, correct_table
     from photogram.comparator.csvfile import read_table
 
     made, remarks = correct_table(

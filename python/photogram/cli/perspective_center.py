@@ -27,9 +27,8 @@ def perspective_center(
     The run stops at the first set that cannot be read or solved. The sets before it are written to --out.
     """
     from photogram.perspective_center import run_deck
-    from photogram.perspective_center.document import set_document
+    from photogram.perspective_center.document import run_sketch, set_document
     from photogram.perspective_center.listing import listing
-    from photogram.perspective_center.plot import run_sketch
     from photogram.statistics.verdict import worst
 
     documents.declare(job, "listing.txt", pictures=["residuals"])

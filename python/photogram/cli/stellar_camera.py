@@ -17,13 +17,13 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.io.writing import Content
-    from photogram.stellar.night_calibration import CalibratedNight
+    from photogram.stellar.night_result import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
 
 Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "kannala_brandt"]
-"""Lenses of digital cameras; `photogram.stellar.lenses` has them."""
+"""Lenses of digital cameras; `photogram.stellar.sky_cameras` has them."""
 Effect = Literal["annual-aberration", "light-deflection", "diurnal-aberration", "refraction"]
 """Effects on star positions."""
 
@@ -45,7 +45,7 @@ def stellar_camera(
     from photogram.statistics.verdict import worst
     from photogram.stellar import calibrate
     from photogram.stellar.cameras import camera_document
-    from photogram.stellar.plots import sketches
+    from photogram.stellar.plots import plate_sketches
 
     problems, inputs = _read(deck)
     job.reads(*inputs)
@@ -64,7 +64,7 @@ def stellar_camera(
         files |= documents.inside(_files(result, mark))
         withheld = phrase("command.camera-withheld", names=list(cameras))
         files |= documents.unless_withheld(cameras, withheld, usable=result.verdict.usable)
-        files |= documents.pictures(partial(sketches, result), mark)
+        files |= documents.pictures(partial(plate_sketches, result), mark)
         files |= documents.page(job, result.document, mark)
         asked |= documents.as_json(result, mark)
     code = worst((result.verdict for result in results), strict=strict)
@@ -94,7 +94,7 @@ def exposures(
     from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_file import inputs, read_night
-    from photogram.stellar.night_plots import sketches
+    from photogram.stellar.plots import night_sketches
 
     job.reads(*inputs(night))
     documents = replace(documents, out=documents.out or Path(f"{night.stem}-calibrated"))
@@ -122,7 +122,7 @@ def exposures(
         result,
         tables,
         document=document,
-        plots=lambda: sketches(result),
+        plots=lambda: night_sketches(result),
         beside=documents.unless_withheld(cameras, withheld, usable=result.verdict.usable),
         tables=("parameters",),
         remarks=result.messages,
@@ -182,7 +182,7 @@ def _files(result: Result, mark: str) -> dict[str, bytes]:
 
 def _night_cameras(result: CalibratedNight) -> dict[str, bytes]:
     """Return the camera files of a night."""
-    from photogram.stellar.camera_yaml import WITH_YAML, to_yaml
+    from photogram.stellar.sky_cameras import WITH_YAML, to_yaml
 
     cameras = {"camera.json": result.camera.to_json()}
     if result.camera.lens in WITH_YAML:

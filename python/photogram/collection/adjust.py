@@ -27,7 +27,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.collection import Collection
 
-__all__ = ["adjust", "adjusted"]
 
 WORSE = 100.0  # Limit of the standard deviations of a weak photo, relative to the median of all photos
 

@@ -12,8 +12,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
-__all__ = ["Simulation", "simulate", "simulate_turntable"]
-
 DISTANCE = 10.0  # Distance of the photos from the centre of the cloud
 SIZE = 4.0  # Side of the cloud, a cube
 FIELD = 400.0  # Image radius of the object on a turntable, pixels

@@ -202,7 +202,13 @@ def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[Plac
     readings = read_points(reduced.points[order], reduced.xy_um[order])
     points = np.array([reading.point for reading in readings])
     means = np.array([reading.mean_um for reading in readings])
-    _refuse_equal_places(reduced, points, means)
+    _, first, counts = np.unique(means, axis=0, return_index=True, return_counts=True)
+    if (counts > 1).any():
+        at = means[first[counts > 1][0]]
+        equal = points[(means == at).all(axis=1)].tolist()
+        place = reduced.places[int(np.flatnonzero(reduced.points == equal[1])[0])]
+        fields = {"case": reduced.number, "first": equal[0], "second": equal[1]}
+        raise place.error(phrase("comparators.equal-points", **fields))
     messages += _identical(reduced, readings)
     with at_place(case.place, name):
         orientation = detect_orientation(grid, points, means)
@@ -231,16 +237,6 @@ def _identical(case: Case, readings: list[PointReadings]) -> list[Message]:
     place = case.places[int(np.flatnonzero(case.points == points[0])[0])]
     names = ", ".join(map(str, points))
     return [place.message(phrase("comparators.identical", case=case.number, points=names))]
-
-
-def _refuse_equal_places(case: Case, points: Indices, means: Floats) -> None:
-    _, first, counts = np.unique(means, axis=0, return_index=True, return_counts=True)
-    if (counts > 1).any():
-        at = means[first[counts > 1][0]]
-        equal = points[(means == at).all(axis=1)].tolist()
-        place = case.places[int(np.flatnonzero(case.points == equal[1])[0])]
-        fields = {"case": case.number, "first": equal[0], "second": equal[1]}
-        raise place.error(phrase("comparators.equal-points", **fields))
 
 
 SUSPECT_UM, REMEASURE_UM = 2.0, 4.0  # mean shifts: check the second point, measure the case again

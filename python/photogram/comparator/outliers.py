@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.comparator.averages import Reduction
 from photogram.comparator.case import PlacedCase, exchanged
 from photogram.comparator.combined_solution import (
     CombinedLinear,
@@ -25,7 +26,6 @@ from photogram.comparator.fits import fit_affine, fit_rigid, rotation_matrix
 from photogram.comparator.grid import Grid
 from photogram.comparator.joint import JointFit
 from photogram.comparator.readings import Case, Session
-from photogram.comparator.reduction import Reduction
 from photogram.errors import AdjustmentError
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace

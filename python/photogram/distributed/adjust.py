@@ -54,8 +54,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.adjustment.keywords import AdjustKeywords
 
-__all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
-
 
 WHOLE = 950.0  # Bytes per image point and its share of the object point, for a block adjusted as a whole
 PARTS_A_WORKER = 4  # So that a slow worker does not delay the rest

@@ -11,8 +11,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
-__all__ = ["Division", "bytes_of"]
-
 MOST = 100_000  # Maximum number of workers or parts; more is a typing error
 MOST_BYTES = 2**63
 UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12, "ki": 2**10, "mi": 2**20, "gi": 2**30}

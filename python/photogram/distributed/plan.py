@@ -20,9 +20,6 @@ from photogram.show.page import Document, Fact, Facts, Section, about
 from photogram.show.quantity import Table, column, members
 from photogram.words import Phrase, phrase
 
-__all__ = ["PartsPlan", "Rates", "Times", "measured_rates", "scheduled"]
-
-
 IMAGE = 200.0  # Multiply-adds of the formation of an image point
 BANDWIDTH = 1e9  # Bytes per second between workers: 10 Gbit Ethernet
 ITERATIONS = 4  # Formations of an adjustment from typical initial values

@@ -187,7 +187,12 @@ def interior_orientation(
         raise InputError(phrase("films.few-marks", model=model, **fields))
     own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
     true = true_places(xy, own, machine, curves)
-    side = _side(q, true, mirrored)
+    found = is_mirrored(q, true)
+    if mirrored is None and found is None:
+        raise InputError(phrase("films.unknown-side"))
+    if mirrored is not None and found is not None and found != mirrored:
+        raise ContradictionError(mirror_message(mirrored, side_residuals(q, true)))
+    side = bool(found if mirrored is None else mirrored)
     fit = _Fit(
         q,
         xy,
@@ -215,15 +220,6 @@ def true_places(
 
 def _vectors(film: Film) -> Floats:
     return np.array([each.position for each in film.unknowns])
-
-
-def _side(q: Floats, true: Floats, given: bool | None) -> bool:
-    found = is_mirrored(q, true)
-    if given is None and found is None:
-        raise InputError(phrase("films.unknown-side"))
-    if given is not None and found is not None and found != given:
-        raise ContradictionError(mirror_message(given, side_residuals(q, true)))
-    return bool(found if given is None else given)
 
 
 def mirror_message(given: bool, apart: tuple[float, float]) -> Phrase:
@@ -297,7 +293,8 @@ class _Fit:
     def adjusted(self, model: FilmModel, values: Floats) -> Interior:
         known, shifts = [_place(name) for name in self.names], list(range(8, len(values)))
         columns, size, rows = known + shifts, np.abs(self.places).max(), 2 * len(self.places)
-        moves = np.concatenate([_moves(size), np.ones(len(shifts))])[columns]
+        # Movements of a mark at the edge per unit of each unknown
+        moves = np.array([1.0, 1.0, *[size] * 4, *[size**2] * 2, *np.ones(len(shifts))])[columns]
         for _ in range(_MAX_STEPS):
             right, matrix = self.equations(values)
             scale = np.linalg.norm(matrix, axis=0)
@@ -355,8 +352,3 @@ def _parts(reseau: Reseau, places: Floats) -> Floats:
 def _place(name: str) -> int:
     """Return the index of an unknown among t1, t2, theta, m, b1, b2 and h or g."""
     return UNKNOWNS["projective" if name in ("g1", "g2") else "bilinear"].index(name)
-
-
-def _moves(size: float) -> Floats:
-    """Return (8,) movements of a mark at the edge per unit of each unknown."""
-    return np.array([1.0, 1.0, size, size, size, size, size**2, size**2])

@@ -28,9 +28,6 @@ from photogram.messages import Message
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Coordinatograph, Grid, reduce
 from photogram.words import phrase
 
-__all__ = ["CardFormat", "Deck", "read_deck"]
-
-
 COLUMNS = 80
 _NUMERIC = re.compile(r"([IFED])(\d+)(?:\.\d+)?", re.ASCII)
 _ALLOWED = re.compile(r"(?:\d*[IFED]\d+(?:\.\d+)?|\d*X|T\d+|\d*\(|[),])+", re.ASCII)

@@ -31,8 +31,6 @@ from photogram.statistics.reliability import ROUNDING, TESTABLE
 from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
-__all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
-
 Weights = Literal["equal", "readings", "deviations"]
 
 MOST_CYCLES = 6  # Maximum number of cycles of the program
@@ -213,7 +211,20 @@ def determine(
         If weights cannot be computed.
     """
     truth_value("as_published", as_published)
-    weight = _weights(grid, weights, model_sd)
+    # Weights of the points with mean 1
+    one_of("weights", weights, get_args(Weights))
+    if model_sd is not None:
+        variance = shaped("model_sd", model_sd, (len(grid.ids),)) ** 2
+    elif weights == "deviations":
+        variance = (grid.reading_sd**2).mean(axis=1) / grid.readings
+    else:
+        variance = 1.0 / (grid.readings if weights == "readings" else np.ones(len(grid.ids)))
+    bad = np.flatnonzero(~((variance > 0) & np.isfinite(variance)))
+    if bad.size:
+        names = [str(grid.ids[index]) for index in bad.tolist()]
+        raise InputError(phrase("projector.no-weight", names=names))
+    weight: Floats = 1.0 / variance
+    weight /= weight.mean()
     unknown = tuple(dict.fromkeys(unknown))
     for name in unknown:
         one_of("unknown", name, INTERIOR)
@@ -234,24 +245,6 @@ def _observed(grid: Grid, weight: Floats) -> Observed:
         grid.model, 0.0, grid.plate_xy, np.repeat(weight[:, np.newaxis] ** -0.5, 2, axis=1),
         -grid.principal_distance, [str(each) for each in grid.ids],
     )  # fmt: skip
-
-
-def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats:
-    """Return weights of the points with mean 1."""
-    one_of("weights", weights, get_args(Weights))
-    if model_sd is not None:
-        variance = shaped("model_sd", model_sd, (len(grid.ids),)) ** 2
-    elif weights == "deviations":
-        variance = (grid.reading_sd**2).mean(axis=1) / grid.readings
-    else:
-        variance = 1.0 / (grid.readings if weights == "readings" else np.ones(len(grid.ids)))
-    bad = np.flatnonzero(~((variance > 0) & np.isfinite(variance)))
-    if bad.size:
-        names = [str(grid.ids[index]) for index in bad.tolist()]
-        raise InputError(phrase("projector.no-weight", names=names))
-    weight: Floats = 1.0 / variance
-    weight /= weight.mean()
-    return weight
 
 
 @dataclass(frozen=True, eq=False)

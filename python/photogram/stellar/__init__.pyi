@@ -1,13 +1,8 @@
 from .adjustment import calibrate as calibrate
-from .camera_yaml import read_yaml as read_yaml
-from .camera_yaml import to_yaml as to_yaml
-from .cameras import BrownCamera as BrownCamera
 from .cameras import PlateCamera as PlateCamera
-from .cameras import SkyCamera as SkyCamera
 from .cameras import camera_document as camera_document
 from .catalogue import Catalogue as Catalogue
 from .deck import read_deck as read_deck
-from .lenses import LENSES as LENSES
 from .night_calibration import calibrate_night as calibrate_night
 from .night_file import read_night as read_night
 from .night_result import CalibratedNight as CalibratedNight
@@ -19,9 +14,9 @@ from .parameters import NAMES as NAMES
 from .parameters import UNITS as UNITS
 from .places import Earth as Earth
 from .places import apparent_places as apparent_places
+from .places import attitude_of as attitude_of
 from .places import sidereal_time as sidereal_time
 from .plain import read_plain as read_plain
-from .pointing import attitude_of as attitude_of
 from .problem import Axis as Axis
 from .problem import Problem as Problem
 from .problem import default_parameters as default_parameters
@@ -35,3 +30,8 @@ from .sky import refraction as refraction
 from .sky_calibration import Exposure as Exposure
 from .sky_calibration import calibrate_exposures as calibrate_exposures
 from .sky_calibration import project_sky as project_sky
+from .sky_cameras import LENSES as LENSES
+from .sky_cameras import BrownCamera as BrownCamera
+from .sky_cameras import SkyCamera as SkyCamera
+from .sky_cameras import read_yaml as read_yaml
+from .sky_cameras import to_yaml as to_yaml

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,11 +12,11 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
-from photogram.stellar import report_iteration, strict
+from photogram.stellar.findings import plate_tests
+from photogram.stellar.iteration import DIVERGED, iterate, iterate_as_published
 from photogram.stellar.movement import combine, movement, pairs_to_combine
 from photogram.stellar.options import core_threads
-from photogram.stellar.outliers import culprits, harm, outliers
-from photogram.stellar.parameters import GROUPS, INDEX
+from photogram.stellar.parameters import GROUPS, INDEX, NAMES
 from photogram.stellar.problem import Problem
 from photogram.stellar.result import Result
 from photogram.stellar.state import PreRun, Solved, Stage
@@ -60,18 +61,16 @@ def calibrate(
     """
     core_threads(threads)  # validated for both iterations
     options, initial = problem.options, problem.initial.copy()
-    iterate = (
-        report_iteration.iterate
-        if options.as_published
-        else partial(strict.iterate, threads=threads, progress=progress)
-    )
+    run: Callable[..., Solved] = iterate_as_published
+    if not options.as_published:
+        run = partial(iterate, threads=threads, progress=progress)
     stages: tuple[Stage, ...] = ()
     if options.minimum_stars:
         smallest, limit = _minimum_problem(problem), options.max_iterations_minimum
         estimated = np.zeros(len(initial), bool)
         estimated[6:14] = ~problem.fixed[6:14]
         estimated[INDEX["cy"]] &= not options.common_scale
-        solved = iterate(smallest, initial, estimated, solution="minimum", limit=limit)
+        solved = run(smallest, initial, estimated, solution="minimum", limit=limit)
         stages = (Stage.of(smallest, solved),)
         initial = solved.parameters.copy()
         initial[0:3] = initial[3:6] = initial[6:9]
@@ -88,17 +87,17 @@ def calibrate(
     if options.as_published:
         solved, remarks = _from_far(problem, initial, free)
     else:
-        solved = iterate(problem, initial, free, solution="maximum", limit=limit)
+        solved = run(problem, initial, free, solution="maximum", limit=limit)
     stages = (*stages, Stage.of(problem, solved))
     if options.refraction and solved.converged:
-        solved = _refraction(problem, iterate, solved)
+        solved = _refraction(problem, run, solved)
         stages = (*stages, Stage.of(problem, solved))
     elif options.refraction:
         remarks = [phrase("stars.no-refraction-solution")]
 
     def solve(left: Problem) -> Solved:
-        found = iterate(left, initial, free_parameters(left), solution="maximum", limit=limit)
-        return _refraction(left, iterate, found) if options.refraction and found.converged else found
+        found = run(left, initial, free_parameters(left), solution="maximum", limit=limit)
+        return _refraction(left, run, found) if options.refraction and found.converged else found
 
     def solution(left: Problem) -> Result:
         stage = Stage.of(left, found := solve(left))
@@ -119,17 +118,17 @@ def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, l
     A deck contains only the attitude of the event, for all groups. The strict iteration with a fixed camera
     gives attitudes from which the steps of the report converge. The solution does not depend on them.
     """
-    run = partial(report_iteration.iterate, solution="maximum", limit=problem.options.max_iterations)
+    run = partial(iterate_as_published, solution="maximum", limit=problem.options.max_iterations)
     failed: AdjustmentError | None = None
     try:
         solved = run(problem, initial, free)
-        if solved.stop != report_iteration.DIVERGED:
+        if solved.stop != DIVERGED:
             return solved, []
     except AdjustmentError as error:
         failed = error
     attitudes = free & (np.arange(len(free)) < INDEX["epsilon"])
     try:
-        start = strict.iterate(problem, initial, attitudes, solution="maximum", limit=0).parameters
+        start = iterate(problem, initial, attitudes, solution="maximum", limit=0).parameters
         again = run(problem, start, free)
         if again.converged:
             return again, [phrase("stars.far-attitudes")]
@@ -223,3 +222,80 @@ def _combined(result: Result, threads: int | None) -> Result:
         message = Message(phrase("stars.combined-not-converged", stop=combined.solved.stop))
         result = replace(result, messages=(message, *result.messages))
     return replace(result, combined=combined)
+
+
+_FALL = 10.0  # Least reduction ratio of the sum of squares by removal of a faulty star
+_MAX_ROUNDS = 10
+_MAX_SUSPECTS = 12
+
+
+def outliers(result: Result) -> list[Phrase]:
+    """Return a warning on the outliers of the verdict, worst first, or an empty list."""
+    found = [
+        (float(abs(tested.values[place])), tested.name(place))
+        for tested in plate_tests(result)
+        for place in result.verdict.outlying.get(tested.kind, ())
+    ]
+    if not found:
+        return []
+    found.sort(key=lambda item: -item[0])
+    names = [phrase("stars.outlier", name=name, value=value) for value, name in found]
+    fields = result.verdict.outliers[0].fields
+    return [phrase("stars.outliers", statistic=fields["statistic"], limit=fields["limit"], names=names)]
+
+
+def harm(result: Result, iterate: Callable[[Problem], Result]) -> Phrase | None:
+    """Return the largest parameter change by outliers, in sd without them, or None.
+
+    Rounds reject outliers that are at least half as large as the worst, and adjust again. None for a change
+    below one, or if the remaining observations do not determine the camera.
+    """
+    clean = result
+    for _ in range(_MAX_ROUNDS):
+        tests, outlying = plate_tests(clean), clean.verdict.outlying
+        if not any(outlying.values()):
+            break
+        sizes = [np.nan_to_num(np.abs(tested.values)).max(axis=1, initial=0.0) for tested in tests]
+        half = 0.5 * max(values.max(initial=0.0) for values in sizes)
+        images, stars = (np.zeros(len(values), bool) for values in sizes)
+        for tested, rows, values in zip(tests, (images, stars), sizes, strict=True):
+            rows[[place[0] for place in outlying.get(tested.kind, ())]] = True
+            rows &= values > half
+        try:
+            clean = iterate(clean.problem.without(stars, images))
+        except AdjustmentError:
+            return None
+        if not clean.converged:
+            return None
+    sd = np.sqrt(np.diag(clean.covariance))
+    camera = np.flatnonzero(clean.solved.free & (sd > 0) & (np.arange(len(sd)) >= INDEX["epsilon"]))
+    change = np.abs(result.solved.parameters - clean.solved.parameters)[camera] / sd[camera]
+    if not change.size or change.max() <= 1.0:
+        return None
+    return phrase("stars.harm", name=NAMES[camera[int(change.argmax())]], change=float(change.max()))
+
+
+def culprits(problem: Problem, solved: Solved, iterate: Callable[[Problem], Solved]) -> list[Phrase]:
+    """Return a warning on the star whose removal makes the solution converge."""
+    before = sum(solved.sums)
+    best, culprit = math.inf, ""
+    for star in _suspects(problem, solved):
+        others = np.arange(len(problem.star_ids)) == star
+        try:
+            again = iterate(problem.without(others, np.zeros(len(problem.image_points), bool)))
+        except AdjustmentError:
+            continue
+        total = sum(again.sums)
+        if again.converged and _FALL * total < before and total < best:
+            best, culprit = total, problem.star_ids[star]
+    return [phrase("stars.culprit", star=culprit)] if culprit else []
+
+
+def _suspects(problem: Problem, solved: Solved) -> list[int]:
+    size = np.zeros(len(problem.star_ids))
+    weighted = np.einsum("mi,mij,mj->m", solved.residuals, problem.image_weights, solved.residuals)
+    np.maximum.at(size, problem.image_stars, np.nan_to_num(weighted))
+    observed = problem.known & ~problem.held
+    off = (solved.places - problem.star_places)[observed]
+    size[observed] += np.nan_to_num(np.einsum("si,sij,sj->s", off, problem.star_weights[observed], off))
+    return [int(star) for star in np.argsort(-size, kind="stable")[:_MAX_SUSPECTS]]

@@ -18,15 +18,14 @@ from photogram.io.json import read_json, to_json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
 from photogram.stellar.parameters import GROUPS, INDEX, INTERIOR, UNITS
-from photogram.stellar.pointing import transformed_angles
+from photogram.stellar.places import transformed_angles
 from photogram.stellar.problem import Problem
-from photogram.stellar.sky_cameras import BrownCamera, SkyCamera, read_camera, weight_of
+from photogram.stellar.sky_cameras import SkyCamera, read_camera, weight_of
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
 
-__all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document", "camera_from"]
 
 _IN_MODEL = {"cx": "c", "cy": "c_y"}
 _METRE = 1000.0  # in mm

@@ -23,7 +23,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.stellar.odds import binomial_tail
+from photogram.stellar.matching import binomial_tail
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, partials
 
 if TYPE_CHECKING:

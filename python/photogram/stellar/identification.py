@@ -11,8 +11,18 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
-from photogram.stellar.matching import FEWEST, STRETCH, Match, Search, match
-from photogram.stellar.odds import ACCEPTED, DOUBTFUL, expected_false, log_odds, star_probabilities
+from photogram.stellar.matching import (
+    ACCEPTED,
+    DOUBTFUL,
+    FEWEST,
+    STRETCH,
+    Match,
+    Search,
+    expected_false,
+    log_odds,
+    match,
+    star_probabilities,
+)
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, project_sky

@@ -10,7 +10,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.stellar import report_iteration, strict
+from photogram.stellar.iteration import iterate, residual_cycle
 from photogram.stellar.parameters import GROUPS, NAMES
 from photogram.stellar.problem import Problem, core_problem
 from photogram.stellar.state import Solved
@@ -200,7 +200,7 @@ def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
     misclosure = -(np.remainder(off + np.pi, 2 * np.pi) - np.pi)
     step, cofactors = modify(solved.cofactors, np.zeros(len(solved.parameters)), c, misclosure)
     parameters = solved.parameters + step
-    return report_iteration.residual_cycle(
+    return residual_cycle(
         problem,
         parameters,
         solved.free,
@@ -231,7 +231,7 @@ def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int |
         initial=initial,
     )
     free = solved.free & (spread.any(axis=0))
-    again = strict.iterate(
+    again = iterate(
         merged,
         solved.parameters,
         free,

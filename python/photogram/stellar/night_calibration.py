@@ -22,15 +22,12 @@ from photogram.stellar.camera_tables import correlation_remarks
 from photogram.stellar.comparison import stood_still
 from photogram.stellar.identification import attitude_of_stars, has_named_stars
 from photogram.stellar.lens_choice import POSITIVE, LensFit, LensTest, test_scale, test_terms
-from photogram.stellar.lenses import LENSES
 from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.night_run import Run, adjusted
 from photogram.stellar.places import Earth
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
-from photogram.stellar.sky_cameras import SkyCamera
+from photogram.stellar.sky_cameras import LENSES, SkyCamera
 from photogram.words import Phrase, phrase
-
-__all__ = ["CalibratedNight", "Night", "calibrate_night"]
 
 _MAX_FIELDS = 200  # Fields of view that are tested if images name their stars
 _MAX_ROUNDS = 10
@@ -39,9 +36,9 @@ _MAX_ROUNDS = 10
 def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight:
     """Identify the stars of a night and calibrate the camera.
 
-    An exposure is used if its stars are significant against chance (`photogram.stellar.odds`) and if it fits
+    An exposure is used if its stars are significant against chance and if it fits
     the camera of the others (`photogram.stellar.comparison`). Messages name the other exposures and the
-    probable cause, if found (`photogram.stellar.hints`).
+    probable cause, if found.
 
     Raises
     ------
@@ -55,7 +52,13 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
     lenses: list[LensFit] = []
     if night.blind is not None:
         still = _located(still, night.blind)
-    still = _directed(still)
+    exposures = [
+        replace(exposure, attitude=attitude_of_stars(exposure, still.camera, still)[0])
+        if has_named_stars(exposure) and np.isnan(exposure.attitude).any()
+        else exposure
+        for exposure in still.exposures
+    ]
+    still = replace(still, exposures=exposures)
     if night.lenses:
         lenses, still = _with_best_lens(still, threads)
     run = _run(still, threads)
@@ -117,16 +120,6 @@ def _field_of_stars(night: Night, fields: tuple[float, float]) -> list[float]:
         return sum(attitude_of_stars(exposure, camera, night)[1] for exposure in named)
 
     return [min(np.geomspace(*fields, _MAX_FIELDS).tolist(), key=misfit)] if named else []
-
-
-def _directed(night: Night) -> Night:
-    exposures = [
-        replace(exposure, attitude=attitude_of_stars(exposure, night.camera, night)[0])
-        if has_named_stars(exposure) and np.isnan(exposure.attitude).any()
-        else exposure
-        for exposure in night.exposures
-    ]
-    return replace(night, exposures=exposures)
 
 
 def _run(night: Night, threads: int | None) -> Run:

@@ -18,18 +18,15 @@ from photogram.io.delimited import read_records, renaming
 from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlTree, read_document
 from photogram.messages import unknown_name
-from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue, star_key
 from photogram.stellar.identification import STARS_OF_AN_ATTITUDE
-from photogram.stellar.lenses import LENSES
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.night_result import Night
 from photogram.stellar.parameters import GRAD
-from photogram.stellar.places import Earth, epoch, pointing_matrix, station_attitude
-from photogram.stellar.pointing import attitude_of, axis_of
+from photogram.stellar.places import Earth, attitude_of, axis_of, epoch, pointing_matrix, station_attitude
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
-from photogram.stellar.sky_cameras import SkyCamera
+from photogram.stellar.sky_cameras import LENSES, SkyCamera, read_yaml
 from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
 from photogram.words import phrase
 

@@ -18,12 +18,11 @@ from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, significance
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.lenses import lens_named
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.places import Earth, InertialAttitude, inertial_attitude
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
-from photogram.stellar.sky_cameras import SkyCamera
+from photogram.stellar.sky_cameras import SkyCamera, lens_named
 from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 

@@ -15,8 +15,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.stellar.sky import Site
 from photogram.words import phrase
 
-__all__ = ["Options"]
-
 _DAYS = 20 * math.pi  # A time of ten days, in radians
 _STEPS = 10_000  # Largest number of rows of a curve table
 

@@ -24,8 +24,7 @@ from photogram.messages import unknown_name
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.options import core_threads
 from photogram.stellar.parameters import COMMON
-from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
-from photogram.stellar.pointing import transformed_angles
+from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time, transformed_angles
 from photogram.stellar.problem import NO_PRIOR, Prior, core_problem
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_cameras import SkyCamera, weight_of

@@ -1,27 +1,109 @@
-"""Calibrated cameras of digital exposures with covariance, of any lens, in pixels, and their files."""
+"""Cameras of digital exposures with any lens and covariance, in pixels, and their files (JSON, YAML)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, truth_value
+from photogram.arguments.arrays import argument_error, one_of, truth_value
 from photogram.arguments.fields import check_fields
+from photogram.arguments.objects import path_of
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.json import read_json, to_json
 from photogram.io.tree import Tree
+from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
-from photogram.stellar.lenses import LENSES, Lens, lens_named
 from photogram.stellar.parameters import COMMON, INTERIOR
 from photogram.stellar.sky import TAU
 from photogram.words import phrase
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Lens model of a digital camera."""
+
+    model: str  # Camera model of `docs/cameras.md`
+    # Parameters in the order of reports and files, fx, fy, cx, cy first; missing model parameters are zero
+    names: tuple[str, ...]
+    order: tuple[str, ...]  # All parameters of the model, in its order
+    # Distance from the principal point in principal distances, without lens terms, for an axis angle
+    # (radians)
+    radius: Callable[[float], float]
+    formula: str  # The radius formula for reports
+    widest: float  # The field of view (radians) at and above which images are undefined
+    # Terms that are zero unless given in a camera file: without them the lens is the named projection
+    held: tuple[str, ...] = ()
+    # Groups of terms for tests, in the order of removal if insignificant
+    groups: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Indices of the parameters in the model."""
+        return tuple(self.order.index(name) for name in self.names)
+
+
+_SQUARE = ("fx", "fy", "cx", "cy")
+_TWO_TERMS = (*_SQUARE, "k1", "k2")
+_FISHEYE = (*_SQUARE, "k1", "k2", "k3", "k4")
+
+LENSES: dict[str, Lens] = {
+    "brown": Lens(
+        "full_opencv",
+        (*_SQUARE, "k1", "k2", "k3", "p1", "p2"),
+        (*_SQUARE, "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+        math.tan,
+        "tan theta (1 + k1 r^2 + k2 r^4 + k3 r^6) and decentering",
+        math.pi,
+        groups=(("k3",), ("k2",), ("k1",), ("p1", "p2")),
+    ),
+    "equidistant": Lens("opencv_fisheye", _SQUARE, _FISHEYE, lambda theta: theta, "theta", math.tau),
+    "equisolid": Lens(
+        "equisolid",
+        _TWO_TERMS,
+        _TWO_TERMS,
+        lambda theta: 2 * math.sin(0.5 * theta),
+        "2 sin(theta/2)",
+        math.tau,
+        held=("k1", "k2"),
+    ),
+    "stereographic": Lens(
+        "stereographic",
+        _TWO_TERMS,
+        _TWO_TERMS,
+        lambda theta: 2 * math.tan(0.5 * theta),
+        "2 tan(theta/2)",
+        math.tau,
+        held=("k1", "k2"),
+    ),
+    "kannala_brandt": Lens(
+        "opencv_fisheye",
+        _FISHEYE,
+        _FISHEYE,
+        lambda theta: theta,
+        "theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)",
+        math.tau,
+        groups=(("k4",), ("k3",), ("k2",), ("k1",)),
+    ),
+}
+"""Lenses by name in files and reports."""
+
+
+def lens_named(name: str) -> Lens:
+    """Return a lens.
+
+    InputError: if the name is unknown.
+    """
+    if name not in LENSES:
+        raise InputError(unknown_name("lens", name, LENSES))
+    return LENSES[name]
 
 
 def weight_of(covariance: Floats) -> Floats:
@@ -244,3 +326,111 @@ class BrownCamera(SkyCamera):
     """
 
     NAMES = LENSES["brown"].names
+
+
+YamlForm = Literal["opencv", "ros"]  # Format of the file
+
+_BROWN = ("k1", "k2", "p1", "p2", "k3")
+_KANNALA_BRANDT = ("k1", "k2", "k3", "k4")
+_ROS = {"plumb_bob": _BROWN, "equidistant": _KANNALA_BRANDT}
+_LENSES = {"brown": ("plumb_bob", _BROWN), "kannala_brandt": ("equidistant", _KANNALA_BRANDT)}
+_LENSES["equidistant"] = _LENSES["kannala_brandt"]
+WITH_YAML = frozenset(_LENSES)  # Lenses supported in YAML
+_MATRIX = ("camera_matrix", "Camera_Matrix", "K")
+_DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "D")
+
+
+def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name: str = "camera") -> bytes:
+    """Return a camera as a YAML file.
+
+    Parameters
+    ----------
+    camera
+        Camera with a `brown`, `equidistant` or `kannala_brandt` lens. Pixel coordinates are not converted. In
+        OpenCV and ROS the centre of the first pixel is (0, 0).
+    frame
+        Width and height, pixels.
+    form
+        `opencv`: camera_matrix, distortion_coefficients (four of `cv2.fisheye`), image_width, image_height
+        and the standard deviations. `ros`: camera_info with distortion_model plumb_bob or equidistant.
+    name
+        Camera name in ROS.
+
+    Raises
+    ------
+    InputError
+        If the lens is not supported.
+    """
+    if camera.lens not in _LENSES:
+        raise InputError(phrase("stars.no-yaml", lens=camera.lens, lenses=list(_LENSES)))
+    model, terms = _LENSES[camera.lens]
+    values = dict(zip(camera.names, camera.values.tolist(), strict=True))
+    sd = np.sqrt(np.diag(camera.covariance))
+    errors = dict(zip(camera.names, sd.tolist(), strict=True))
+    if camera.common_scale:
+        errors["fy"] = errors["fx"]
+    matrix = np.array([[values["fx"], 0, values["cx"]], [0, values["fy"], values["cy"]], [0, 0, 1]], float)
+    coefficients = [values.get(term, 0.0) for term in terms]
+    width, height = round(frame[0]), round(frame[1])
+    one_of("form", form, get_args(YamlForm))
+    if form == "ros":
+        return camera_info(name, (width, height), matrix, (model, coefficients))
+    order = ("fx", "fy", "cx", "cy", *terms)
+    lines = [
+        "%YAML:1.0",
+        "---",
+        f"image_width: {width}",
+        f"image_height: {height}",
+        f"fisheye_model: {int(model == 'equidistant')}",
+        *matrix_lines("camera_matrix", matrix, opencv=True),
+        *matrix_lines("distortion_coefficients", [coefficients], opencv=True),
+        f"# of {', '.join(order)}",
+        *matrix_lines("standard_deviations", [[errors.get(term, 0.0) for term in order]], opencv=True),
+    ]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
+    """Read a camera from a YAML file of OpenCV or ROS.
+
+    Returns
+    -------
+    Camera without covariance, since YAML contains no correlations, and frame width and height in pixels.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has another format, or contains unsupported lens terms.
+    """
+    path = path_of("path", path)
+    content = Tree(read_yaml_text(path), path)
+    matrix = _member(content, *_MATRIX)
+    values = np.reshape(matrix["data"].numbers(9), (3, 3))
+    distortion = _member(content, *_DISTORTION)
+    coefficients = distortion["data"].numbers()
+    frame = (
+        float(_member(content, "image_width", "image_Width", "width").whole(1)),
+        float(_member(content, "image_height", "image_Height", "height").whole(1)),
+    )
+    if values[0, 1] or not np.array_equal(values[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
+        raise matrix.error(phrase("stars.camera-matrix", value=str(values.tolist())))
+    fisheye = _is_fisheye(content)
+    terms = _KANNALA_BRANDT if fisheye else _BROWN
+    if any(coefficients[len(terms) :]):
+        raise distortion.error(phrase("stars.more-terms", terms=list(terms)))
+    parameters = {"fx": values[0, 0], "fy": values[1, 1], "cx": values[0, 2], "cy": values[1, 2]}
+    parameters |= dict(zip(terms, [*coefficients, *[0.0] * len(terms)], strict=False))
+    of, lens = (SkyCamera, "kannala_brandt") if fisheye else (BrownCamera, "brown")
+    empty = of.of_field(*frame, 1.0, lens)
+    return of(np.array([parameters[name] for name in empty.names]), empty.covariance, lens), frame
+
+
+def _member(content: Tree, *keys: str) -> Tree:
+    return content[next((key for key in keys if key in content), keys[0])]
+
+
+def _is_fisheye(content: Tree) -> bool:
+    """Return whether the file specifies a fisheye model."""
+    if "distortion_model" in content:
+        return content["distortion_model"].choice(_ROS) == "equidistant"
+    return content.get("fisheye_model", 0).value not in (0, False)

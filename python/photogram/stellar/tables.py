@@ -38,7 +38,7 @@ from photogram.stellar.directions import Ellipse, ellipse
 from photogram.stellar.findings import plate_tests
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
-from photogram.stellar.pointing import transformed_angles
+from photogram.stellar.places import transformed_angles
 from photogram.stellar.problem import Counts
 
 if TYPE_CHECKING:

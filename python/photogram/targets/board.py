@@ -99,7 +99,22 @@ class Board(Valued, Brief):
     def __post_init__(self) -> None:
         check_fields(self)
         if self.kind == "points":
-            self._check_points()
+            self._refuse("tag_size", "tag_spacing", "spacing")
+            if self.points is None:
+                raise argument_error("points", "empty")
+            if self.shape == "bend":
+                raise InputError(phrase("targets.bend"))
+            self._set("points", shaped("points", self.points, (None, 3)))
+            count = len(np.asarray(self.points))
+            beyond = ~(np.abs(np.asarray(self.points)) <= MAX_LENGTH)
+            if beyond.any():
+                value = float(np.asarray(self.points)[beyond][0])
+                raise argument_error("points", "range", low=-MAX_LENGTH, high=MAX_LENGTH, value=value)
+            if self.point_names is not None:
+                point_names = names("point_names", self.point_names)
+                if len(point_names) != count or len(set(point_names)) < count:
+                    raise InputError(phrase("targets.names", count=count, given=len(set(point_names))))
+                self._set("point_names", tuple(point_names))
         else:
             self._check_grid()
         if self.point_sd is not None:
@@ -147,24 +162,6 @@ class Board(Valued, Brief):
         if len(both) != 2:
             raise argument_error("spacing", "count", count=2, actual=len(both))
         self._set("spacing", (_length("spacing", both[0]), _length("spacing", both[1])))
-
-    def _check_points(self) -> None:
-        self._refuse("tag_size", "tag_spacing", "spacing")
-        if self.points is None:
-            raise argument_error("points", "empty")
-        if self.shape == "bend":
-            raise InputError(phrase("targets.bend"))
-        self._set("points", shaped("points", self.points, (None, 3)))
-        count = len(np.asarray(self.points))
-        beyond = ~(np.abs(np.asarray(self.points)) <= MAX_LENGTH)
-        if beyond.any():
-            value = float(np.asarray(self.points)[beyond][0])
-            raise argument_error("points", "range", low=-MAX_LENGTH, high=MAX_LENGTH, value=value)
-        if self.point_names is not None:
-            point_names = names("point_names", self.point_names)
-            if len(point_names) != count or len(set(point_names)) < count:
-                raise InputError(phrase("targets.names", count=count, given=len(set(point_names))))
-            self._set("point_names", tuple(point_names))
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the board."""

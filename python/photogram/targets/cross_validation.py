@@ -118,22 +118,14 @@ def parts_agree(
         splined = any(each.knots is not None for each in a.cameras)
         changed, known = change[own], cofactors[own, own]
         if splined:
-            changed, known = _seen_by_both(changed, known, np.diag(a.cofactors + b.cofactors)[own])
+            # (r,) changes that corners determine, and their (r, r) cofactors
+            scale = 1 / np.sqrt(np.diag(a.cofactors + b.cofactors)[own])
+            values, vectors = np.linalg.eigh(known * scale[:, np.newaxis] * scale)
+            kept = values > RANK_TOLERANCE
+            changed, known = vectors[:, kept].T @ (scale * changed), np.diag(values[kept])
         chi2 = float(changed @ np.linalg.solve(known, changed)) / variance
         found.append(DifferenceTest.of(name, chi2, len(changed), freedom))
     return found
-
-
-def _seen_by_both(change: Floats, cofactors: Floats, whole: Floats) -> tuple[Floats, Floats]:
-    """Return (r,) changes that corners determine, and their (r, r) cofactors.
-
-    Combinations of knots determined only by common priors do not change. `whole` contains the cofactors (u,)
-    of changes for separate priors.
-    """
-    scale = 1 / np.sqrt(whole)
-    values, vectors = np.linalg.eigh(cofactors * scale[:, np.newaxis] * scale)
-    kept = values > RANK_TOLERANCE
-    return vectors[:, kept].T @ (scale * change), np.diag(values[kept])
 
 
 def cross_map(

@@ -23,14 +23,6 @@ if TYPE_CHECKING:
     from photogram.targets import Calibrated
 
 
-__all__ = [
-    "plot_cross_validation",
-    "plot_difference",
-    "plot_uncertainty",
-    "plot_uncertainty_curve",
-    "steps_of_125",
-]
-
 MAX_DOTS = 4000  # plotted corners
 ARROWS_ALONG_PICTURE = 24
 WIDTH_INCHES = 7.6
@@ -223,8 +215,6 @@ def in_pixels(size: tuple[int, int]) -> Panel:
     limits = np.array([[-0.5, size[1] - 0.5], [size[0] - 0.5, -0.5]])
     return Panel(limits, across="column, px", up="row, px", equal=True)
 
-
-__all__ = ["plot_board_residuals", "plot_poorest_views"]
 
 VIEWS_DRAWN = 3
 MAX_VECTOR, OUTLIER_FACTOR = 1.5, 3.0  # in point spacings; multiple of the length limit of other vectors

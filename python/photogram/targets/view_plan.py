@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,11 +45,6 @@ from photogram.targets.regularisation import weighted_block
 from photogram.targets.uncertainty import checked_distance, uncertainty_map
 from photogram.targets.vision import rays
 from photogram.words import phrase
-
-if TYPE_CHECKING:
-    from photogram.targets import ViewPlan
-
-__all__ = ["plan_views"]
 
 BOARD_OF_PICTURE = (0.9, 0.6, 0.4)  # ratio of the longer side of the board and the shorter side of the image
 FIRST_TILTS = tuple(name for name in TILTS if name)
@@ -328,8 +322,6 @@ def _views(plan: ViewPlan) -> Table:
     about = "Largest is the largest standard deviation over the picture with this view and those before it."
     return Table("views", "Views to take", columns, about=about)
 
-
-__all__ = ["plot_planned_views"]
 
 PANELS_PER_ROW, PANEL_INCHES = 4, 2.2
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photogram.comparator.listing.forms import residual_page
 from photogram.comparator.listing.parameters import (
     case_linear_page,
     case_polynomial_page,
@@ -12,6 +11,7 @@ from photogram.comparator.listing.parameters import (
     combined_polynomial_page,
     correction_table,
     joint_page,
+    residual_page,
     summary_page,
     tests_page,
 )

@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.comparator.averages import LocationAverages
 from photogram.comparator.case import Closeout, exchanged
 from photogram.comparator.grid import Grid
-from photogram.comparator.listing.forms import centred, nearest, number, sums
+from photogram.comparator.listing.parameters import centred, nearest, number, sums
 from photogram.comparator.pointing import Precision
 
 if TYPE_CHECKING:

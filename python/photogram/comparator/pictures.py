@@ -1,0 +1,433 @@
+"""Plots of a calibration by name: vectors, corrections, error ellipses, statistics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.case import exchanged
+from photogram.comparator.listing.parameters import table_nodes
+from photogram.comparator.pointing import CONFIDENCE_FACTORS, Ellipse
+from photogram.errors import InputError
+from photogram.show.sketch.marks import (
+    Arrows,
+    Ellipses,
+    Line,
+    Mark,
+    Markers,
+    Names,
+    Panel,
+    Polygons,
+    Shades,
+    Texts,
+    around,
+    boxes,
+    contours,
+)
+from photogram.show.sketch.plot import Plot, side_by_side
+from photogram.show.style import BLUE, FAINT, INK, SOFT, VERMILION, round_length
+from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
+    from photogram.comparator import Calibration
+    from photogram.comparator.pointing import Precision
+    from photogram.comparator.polynomial import Polynomial
+
+__all__ = ["sketches"]
+
+
+def sketches(calibration: Calibration) -> dict[str, Plot]:
+    """Return all plots of a calibration, by short names."""
+    return {name: plotter() for name, plotter in plotters(calibration).items()}
+
+
+def plotters(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
+    """Return the plot functions of a calibration, by short names."""
+    nonlinear, joint = calibration.nonlinear, calibration.joint
+    made: dict[str, Callable[[], Plot]] = {
+        "variance": partial(variance_bars, calibration),
+        "comparator-residuals": partial(comparator_vectors, calibration),
+        "grid-residuals": partial(grid_vectors, calibration),
+    }
+    for plate in calibration.plates:
+        made[f"average-residuals-{plate}"] = partial(average_vectors, calibration, plate)
+        if joint and joint.plates[plate].sigma_um > 0:
+            made[f"grid-corrections-{plate}"] = partial(joint_grid, calibration, plate)
+    polynomials = [("", "", nonlinear.polynomial)] if nonlinear else []
+    polynomials += [
+        (f"-case-{case.number}", f", case {case.number} alone", case.polynomial.polynomial)
+        for case in calibration.cases
+        if calibration.session.plot_each_case and case.polynomial
+    ]
+    for ending, whose, polynomial in polynomials:
+        made[f"correction{ending}"] = partial(correction_surface, calibration, polynomial, whose)
+        made[f"distorted-grid{ending}"] = partial(distorted_grid, calibration, polynomial, whose)
+    made["pointing-ellipses"] = partial(pointing_ellipses, calibration)
+    for operator in calibration.pointing.operators:
+        made[f"pointing-ellipses-operator-{operator}"] = partial(operator_ellipses, calibration, operator)
+    return made | {
+        "pointing-ellipses-total": partial(total_ellipses, calibration),
+        "pooled-ellipses": partial(pooled_ellipses, calibration),
+        "residual-histogram": partial(residual_histogram, calibration),
+    }
+
+
+def comparator_vectors(calibration: Calibration) -> Plot:
+    """Draw the final residuals of each case in the comparator system."""
+    residuals = [fit.residuals for fit in calibration.last_fits]
+    return _by_case(
+        calibration,
+        [own.xy_um for own in residuals],
+        [own.comparator_um for own in residuals],
+        OF_COMPARATOR,
+        "Residuals in the comparator system (to be added to the measurement)",
+    )
+
+
+def grid_vectors(calibration: Calibration) -> Plot:
+    """Draw the final residuals of each case in the plate system."""
+    hands = [case.placed.orientation.left_handed for case in calibration.cases]
+    return _by_case(
+        calibration,
+        [exchanged(case.placed.grid_um, hand) for case, hand in zip(calibration.cases, hands, strict=True)],
+        [
+            exchanged(fit.residuals.grid_um, hand)
+            for fit, hand in zip(calibration.last_fits, hands, strict=True)
+        ],
+        OF_PLATE,
+        "Residuals in the grid system (to be added to the grid)",
+    )
+
+
+def _by_case(
+    calibration: Calibration,
+    places: Sequence[Floats],
+    vectors: Sequence[Floats],
+    axes: tuple[str, str],
+    title: str,
+) -> Plot:
+    every = np.vstack(vectors)
+    scale = magnification(places[0] / MM, every)
+    # The longest residual of all panels defines their common scale.
+    key = scale, round_length(float(np.hypot(*every.T).max()))
+    limits = limits_of(np.vstack(places), every, scale)
+    panels = [
+        plan(
+            limits,
+            arrows(own, vector, scale),
+            f"case {case.number}, point {case.placed.orientation.nearest_point} nearest zero",
+            axes,
+            key,
+        )
+        for case, own, vector in zip(calibration.cases, places, vectors, strict=True)
+    ]
+    return side_by_side(panels, PANELS_ACROSS, 3.4, title)
+
+
+def average_vectors(calibration: Calibration, plate: int) -> Plot:
+    """Draw average residuals by comparator location and by grid point, on one scale."""
+    result = calibration.plates[plate]
+    averages = result.averages
+    grid = calibration.session.grids[plate]
+    own = grid.xy_um[grid.rows_of(averages.points)]
+    corrections = averages.corrections_um
+    together = np.vstack([corrections, averages.location_um])
+    scale = magnification(own / MM, together)
+    key = scale, round_length(float(np.hypot(*together.T).max()))
+    panels = [
+        plan(
+            limits_of(place.xy_um, place.residuals_um, scale),
+            arrows(place.xy_um, place.residuals_um, scale),
+            f"by comparator location, cases {', '.join(map(str, place.cases))}",
+            OF_COMPARATOR,
+            key,
+        )
+        for place in averages.by_location
+    ]
+    marks, title = arrows(own, corrections, scale, ACCENT), "by grid point: correction of the grid"
+    panels.append(plan(limits_of(own, corrections, scale), marks, title, OF_PLATE, key))
+    return side_by_side(
+        panels, PANELS_ACROSS, 4.2, f"Average residuals of {len(averages.cases)} cases, plate {plate}"
+    )
+
+
+def joint_grid(calibration: Calibration, plate: int) -> Plot:
+    """Draw the grid corrections of the joint adjustment with standard ellipses."""
+    joint = calibration.joint
+    if joint is None:
+        raise InputError(phrase("comparators.no-joint"))
+    own = joint.plates[plate]
+    grid = calibration.session.grids[plate]
+    places = grid.xy_um[grid.rows_of(own.points)]
+    ellipses = [Ellipse.of(c[0, 0], c[1, 1], c[0, 1]) for c in own.covariance_um2]
+    largest = max(ellipse.major_um for ellipse in ellipses)
+    # Space for an arrow and the ellipse at its end.
+    scale = magnification(places / MM, own.corrections_um * (1 + largest / np.abs(own.corrections_um).max()))
+    ends = places / MM + own.corrections_um * scale
+    semi_axes = scale * np.array([[each.major_um, each.minor_um] for each in ellipses])
+    turns = np.degrees([each.angle_rad for each in ellipses])
+    marks = [
+        *arrows(places, own.corrections_um, scale, ACCENT),
+        Ellipses(ends, semi_axes, turns, FAINT, 0.9, layer=1.5),
+        Names(places / MM, [str(point) for point in own.points.tolist()], [SOFT] * len(places), ends),
+    ]
+    reach = scale * largest
+    limits = around(np.vstack([places / MM, ends - reach, ends + reach]))
+    key = scale, round_length(float(np.hypot(*own.corrections_um.T).max()))
+    title = f"Corrections of grid {plate} by the joint adjustment, standard ellipses"
+    return Plot(6.2, 5.8, [plan(limits, marks, title, OF_PLATE, key)])
+
+
+MAIN, ACCENT = BLUE, VERMILION
+MM = 1000.0
+PANELS_ACROSS = 4
+OF_PLATE = ("X of the plate, mm", "Y of the plate, mm")
+OF_COMPARATOR = ("x, mm", "y, mm")
+
+
+def plan(
+    limits: Floats,
+    marks: Sequence[Mark],
+    title: str,
+    axes: tuple[str, str],
+    key: tuple[float, float] | None = None,
+) -> Panel:
+    """Return a map of equal scales; `key`: mm per micrometre, micrometres of the bar."""
+    bars = [(key[0] * key[1], ACCENT, f"{key[1]:g} µm")] if key else []
+    return Panel(limits, marks, title, *axes, equal=True, bars=bars)
+
+
+def magnification(places_mm: Floats, vectors_um: Floats) -> float:
+    """Return plot millimetres per micrometre for vectors within 0.9 times the spacing."""
+    longest = float(np.hypot(*vectors_um.T).max(initial=0.0))
+    return 0.9 * spacing(places_mm) / longest if longest > 0 else 1.0
+
+
+def spacing(places: Floats) -> float:
+    """Return the mean spacing of points that fill a square."""
+    extent = float(np.ptp(places, axis=0).max()) or 1.0
+    return extent / max(math.sqrt(len(places)) - 1, 1)
+
+
+def arrows(places_um: Floats, vectors_um: Floats, scale: float, colour: str = MAIN) -> list[Mark]:
+    """Return vectors at points, `scale` plot millimetres per micrometre."""
+    places = places_um / MM
+    dots = Markers(places, ".", 5.0, FAINT, layer=1.0)
+    return [dots, Arrows(places, vectors_um * scale, colour, 0.006)]
+
+
+def limits_of(places_um: Floats, vectors_um: Floats, scale: float) -> Floats:
+    """Return the limits of a map of vectors."""
+    return around(np.vstack([places_um / MM, places_um / MM + vectors_um * scale]))
+
+
+FINE = 121
+MAGNIFICATION = 10_000  # of the net: a micrometre is drawn as 10 mm
+
+
+def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:
+    """Draw contour maps of the corrections in x and y with the measured points."""
+    centre, half = np.array(polynomial.frame.centre_um), np.array(polynomial.frame.half_range_um)
+    x, y = np.linspace(centre - half, centre + half, FINE).T
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    values = polynomial.evaluate(places.reshape(-1, 2)).reshape(places.shape)
+    measured = np.vstack([fit.residuals.xy_um for fit in calibration.last_fits]) / MM
+    largest = float(np.abs(values).max()) or 1.0
+    step = round_length(largest / 5)
+    levels = step * np.arange(-np.ceil(largest / step), np.ceil(largest / step) + 1)
+    shades = Shades(levels[0], levels[-1], "µm", "signed")
+    panels = [
+        Panel(
+            np.array([centre - half, centre + half]) / MM,
+            [
+                *contours(x / MM, y / MM, values[..., axis], levels, shades, "black", 0.4),
+                Markers(measured, ".", 3.0, INK, opacity=0.7),
+            ],
+            f"correction in {'xy'[axis]}",
+            *OF_COMPARATOR,
+            equal=True,
+            shades=shades if axis else None,
+        )
+        for axis in range(2)
+    ]
+    title = f"Nonlinear correction{whose}; dots are the places measured"
+    return Plot(10.5, 4.9, panels, 2, title=title)
+
+
+def distorted_grid(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:
+    """Draw the program's 5 x 5 net, displaced by 10,000 times the correction.
+
+    Nodes and magnification are constant, for comparisons over the years.
+    """
+    nodes = np.array(table_nodes(calibration.session.centre_um)[::2])[:, ::2]
+    corners = nodes[0, 0], nodes[-1, -1]
+    along = np.linspace(0.0, 1.0, FINE)
+    lines: list[Floats] = []
+    for part in np.linspace(0.0, 1.0, len(nodes)):
+        for line in (np.column_stack([along, along * 0 + part]), np.column_stack([along * 0 + part, along])):
+            places = corners[1] + line * (corners[0] - corners[1])
+            lines.append(places / MM + polynomial.evaluate(places) * (MAGNIFICATION / MM))
+    stars = Markers(nodes.reshape(-1, 2) / MM, "*", 5.0, FAINT, layer=1.0)
+    marks: list[Mark] = [stars, *(Line(line, MAIN, 1.2) for line in lines)]
+    limits = around(np.vstack([stars.places, *lines]))
+    title = f"Net displaced by the nonlinear correction{whose}, {MAGNIFICATION:,} times magnified"
+    return Plot(6.2, 6.0, [plan(limits, marks, title, OF_COMPARATOR, (MAGNIFICATION / MM, 1.0))])
+
+
+LEVELS = " / ".join(str(percent) for percent in CONFIDENCE_FACTORS)
+STANDARD_PERCENT = 39  # Confidence of the standard ellipse, which the program draws
+
+
+def pointing_ellipses(calibration: Calibration) -> Plot:
+    """Draw the 39 percent ellipses of pointings at the measured points of each case."""
+    places = [case.placed.means_um / MM for case in calibration.cases]
+    ellipses = [
+        [readings.precision.ellipse for readings in case.placed.readings] for case in calibration.cases
+    ]
+    largest = max((ellipse.major_um for own in ellipses for ellipse in own), default=0.0)
+    scale, limits = _scale(places[0], largest), around(np.vstack(places))
+    panels = [
+        plan(
+            limits,
+            _ellipses(at, own, {STANDARD_PERCENT: scale}),
+            f"case {case.number}, pooled {case.placed.precision.sd_point_um:.2f} µm",
+            OF_COMPARATOR,
+            (scale, round_length(largest)),
+        )
+        for at, case, own in zip(places, calibration.cases, ellipses, strict=True)
+    ]
+    return side_by_side(
+        panels, PANELS_ACROSS, 3.4, "Error ellipses of single pointings (39 percent; * no deviation)"
+    )
+
+
+def operator_ellipses(calibration: Calibration, operator: int) -> Plot:
+    """Draw the pointing ellipses of an operator, by point, on the grid."""
+    points, total = calibration.pointing.operators[operator]
+    own = [case for case in calibration.cases if case.placed.case.operator == operator]
+    title = f"Pointings of operator {operator}, {len(own)} cases"
+    return _on_grid(calibration, own[0].placed.case.plate, points, total, title)
+
+
+def total_ellipses(calibration: Calibration) -> Plot:
+    """Draw the ellipses of all pointings, by point, on the grid of the first plate."""
+    pointing = calibration.pointing
+    title = f"All pointings, {len(calibration.cases)} cases, {len(pointing.operators)} operators"
+    plate = calibration.cases[0].placed.case.plate
+    return _on_grid(calibration, plate, pointing.points, pointing.total, title)
+
+
+def _on_grid(
+    calibration: Calibration, plate: int, points: Mapping[int, Precision], total: Precision, title: str
+) -> Plot:
+    """Draw the ellipses of points at all levels, in the axes of the comparator."""
+    grid = calibration.session.grids[plate]
+    place = dict(zip(grid.points.tolist(), grid.xy_um / MM, strict=True))
+    known = {point: own for point, own in points.items() if point in place and own.degrees_of_freedom > 0}
+    pooled = f"pooled {total.sd_point_um:.2f} µm" if total.degrees_of_freedom > 0 else "no repeated readings"
+    title = f"{title}: {pooled}\nellipses of {LEVELS} percent; * no deviation"
+    if not known:
+        return Plot(7.2, 7.0, [plan(around(np.array([*place.values()])), (), title, OF_PLATE)])
+    places = np.array([place[point] for point in known])
+    ellipses = [own.ellipse for own in known.values()]
+    largest = max(CONFIDENCE_FACTORS.values()) * max(ellipse.major_um for ellipse in ellipses)
+    scale = _scale(places, largest)
+    scales = {percent: factor * scale for percent, factor in CONFIDENCE_FACTORS.items()}
+    marks, key = _ellipses(places, ellipses, scales), (scale, round_length(largest))
+    return Plot(7.2, 7.0, [plan(around(places, 0.12), marks, title, OF_PLATE, key)])
+
+
+def pooled_ellipses(calibration: Calibration) -> Plot:
+    """Draw the pooled ellipses of cases, operators and all pointings at all levels."""
+    pointing = calibration.pointing
+    pooled = [
+        *((f"case {case.number}", case.placed.precision) for case in calibration.cases),
+        *((f"operator {operator}", total) for operator, (_, total) in pointing.operators.items()),
+        ("all", pointing.total),
+    ]
+    known = [(name, own) for name, own in pooled if own.degrees_of_freedom > 0]
+    largest = max((own.ellipse.major_um for _, own in known), default=1.0) or 1.0
+    reach = 1.15 * largest * max(CONFIDENCE_FACTORS.values())
+    limits = np.array([[-reach, -reach], [reach, reach]])
+    panels = [
+        Panel(
+            limits,
+            _ellipses(np.zeros((1, 2)), [own.ellipse], CONFIDENCE_FACTORS),
+            f"{name}: {own.sd_point_um:.3f} µm",
+            "x, µm",
+            "y, µm",
+            equal=True,
+        )
+        for name, own in known
+    ]
+    title = f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)"
+    return side_by_side(panels or [Panel(limits)], PANELS_ACROSS, 2.6, title)
+
+
+def _scale(places_mm: Floats, largest_um: float) -> float:
+    """Return plot millimetres per micrometre for ellipses within half the spacing."""
+    return 0.5 * spacing(places_mm) / largest_um if largest_um > 0 else 1.0
+
+
+def _ellipses(places: Floats, ellipses: Sequence[Ellipse], scales: Mapping[int, float]) -> list[Mark]:
+    """Return ellipses of several percentages, and a star for each missing one."""
+    semi_axes = np.array([[each.major_um, each.minor_um] for each in ellipses])
+    turns = np.degrees([each.angle_rad for each in ellipses])
+    marks: list[Mark] = [Markers(places, "+", 4.0, FAINT)]
+    for percent, scale in scales.items():
+        colour, width = (MAIN, 1.0) if percent == STANDARD_PERCENT else (FAINT, 0.7)
+        marks.append(Ellipses(places, scale * semi_axes, turns, colour, width))
+    none = places[semi_axes[:, 0] == 0.0]
+    return [*marks, Markers(none, "*", 5.0, ACCENT)] if len(none) else marks
+
+
+def residual_histogram(calibration: Calibration) -> Plot:
+    """Draw histograms of the final residuals with normal curves."""
+    residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
+    limit = float(np.abs(residuals).max()) * 1.1 or 1.0
+    bins = 2 * round(math.sqrt(len(residuals)) * 0.75) + 1  # Odd
+    edges = np.linspace(-limit, limit, bins + 1)
+    counts = [np.histogram(own, edges)[0] for own in residuals.T]
+    sigmas = [math.sqrt(float((own**2).mean())) or 1.0 for own in residuals.T]
+    scale = len(residuals) * (edges[1] - edges[0]) / math.sqrt(2 * math.pi)
+    top = 1.05 * max(*(float(own.max()) for own in counts), *(scale / sigma for sigma in sigmas))
+    limits = np.array([[-limit, 0.0], [limit, top]])
+    panels = []
+    for axis, (own, count, sigma) in enumerate(zip(residuals.T, counts, sigmas, strict=True)):
+        x = np.linspace(-limit, limit, 301)
+        curve = np.column_stack([x, scale / sigma * np.exp(-((x / sigma) ** 2) / 2)])
+        bars = boxes(np.column_stack([edges[:-1], 0 * count]), np.column_stack([edges[1:], count]))
+        beyond = 100 * float((np.abs(own) > 2 * sigma).mean())
+        title = (
+            f"{'xy'[axis]}: {len(own)} residuals, rms {sigma:.3f} µm,\n"
+            f"{beyond:.1f} % beyond twice that (normal: 4.6 %)"
+        )
+        marks = [Polygons(bars, MAIN, 0.35, MAIN, 1.0, 0.8), Line(curve, ACCENT, 1.8)]
+        panels.append(Panel(limits, marks, title, "residual, µm", "" if axis else "number"))
+    title = "Final residuals in the comparator system and the normal curve"
+    return Plot(10.0, 3.9, panels, 2, title=title)
+
+
+def variance_bars(calibration: Calibration) -> Plot:
+    """Draw the components of the error as bars of variance."""
+    components = calibration.variance.components_um
+    total = components["total"] ** 2
+    names = [name for name in components if name != "total"][::-1]
+    values = np.array([components[name] ** 2 for name in names])
+    right, places = 1.25 * (float(values.max()) or 1.0), np.arange(len(names), dtype=float)
+    shares = 100 * values / total if total else 0 * values
+    every = zip(names, shares.tolist(), strict=True)
+    texts = [f"{components[name]:.3f} µm, {share:.0f} %" for name, share in every]
+    bars = boxes(np.column_stack([0 * values, places - 0.3]), np.column_stack([values, places + 0.3]))
+    marks = [
+        Polygons(bars, MAIN, 0.75, MAIN, 0.0, 0.0),
+        Texts(np.column_stack([values + 0.01 * right, places]), texts, 8.0),
+    ]
+    title = f"Components of the error: {components['total']:.3f} µm before calibration"
+    limits = np.array([[0.0, -0.5], [right, len(names) - 0.5]])
+    return Plot(8.0, 2.9, [Panel(limits, marks, title, "variance, µm²", up_names=names)])
