@@ -35,16 +35,14 @@ pub mod geometry;
 pub mod network;
 pub mod normals;
 mod parallel;
-mod sorting;
 
 /// Functions that other crates of this project use; they may change at any time.
 #[doc(hidden)]
 pub mod internal {
-    pub use crate::adjustment::go_on;
+    pub use crate::adjustment::{go_on, median};
     pub use crate::geometry::principal_axes;
     pub use crate::network::meet;
     pub use crate::parallel::map;
-    pub use crate::sorting::{median, order, sort_by};
 }
 
 pub use nalgebra;

@@ -19,7 +19,6 @@ use crate::normals::{
     Cofactors, FactorOptions, Function, InvertOptions, Layout, LayoutError, LocalCofactors, Prior,
     SelectedInverse,
 };
-use crate::sorting::sort_by;
 use crate::{Threads, parallel};
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -357,7 +356,7 @@ fn correlated_rows(own: &LocalCofactors, layout: &Layout, local: usize, limit: f
     };
     let odds: Vec<f64> = (0..groups).map(odds).collect();
     let mut order: Vec<usize> = (0..groups).collect();
-    sort_by(&mut order, &|a, b| odds[*b].total_cmp(&odds[*a]));
+    order.sort_by(|a, b| odds[*b].total_cmp(&odds[*a]));
     let partner =
         |group: usize| order.iter().find(|&&other| other != group).map_or(0.0, |&other| odds[other]);
     let may = |&group: &usize| may_correlate(odds[group], partner(group), limit);

@@ -111,11 +111,14 @@ pub use part::{PartError, PartOptions};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem, Term};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
+pub(crate) use run::between;
 #[doc(hidden)]
 pub use run::go_on;
 pub use run::{Requests, Watch, adjust, adjust_with};
-pub(crate) use statistics::weighted;
+#[doc(hidden)]
+pub use statistics::median;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
+pub(crate) use statistics::{middle, weighted};
 pub use terms::Terms;
 pub use traces::{EquationGroups, GroupSquares, Probing};
 pub use transformation::DatumOfPart;

@@ -395,7 +395,7 @@ fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
 }
 
 /// Reports finished local blocks.
-pub(super) fn between(
+pub(crate) fn between(
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     phase: Phase,
     total: usize,

@@ -1,7 +1,5 @@
 //! Vectors and matrices in cartesian axes, and three linear equations.
 
-use crate::sorting::order;
-
 /// Vector of three cartesian components.
 pub type Vector3 = nalgebra::Vector3<f64>;
 /// Matrix of 3 x 3 cartesian components.
@@ -17,8 +15,9 @@ pub fn principal_axes(matrix: &Matrix3) -> Option<(Vector3, Matrix3)> {
     }
     let eigen = matrix.try_symmetric_eigen(f64::EPSILON, SWEEPS)?;
     let values = eigen.eigenvalues;
-    let falling = order(3, &|a, b| values[b].total_cmp(&values[a]));
-    let columns = [0, 1, 2].map(|k| eigen.eigenvectors.column(falling[k]).into_owned());
+    let mut falling = [0, 1, 2];
+    falling.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+    let columns = falling.map(|k| eigen.eigenvectors.column(k).into_owned());
     Some((Vector3::from_fn(|k, _| values[falling[k]]), Matrix3::from_columns(&columns)))
 }
 

@@ -11,8 +11,7 @@ use super::screens::{Begin, Ended, Screening};
 use super::solution::{Joint, Solution};
 use super::trial::Converged;
 use crate::Threads;
-use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Requests, Watch};
-use crate::sorting::sort_by;
+use crate::adjustment::{self, AdjustError, Adjustment, Method, Phase, Requests, Watch, between};
 
 /// An adjustment to be run: initial state, threads, progress function and datum.
 ///
@@ -200,7 +199,7 @@ impl<'a> NetworkAdjustment<'a> {
         solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
         solution.datum.relative_error = lost;
         solution.dropped.extend(leaving.harmful);
-        sort_by(&mut solution.dropped, &|a, b| a.point.cmp(&b.point));
+        solution.dropped.sort_by_key(|own| own.point);
         solution.joint = joint.filter(|_| found.is_some()).map(Arc::new);
         solution.converged =
             found.map(|found| Box::new(Converged::new(assembled, options.adjustment, found)));
@@ -249,8 +248,7 @@ fn take_to(
     watch: Watch<'_>,
 ) -> Result<f64, NetworkError> {
     let (datum, reference) = assembled.datum(inner);
-    let total = assembled.points.len();
-    let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });
+    let mut between = between(watch, Phase::Invert, assembled.points.len());
     let problem = &assembled.problem;
     Ok(adjusted.take_to(problem, options, &datum, &reference, threads, &mut between)?)
 }

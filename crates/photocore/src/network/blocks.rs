@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::commons::{Common, InBlock};
 use super::input::{Network, Photo};
 use super::mounts::Trajectory;
-use super::surroundings::Surroundings;
+use super::surroundings::{BlockOf, Surroundings};
 use crate::geometry::POSE;
 
 /// Retained blocks, except points: photos (pose, own camera, own film parameters), then shared cameras, then shared parameters. The pose of
@@ -143,7 +143,7 @@ impl Network {
         self.photos.iter().for_each(|photo| photos[photo.camera] += 1);
         // The block of a mounted photo cannot contain camera parameters.
         self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo()].camera] += 1);
-        surroundings.cameras().into_iter().for_each(|camera| photos[camera] += 2);
+        surroundings.indices(BlockOf::Camera).into_iter().for_each(|camera| photos[camera] += 2);
         (0..photos.len()).filter(|&camera| photos[camera] > 1 && !self.cameras[camera].is_held()).collect()
     }
 }

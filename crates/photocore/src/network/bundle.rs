@@ -13,6 +13,7 @@ use super::neighbourhood::TOGETHER;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::passages::Passages;
 use super::selection::Selected;
+use super::surroundings::BlockOf;
 use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
 use crate::parallel;
 
@@ -47,7 +48,7 @@ impl Network {
             blocks: Blocks::new(
                 self,
                 self.shared_cameras(&selected.surroundings),
-                &selected.surroundings.commons(),
+                &selected.surroundings.indices(BlockOf::Common),
             ),
             camera_priors: vec![],
             commons: self.placed_commons(selected, &mounts, (&images, &image_times), middle),

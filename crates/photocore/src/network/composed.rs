@@ -11,7 +11,6 @@ use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Mounted, Station, Stations};
 use crate::geometry::{Orientation, POSE, Vector3};
 use crate::normals::{Cofactors, Layout};
-use crate::sorting::sort_by;
 
 impl Bundle {
     /// Returns the photo whose six parameters are the start of the pose of a photo: its frame, or itself.
@@ -158,7 +157,7 @@ impl Bundle {
         let mut parts = composed.parts();
         // Blocks with zero partials contribute nothing, even if their cofactors are undefined.
         parts.retain(|(_, by)| by.iter().any(|&partial| partial != 0.0));
-        sort_by(&mut parts, &|a, b| a.0.cmp(&b.0));
+        parts.sort_by_key(|own| own.0);
         let mut sum = Matrix6::zeros();
         for (j, part) in parts.iter().enumerate() {
             for before in &parts[..j] {

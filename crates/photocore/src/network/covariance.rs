@@ -12,7 +12,9 @@ use super::problem::Assembled;
 use super::solution::Solution;
 use super::suspects::Suspects;
 use crate::Threads;
-use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};
+use crate::adjustment::{
+    Adjusted, Adjustment, Classes, CofactorError, Datum, Linearized, Phase, Watch, between,
+};
 use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Function;
 
@@ -63,7 +65,7 @@ impl Network {
         state: &State,
         datum: Option<&NetworkDatum>,
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<Covariances, NetworkError> {
         if state.released {
             let free = State { released: false, ..state.clone() };
@@ -72,7 +74,7 @@ impl Network {
         let assembled = self.assembled_again(options, state, threads)?;
         let datum = datum.or(state.datum.as_ref());
         let linearized = {
-            let mut between = forming(watch, &assembled);
+            let mut between = between(watch, Phase::Form, assembled.problem.layout().locals());
             let adjusted = state.adjusted(options);
             match datum {
                 None => {
@@ -122,7 +124,7 @@ impl Network {
         state: &State,
         datum: &NetworkDatum,
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<Solution, NetworkError> {
         let assembled = self.assembled_again(options, state, threads)?;
         let is_inner = matches!(datum, NetworkDatum::Inner(_));
@@ -138,7 +140,7 @@ impl Network {
         let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
         let found =
             {
-                let mut between = forming(watch, &assembled);
+                let mut between = between(watch, Phase::Form, problem.layout().locals());
                 Linearized::in_datum(problem, adjusted, &carried, reference, threads, &mut between)?
                     .inverted(problem, threads, &mut between)?
             };
@@ -247,15 +249,6 @@ impl State {
     }
 }
 
-/// Returns a progress function.
-fn forming(
-    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    assembled: &Assembled,
-) -> impl FnMut(usize) -> ControlFlow<()> {
-    let total = assembled.problem.layout().locals();
-    move |done| watch(Event::Progress { phase: Phase::Form, done, total })
-}
-
 impl Covariances {
     /// Returns the cofactors (a priori unit weight) of all parameters of `rows`, with each other or with `columns`.
     ///
@@ -266,7 +259,7 @@ impl Covariances {
         rows: &[Of],
         columns: Option<&[Of]>,
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<DMatrix<f64>, NetworkError> {
         let rows = self.unknowns(rows)?;
         let columns = columns.map(|columns| self.unknowns(columns)).transpose()?;
@@ -282,7 +275,7 @@ impl Covariances {
         partials: &[f64],
         of: &[Of],
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<DMatrix<f64>, NetworkError> {
         let functions = self.functions(partials, of)?;
         self.of_functions(&functions, None, threads, watch)
@@ -328,11 +321,10 @@ impl Covariances {
         rows: &[Function],
         columns: Option<&[Function]>,
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<DMatrix<f64>, NetworkError> {
         let problem = &self.assembled.problem;
-        let total = problem.layout().locals();
-        let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
+        let mut between = between(watch, Phase::Invert, problem.layout().locals());
         let found = self.linearized.cofactors(problem, rows, columns, self.memory, threads, &mut between);
         let found = found.map_err(|error| match error {
             CofactorError::Adjust(error) => NetworkError::new(error, &self.assembled),

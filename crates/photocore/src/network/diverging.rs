@@ -4,7 +4,7 @@ use super::input::Image;
 use super::model::Bundle;
 use super::selection::FEW;
 use super::stations::{Station, Stations};
-use crate::sorting::median;
+use crate::adjustment::median;
 
 /// Ratio of a point's share of the station's information to the mean of the others, above which it is at the station. The point is 10,000
 /// times nearer, and rounding leaves eight digits for the others.

@@ -10,7 +10,6 @@ use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{AttitudeNumbers, Vector3};
 use crate::normals::{GroupRows, TieRows};
-use crate::sorting::sort_by;
 
 /// A bundle at given parameter values.
 pub(super) struct At<'a> {
@@ -81,7 +80,7 @@ impl Model for Bundle {
         let mut all = self.weighted_angles(values, prior, sd);
         if !self.camera_priors.is_empty() {
             all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));
-            sort_by(&mut all, &|a, b| a.first.cmp(&b.first));
+            all.sort_by_key(|own| own.first);
         }
         all
     }

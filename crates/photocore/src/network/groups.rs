@@ -1,13 +1,14 @@
 //! Groups of the observations of a network, and the effect of errors of some observations on the residuals of others.
 
-use std::ops::ControlFlow;
-
 use super::covariance::Covariances;
 use super::error::NetworkError;
 use super::model::Owner;
 use crate::Threads;
-use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};
+use crate::adjustment::{
+    AdjustError, AnyProblem, EquationGroups, GroupSquares, Phase, Probing, Watch, between,
+};
 use crate::geometry::POSE;
+use crate::normals::Between;
 
 /// Group number of each observation, in the order of the network; a number of `count` or more means none.
 #[derive(Debug, Clone, Default)]
@@ -38,14 +39,12 @@ impl Covariances {
         groups: &Groups,
         probing: &Probing,
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<GroupSquares, NetworkError> {
         let groups = self.equation_groups(groups)?;
-        let problem = &self.assembled.problem;
-        let total = problem.layout().locals();
-        let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let found = self.linearized.group_squares(problem, &groups, probing, threads, &mut between);
-        found.map_err(|error| self.named(error))
+        self.solved(watch, |problem, between| {
+            self.linearized.group_squares(problem, &groups, probing, threads, between)
+        })
     }
 
     /// Returns the sums within each of many groups, in `classes` column classes (see [`crate::adjustment::Linearized::own_squares`]).
@@ -58,14 +57,12 @@ impl Covariances {
         classes: usize,
         probing: &Probing,
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
         let groups = self.equation_groups(groups)?;
-        let problem = &self.assembled.problem;
-        let total = problem.layout().locals();
-        let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let found = self.linearized.own_squares(problem, &groups, classes, probing, threads, &mut between);
-        found.map_err(|error| self.named(error))
+        self.solved(watch, |problem, between| {
+            self.linearized.own_squares(problem, &groups, classes, probing, threads, between)
+        })
     }
 
     /// Returns the residuals that errors of the images cause, both in standard deviations. Columns contain x and y of every image, column
@@ -77,7 +74,7 @@ impl Covariances {
         &self,
         columns: &[f64],
         threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
         let problem = &self.assembled.problem;
         let (width, height) = (2 * self.images, problem.equations());
@@ -91,10 +88,8 @@ impl Covariances {
                 z[2 * row..][..2].copy_from_slice(&column[2 * image..][..2]);
             }
         }
-        let total = problem.layout().locals();
-        let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
         let u =
-            self.linearized.project(problem, z, threads, &mut between).map_err(|error| self.named(error))?;
+            self.solved(watch, |problem, between| self.linearized.project(problem, z, threads, between))?;
         let mut found = vec![0.0; columns.len()];
         for (found, u) in found.chunks_exact_mut(width).zip(u.chunks_exact(height)) {
             for (row, &image) in order.iter().enumerate() {
@@ -104,8 +99,15 @@ impl Covariances {
         Ok(found)
     }
 
-    fn named(&self, error: AdjustError) -> NetworkError {
-        NetworkError::new(error, &self.assembled)
+    /// Solves with the factored equations.
+    fn solved<T>(
+        &self,
+        watch: Watch<'_>,
+        solve: impl FnOnce(&AnyProblem<'_>, Between<'_>) -> Result<T, AdjustError>,
+    ) -> Result<T, NetworkError> {
+        let problem = self.assembled.problem.any();
+        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        solve(problem, &mut between).map_err(|error| NetworkError::new(error, &self.assembled))
     }
 
     /// Returns the groups of the equations of the adjustment.

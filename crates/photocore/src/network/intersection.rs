@@ -3,10 +3,10 @@
 use super::model::Bundle;
 use super::mounts::Composed;
 use super::stations::{Mounted, Station, Stations};
+use crate::adjustment::median;
 use crate::geometry::axes::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
 use crate::parallel;
-use crate::sorting::median;
 
 /// Determinant of the normal matrix, relative to its maximum, below which rays count as parallel (about a hundredth of a degree between two
 /// rays).

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use super::error::NetworkError;
 use super::model::Bundle;
 use super::surroundings::{BlockOf, Surroundings};
+use crate::adjustment::median;
 use crate::normals::Layout;
-use crate::sorting::median;
 
 /// Returns the block layout of a model at given positions, with its ties.
 pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError> {

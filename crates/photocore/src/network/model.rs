@@ -91,16 +91,10 @@ pub enum Owner {
 }
 
 impl Owner {
-    pub fn photo(self) -> Option<usize> {
-        if let Self::Photo(photo) = self { Some(photo) } else { None }
-    }
-
-    pub fn camera(self) -> Option<usize> {
-        if let Self::Camera(camera) = self { Some(camera) } else { None }
-    }
-
-    pub fn common(self) -> Option<usize> {
-        if let Self::Common(common) = self { Some(common) } else { None }
+    /// Returns the index of the owner if it is this variant.
+    pub fn index(self, of: fn(usize) -> Self) -> Option<usize> {
+        let (Self::Photo(own) | Self::Camera(own) | Self::Common(own)) = self;
+        (of(own) == self).then_some(own)
     }
 }
 

@@ -15,7 +15,6 @@ use super::stations::Stations;
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::trajectory::{Active, Flight};
 use crate::geometry::{Matrix3, Pose, Vector3};
-use crate::sorting::sort_by;
 
 /// Maximum number of sampled times per basis function; further times add no information.
 const TIMES: usize = 8;
@@ -246,7 +245,7 @@ impl Bundle {
             seen[trajectory].push(time);
         }
         let times = |(own, mut seen): (&Trajectory, Vec<f64>)| {
-            sort_by(&mut seen, &f64::total_cmp);
+            seen.sort_by(f64::total_cmp);
             seen.dedup();
             let most = TIMES * own.position.len().max(own.rotation.len()).max(1);
             let (first, last) = own.course.span();

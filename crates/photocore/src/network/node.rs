@@ -94,7 +94,7 @@ impl Network {
         let assembled = threads.install(|| self.assemble(options, selected, None))?;
         let problem = &assembled.problem;
         let held = problem.any().to_hold(&problem.initial, threads);
-        let in_photos = owned(problem, &held, Owner::photo);
+        let in_photos = owned(problem, &held, Owner::Photo);
         (in_photos.len() == held.len()).then_some(in_photos).ok_or(NetworkError::Node(
             "in parts trajectories take no datum: it would be held by their coefficients",
         ))
@@ -132,7 +132,7 @@ impl Network {
     /// Removes the weights of outer blocks, because they count in the node that eliminates them. Fixed parameters remain fixed.
     pub(super) fn release(&mut self, surroundings: &Surroundings) {
         let outer = &surroundings.outer;
-        let (films, _) = self.commons_by_block(&surroundings.commons());
+        let (films, _) = self.commons_by_block(&surroundings.indices(BlockOf::Common));
         let mut photos_of = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos_of[photo.camera] += 1);
         let named = |camera: usize| outer.contains(&BlockOf::Camera(camera));

@@ -10,7 +10,6 @@ use super::node::{FormedNode, Node};
 use super::problem::Assembled;
 use crate::Threads;
 use crate::adjustment::{Adjusted, DatumColumns, Watch, moved_with_columns};
-use crate::sorting::order;
 
 /// Owner of a parameter (0: photo, 1: shared camera, 2: shared parameter, 3: point), its index in the network, and the number of the
 /// parameter there.
@@ -90,7 +89,8 @@ impl Assembled {
     /// Returns the indices of named parameters; None if one is missing.
     fn places_of(&self, names: &[UnknownName]) -> Option<Vec<usize>> {
         let own = self.names();
-        let order = order(own.len(), &|a, b| own[a].cmp(&own[b]));
+        let mut order: Vec<usize> = (0..own.len()).collect();
+        order.sort_by_key(|&unknown| own[unknown]);
         let place = |name: &UnknownName| order.binary_search_by_key(name, |&unknown| own[unknown]).ok();
         names.iter().map(|name| place(name).map(|at| order[at])).collect()
     }

@@ -6,9 +6,9 @@ use super::model::Bundle;
 use super::neighbourhood::TOGETHER;
 use super::selection::Selected;
 use super::stations::Station;
+use crate::adjustment::median;
 use crate::geometry::PoseNumbers;
 use crate::parallel;
-use crate::sorting::median;
 
 /// Maximum coordinate for which its square, or the product of its partials, is finite.
 const LARGEST: f64 = 1e100;

@@ -10,10 +10,10 @@ use super::observations::{Fault, Linear};
 use super::selection::{Dropped, LeftOut, Selected};
 use super::stations::{Station, Stations};
 use super::surroundings::Surroundings;
+use crate::adjustment::median;
 use crate::adjustment::{Method, Problem};
 use crate::geometry::{ObjectSpace, POSE, PoseNumbers};
 use crate::normals::{Layout, System, TieBuffer, TieRows};
-use crate::sorting::median;
 use crate::{Threads, parallel};
 
 /// A problem, and the indices of its parts in the network.

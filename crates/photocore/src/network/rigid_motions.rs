@@ -7,11 +7,11 @@ use super::model::Bundle;
 use super::parts::{Component, Components, Joined, MOST_PARTS, MOTIONS};
 use super::stations::{Station, Stations};
 use crate::adjustment::Motions;
+use crate::adjustment::median;
 use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, Pose, PoseNumbers, Vector3,
     angle_axis::rotation_angle_axis, angle_axis_rotation, local_vertical,
 };
-use crate::sorting::{median, sort_by};
 
 /// Index of the scale, the last of the [`MOTIONS`].
 pub(super) const SCALE: usize = 6;
@@ -81,7 +81,7 @@ impl Bundle {
         let mut found: Vec<(usize, Vec<usize>)> =
             by_root.into_iter().enumerate().filter(|(_, photos)| !photos.is_empty()).collect();
         let has_asked = |photos: &[usize]| asked.is_some_and(|asked| photos.contains(&asked));
-        sort_by(&mut found, &|(_, a), (_, b)| has_asked(b).cmp(&has_asked(a)).then(b.len().cmp(&a.len())));
+        found.sort_by(|(_, a), (_, b)| has_asked(b).cmp(&has_asked(a)).then(b.len().cmp(&a.len())));
         found.truncate(MOST_PARTS);
         let mut number = vec![None; joined.0.len()];
         found.iter().enumerate().for_each(|(part, (root, _))| number[*root] = Some(part));
@@ -185,7 +185,7 @@ impl Bundle {
             let coefficients = self.position_coefficients(parts, part).into_iter();
             let coefficients = coefficients.map(|unknown| (false, scale[unknown].abs(), unknown));
             let mut shifts: Vec<(bool, f64, usize)> = shifts.chain(coefficients).collect();
-            sort_by(&mut shifts, &|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+            shifts.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
             preferred.extend(shifts.into_iter().map(|(_, _, unknown)| unknown));
         }
         preferred

@@ -3,8 +3,8 @@
 use super::input::{Options, Screens};
 use super::problem::Assembled;
 use super::selection::{Dropped, FEW, LeftOut, Reason};
+use crate::adjustment::median;
 use crate::adjustment::{AdjustError, Adjustment, Method, Status};
-use crate::sorting::median;
 
 /// Minimum ratio of all photos to undetermined ones, for which these count as few.
 const HALF: usize = 2;

@@ -4,9 +4,8 @@ use super::error::NetworkError;
 use super::input::{Network, State};
 use super::neighbourhood::{ByPoint, TOGETHER};
 use super::observations::Touches;
-use super::surroundings::Surroundings;
+use super::surroundings::{BlockOf, Surroundings};
 use crate::parallel;
-use crate::sorting::sort_by;
 
 /// Minimum ratio of all objects to excluded ones, for which these count as few.
 pub(super) const FEW: usize = 10;
@@ -88,7 +87,7 @@ impl Network {
     /// Points that observations connect with other objects are the last ones. Images on excluded photos are ignored.
     pub(super) fn select(&self, left_out: &LeftOut, surroundings: Surroundings) -> Selected {
         let loose = &left_out.photos;
-        let named = surroundings.points();
+        let named = surroundings.indices(BlockOf::Point);
         let all = self.point_images(loose);
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         let along = self.along_curve(&all);
@@ -100,7 +99,7 @@ impl Network {
                 None => points.push(point),
             }
         }
-        sort_by(&mut dropped, &|a, b| a.point.cmp(&b.point));
+        dropped.sort_by_key(|own| own.point);
         let observations = self.observations_of(&points);
         let mut tied = Vec::new();
         if !(observations.is_empty() && named.is_empty()) {

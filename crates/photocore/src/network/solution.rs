@@ -197,14 +197,14 @@ impl Solution {
             unseen: Unseen::default(),
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
             weak: Weak {
-                photos: owned(problem, &adjustment.weak, Owner::photo),
-                cameras: owned(problem, &adjustment.weak, Owner::camera),
-                commons: owned(problem, &adjustment.weak, Owner::common),
+                photos: owned(problem, &adjustment.weak, Owner::Photo),
+                cameras: owned(problem, &adjustment.weak, Owner::Camera),
+                commons: owned(problem, &adjustment.weak, Owner::Common),
                 points: vec![],
             },
             datum: DatumInForce {
-                held: owned(problem, &adjustment.datum, Owner::photo),
-                held_commons: owned(problem, &adjustment.datum, Owner::common),
+                held: owned(problem, &adjustment.datum, Owner::Photo),
+                held_commons: owned(problem, &adjustment.datum, Owner::Common),
                 ..DatumInForce::default()
             },
             dropped: dropped.clone(),
@@ -243,15 +243,15 @@ fn over(sum: f64, degrees_of_freedom: i64) -> Option<f64> {
     (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64)
 }
 
-/// Returns the objects that `select` chooses among the owners of parameters, each with the number of the parameter there.
+/// Returns the owners of parameters that are of one type, each with the number of the parameter there.
 pub(super) fn owned(
     problem: &Problem<Bundle>,
     unknowns: &[usize],
-    select: impl Fn(Owner) -> Option<usize>,
+    of: fn(usize) -> Owner,
 ) -> Vec<(usize, usize)> {
     let own = |&unknown: &usize| {
         let (owner, number) = problem.model.owner(unknown)?;
-        Some((select(owner)?, number))
+        Some((owner.index(of)?, number))
     };
     unknowns.iter().filter_map(own).collect()
 }

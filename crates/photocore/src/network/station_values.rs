@@ -2,9 +2,9 @@
 
 use super::input::{Camera, Network, Photo};
 use super::model::Bundle;
-use super::surroundings::Surroundings;
+use super::surroundings::{BlockOf, Surroundings};
+use crate::adjustment::median;
 use crate::geometry::{ObjectSpace, Orientation, POSE, PoseNumbers, Vector3, nearest_turns};
-use crate::sorting::median;
 
 impl Network {
     /// Returns the projection centre for six pose parameters.
@@ -46,8 +46,8 @@ impl Network {
     ) -> Vec<f64> {
         let mut all = Vec::new();
         let mut used = vec![false; self.cameras.len()];
-        surroundings.cameras().into_iter().for_each(|camera| used[camera] = true);
-        let (commons, photos) = (surroundings.commons(), surroundings.photos());
+        surroundings.indices(BlockOf::Camera).into_iter().for_each(|camera| used[camera] = true);
+        let (commons, photos) = (surroundings.indices(BlockOf::Common), surroundings.indices(BlockOf::Photo));
         let of_commons = |own: &[usize], elsewhere: bool| {
             let of_common = |&common: &usize| {
                 let is_used = elsewhere || model.commons[common].uses > 0 || commons.contains(&common);

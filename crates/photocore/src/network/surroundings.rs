@@ -37,32 +37,12 @@ impl Surroundings {
         self.outer.iter().chain(self.below.iter().flatten()).copied()
     }
 
-    /// Returns the points with parameters in other nodes.
-    pub(super) fn points(&self) -> BTreeSet<usize> {
-        self.all()
-            .filter_map(|block| if let BlockOf::Point(point) = block { Some(point) } else { None })
-            .collect()
-    }
-
-    /// Returns the photos with parameters in other nodes.
-    pub(super) fn photos(&self) -> BTreeSet<usize> {
-        self.all()
-            .filter_map(|block| if let BlockOf::Photo(photo) = block { Some(photo) } else { None })
-            .collect()
-    }
-
-    /// Returns the cameras shared with photos of other nodes.
-    pub(super) fn cameras(&self) -> BTreeSet<usize> {
-        self.all()
-            .filter_map(|block| if let BlockOf::Camera(own) = block { Some(own) } else { None })
-            .collect()
-    }
-
-    /// Returns the shared parameters of other nodes.
-    pub(super) fn commons(&self) -> BTreeSet<usize> {
-        self.all()
-            .filter_map(|block| if let BlockOf::Common(own) = block { Some(own) } else { None })
-            .collect()
+    /// Returns the indices of the blocks of one type that other nodes share: `of` is the variant of [`BlockOf`].
+    pub(super) fn indices(&self, of: fn(usize) -> BlockOf) -> BTreeSet<usize> {
+        let index = |block: BlockOf| match block {
+            BlockOf::Photo(own) | BlockOf::Camera(own) | BlockOf::Common(own) | BlockOf::Point(own) => own,
+        };
+        self.all().filter(|&block| of(index(block)) == block).map(index).collect()
     }
 }
 

@@ -9,7 +9,6 @@ use std::sync::OnceLock;
 use super::model::{Bundle, Owner};
 use super::problem::Assembled;
 use crate::geometry::PoseNumbers;
-use crate::sorting::sort_by;
 
 /// Object of a test group: indices into the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -341,7 +340,7 @@ fn of_points(assembled: &Assembled) -> Vec<Suspect> {
         Some((point, weighted(assembled, Subject::Control(point), Home::Point(place), unknowns)?))
     };
     let mut all: Vec<(usize, Suspect)> = assembled.points.iter().enumerate().filter_map(of).collect();
-    sort_by(&mut all, &|a, b| a.0.cmp(&b.0));
+    all.sort_by_key(|own| own.0);
     all.into_iter().map(|(_, suspect)| suspect).collect()
 }
 

@@ -4,9 +4,9 @@ use super::adjusted::AdjustedPoint;
 use super::input::Network;
 use super::model::Bundle;
 use super::neighbourhood::TOGETHER;
+use crate::adjustment::median;
 use crate::geometry::{self, Matrix3};
 use crate::parallel;
-use crate::sorting::median;
 
 /// Ratio of largest to smallest standard deviation of a point above which its rays count as nearly parallel.
 const RATIO: f64 = 1e4;

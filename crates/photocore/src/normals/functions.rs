@@ -20,7 +20,6 @@ use super::system::{System, SystemError};
 use super::vectorised::dot;
 use super::watch::{Between, Control, watched};
 use super::workspace::zeros;
-use crate::sorting::sort_by;
 use crate::{Stopped, Threads, parallel};
 
 /// Linear function of the unknowns: indices of unknowns with their coefficients.
@@ -244,7 +243,7 @@ impl Reduction<'_> {
             }
         }
         let mut taken: Vec<(usize, Taken)> = taken.into_iter().collect();
-        sort_by(&mut taken, &|a, b| a.0.cmp(&b.0));
+        taken.sort_by_key(|own| own.0);
         let found = parallel::map_each(taken.chunks(CHUNK).collect(), &|taken| self.at_locals(taken));
         for (local, found) in found.into_iter().flatten() {
             for (index, y, entries) in found {

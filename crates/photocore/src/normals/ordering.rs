@@ -3,7 +3,6 @@
 use super::dissection::{minimum_degree, nested_dissection};
 use super::graph::{Graph, NOWHERE};
 use super::layout::Layout;
-use crate::sorting::sort_by;
 
 /// Ordering method for the retained blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -101,6 +100,6 @@ fn dense_blocks(graph: &Graph, layout: &Layout) -> Vec<usize> {
     let main = layout.are_main();
     let is_dense = |&block: &usize| !main[block] && graph.degree(block) as f64 > most;
     let mut dense: Vec<usize> = (0..graph.len()).filter(is_dense).collect();
-    sort_by(&mut dense, &|&a, &b| graph.degree(a).cmp(&graph.degree(b)));
+    dense.sort_by_key(|&block| graph.degree(block));
     dense
 }

@@ -17,7 +17,6 @@ use super::triangle::Triangle;
 use super::watch::Control;
 use super::workspace::Workspace;
 use crate::Stopped;
-use crate::sorting::order;
 
 /// Error of a phase of a system.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -134,7 +133,8 @@ impl Nodes {
             positions.min().map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
         };
         let node: Vec<usize> = lists.map(node).collect();
-        let by_node = order(node.len(), &|a, b| node[a].cmp(&node[b]));
+        let mut by_node: Vec<usize> = (0..node.len()).collect();
+        by_node.sort_by_key(|&list| node[list]);
         let start = |supernode| by_node.partition_point(|&list| node[list] < supernode);
         let node_ptr = (0..=symbolic.supernode_count()).map(start).collect();
         Self { by_node: by_node.into_iter().map(|list| list as u32).collect(), node_ptr }

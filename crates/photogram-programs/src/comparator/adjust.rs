@@ -10,7 +10,6 @@ use photocore::Threads;
 use photocore::adjustment::{
     self, AdjustError, Adjustment, Evaluated, Event, Model, Problem, leading_matrix,
 };
-use photocore::internal::order;
 use photocore::normals::{GroupRows, Layout, Ordering, System};
 
 impl Calibration {
@@ -70,8 +69,8 @@ impl Calibration {
 
     /// Builds the problem: grid points are local blocks of two, cases retained blocks of three, the comparator one shared block.
     fn problem(&self) -> Result<Problem<Comparison>, CalibrationError> {
-        let point = |i: usize| self.measurements[i].point;
-        let order = order(self.measurements.len(), &|a, b| point(a).cmp(&point(b)));
+        let mut order: Vec<usize> = (0..self.measurements.len()).collect();
+        order.sort_by_key(|&i| self.measurements[i].point);
         let measurements: Vec<Measurement> = order.iter().map(|&i| self.measurements[i]).collect();
         let start =
             (0..=self.points.len()).map(|point| measurements.partition_point(|m| m.point < point)).collect();

@@ -13,7 +13,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 use super::form::{ByMotions, Curvature, MOTIONS, Partials, RADIUS};
 use super::{FeatureError, Form};
 use photocore::geometry::{Matrix3, Vector3, angle_axis_rotation};
-use photocore::internal::{principal_axes, sort_by};
+use photocore::internal::principal_axes;
 
 /// Maximum number of steps, and the step size that ends the iteration; lengths are relative to the root mean square distance of the points.
 const STEPS: usize = 200;
@@ -52,7 +52,7 @@ pub fn fit(form: Form, points: &[Vector3]) -> Result<Placed, FeatureError> {
             Err(error) => failed = error,
         }
     }
-    sort_by(&mut found, &|a, b| a.0.total_cmp(&b.0));
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut found = found.into_iter();
     let Some((least, best)) = found.next() else { return Err(failed) };
     let limit = RIVAL * least + ROUNDING * points.len() as f64;
@@ -282,7 +282,7 @@ fn cylinders(points: &[Vector3], axes: &Matrix3) -> Vec<Placed> {
     let all = main.chain(spiral).filter_map(|axis| placed(Form::Cylinder, points, &axis));
     let mut judged: Vec<(f64, Placed)> =
         all.map(|each| (each.square_sum(Form::Cylinder, points), each)).collect();
-    sort_by(&mut judged, &|a, b| a.0.total_cmp(&b.0));
+    judged.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut taken: Vec<Placed> = vec![];
     for (_, each) in judged {
         let apart = |other: &Placed| other.axis().dot(&each.axis()).abs() < APART;

@@ -10,7 +10,7 @@ use crate::relative_orientation::{Candidate, relative_orientation};
 use crate::sampling::Samples;
 use crate::similarity::{Similarity, Station, closed_form};
 use photocore::geometry::{Matrix3, Pose, Vector3};
-use photocore::internal::{median, sort_by};
+use photocore::internal::median;
 
 /// Minimum number of common points of a pair: five, and three for a check.
 pub(super) const COMMON: usize = 8;
@@ -32,7 +32,7 @@ impl Search<'_> {
     pub fn relative_model(&mut self, free: &[bool]) -> Result<Option<Model>, FirstValuesError> {
         let mut pairs: Vec<PhotoPair> =
             self.pairs(free).into_iter().filter_map(|photos| self.oriented(photos)).collect();
-        sort_by(&mut pairs, &|a, b| b.merit.total_cmp(&a.merit));
+        pairs.sort_by(|a, b| b.merit.total_cmp(&a.merit));
         let mut best: Option<Model> = None;
         for pair in &pairs {
             // If two poses fit equally well (a plane), the other photos decide.
@@ -67,7 +67,7 @@ impl Search<'_> {
         let mut pairs: Vec<(usize, [usize; 2])> =
             common.into_iter().map(|(pair, count)| (count, pair)).collect();
         pairs.retain(|(count, _)| *count >= COMMON);
-        sort_by(&mut pairs, &|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        pairs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         pairs.into_iter().take(TRIED).map(|(_, pair)| pair).collect()
     }
 

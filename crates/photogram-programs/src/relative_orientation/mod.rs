@@ -26,7 +26,6 @@ pub use oriented::Oriented;
 
 use super::sampling::Samples;
 use photocore::geometry::{Matrix3, Vector3};
-use photocore::internal::sort_by;
 
 /// Number of samples: if a third of the pairs is wrong, one sample in eight is free of errors.
 const SAMPLES: usize = 80;
@@ -72,7 +71,7 @@ pub fn relative_orientation(pairs: &[[Vector3; 2]]) -> Vec<Candidate> {
 
 /// Returns the best pose, and different poses that fit nearly as well.
 fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
-    sort_by(&mut found, &|a, b| a.misfit.total_cmp(&b.misfit));
+    found.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     let Some(best) = found.first().map(|candidate| candidate.misfit) else { return found };
     let mut retained: Vec<Candidate> = Vec::new();
     for candidate in found {

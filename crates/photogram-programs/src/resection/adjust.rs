@@ -8,7 +8,6 @@ use super::{ControlPoint, Pose, Resection, ResectionError};
 use photocore::Threads;
 use photocore::adjustment::{self, AdjustError, Event, Options, Problem};
 use photocore::geometry::{ObjectSpace, rotation, rotation_angles};
-use photocore::internal::sort_by;
 use photocore::normals::{Layout, LayoutError, Ordering, System};
 
 impl Resection {
@@ -63,7 +62,7 @@ impl Resection {
                 }
             }
         }
-        sort_by(&mut solved, &|a, b| {
+        solved.sort_by(|a, b| {
             b.converged().cmp(&a.converged()).then(a.sum_of_squares().total_cmp(&b.sum_of_squares()))
         });
         Solution::new(self, solved, undetermined).ok_or(failure)

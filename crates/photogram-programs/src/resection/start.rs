@@ -8,7 +8,6 @@ use photocore::geometry::{
     CameraModel, Matrix3, ObjectSpace, Perspective, RotationSense, Vector3, local_vertical, nearest_turns,
     rotation_angles,
 };
-use photocore::internal::sort_by;
 
 /// Number of points from which triples are formed, and number of triples.
 const SPREAD_POINTS: usize = 8;
@@ -107,7 +106,7 @@ impl Sight {
             scored.extend(three_points(&rays, &points).into_iter().map(|place| (self.misfit(&place), place)));
         }
         scored.retain(|(misfit, _)| misfit.is_finite());
-        sort_by(&mut scored, &|a, b| a.0.total_cmp(&b.0));
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         let limit = scored.first().map_or(0.0, |best| WORSE * best.0.max(self.noise));
         let mut chosen: Vec<Placement> = Vec::new();
         for (_, place) in scored.into_iter().take_while(|(misfit, _)| *misfit <= limit) {
@@ -146,7 +145,7 @@ impl Sight {
                 }
             }
         }
-        sort_by(&mut triples, &|a, b| b.0.total_cmp(&a.0));
+        triples.sort_by(|a, b| b.0.total_cmp(&a.0));
         triples.into_iter().take(TRIPLES).map(|(_, triple)| triple).collect()
     }
 

@@ -7,7 +7,6 @@
 
 use photocore::geometry::axes::{solve, unit};
 use photocore::geometry::{Matrix3, Vector3};
-use photocore::internal::sort_by;
 
 /// Pose in cartesian object space: u = G (P - C).
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +30,7 @@ const TWINS: f64 = 1e-4;
 pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement> {
     let triangle = RayTriangle::new(rays, points);
     let mut candidates = triangle.distances();
-    sort_by(&mut candidates, &|a, b| a.misclosure.total_cmp(&b.misclosure));
+    candidates.sort_by(|a, b| a.misclosure.total_cmp(&b.misclosure));
     let mut found: Vec<Vector3> = Vec::new();
     for PoseCandidate { distances, .. } in candidates {
         let twin = |other: &Vector3| {

@@ -5,7 +5,6 @@ use super::moments::Moments;
 use super::transform::Similarity;
 use super::{SimilarityError, Start, Station};
 use photocore::geometry::{Vector3, rotation};
-use photocore::internal::sort_by;
 
 /// Largest ratio of sums of squares of another minimum and the best one, for an equal fit.
 const AS_WELL: f64 = 4.0;
@@ -53,7 +52,7 @@ pub fn choose(stations: &[Station], start: Start, held: Option<f64>) -> Result<C
             let report = report(stations, control_centre, model_centre, held).ok();
             let report = report.filter(|_| start == Start::Auto);
             let sum = |similarity: &Similarity| sum_of_squares(stations, similarity);
-            sort_by(&mut minima, &|a, b| sum(a).total_cmp(&sum(b)));
+            minima.sort_by(|a, b| sum(a).total_cmp(&sum(b)));
             let Some(best) = minima.first().copied() else {
                 // All minima are mirror images: the report's values will expose it.
                 return report.map(|r| only(r, Started::Report)).ok_or(SimilarityError::Scale(f64::NAN));

@@ -10,7 +10,7 @@ use super::log::Remark;
 use super::state::{Snooping, TESTABLE};
 use super::tried::{Tried, unless_lost};
 use crate::adjustment::Status;
-use crate::sorting::middle;
+use crate::adjustment::middle;
 
 /// Median of the absolute value of a standard normal variable, and of the length of a vector of two of them.
 const MEDIAN: f64 = 0.674_489_750_196_081_7;

@@ -6,7 +6,7 @@ use super::log::{Consequence, Removal};
 use super::state::Snooping;
 use super::tried::Tried;
 use crate::adjustment::log_chi_square;
-use crate::sorting::middle;
+use crate::adjustment::middle;
 
 /// Median test value of a bad photo, in medians of all photos (in standard deviations, at least one).
 const FAR: f64 = 5.0;
