@@ -58,8 +58,8 @@ def adjust(
     and all other observations (standard deviations, redundancy numbers, test values), and the adjusted
     project.
     """
-    from photogram.formats.results import project_files
     from photogram.formats.description import described
+    from photogram.formats.results import project_files
 
     if not statement:
         wanted.check_alone()
