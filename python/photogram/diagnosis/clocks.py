@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -21,22 +22,14 @@ TAI_GPS, ET_TAI = 19.0, 32.184  # TAI - GPS and ET - TAI, seconds; ET as in SPIC
 WITHIN = 0.010  # Seconds within which a time shift equals a difference of scales
 
 
-def differences() -> Iterator[tuple[str, str, float]]:
-    """Yield two time scales and by how many seconds the first is ahead of the second."""
-    yield "TAI", "GPS", TAI_GPS
-    yield "ET", "TAI", ET_TAI
-    yield "ET", "GPS", TAI_GPS + ET_TAI
-    for leap in reversed(LEAPS):
-        yield "GPS", "UTC", float(leap)
-        yield "TAI", "UTC", leap + TAI_GPS
-        yield "ET", "UTC", leap + TAI_GPS + ET_TAI
-
-
 def shifts() -> Iterator[tuple[str, str, float]]:
     """Yield time scales of data and of a table, and the seconds that convert times of the data."""
-    for ahead, behind, seconds in differences():
-        yield behind, ahead, seconds
-        yield ahead, behind, -seconds
+    ahead_of_gps = {"TAI": TAI_GPS, "ET": TAI_GPS + ET_TAI, "GPS": 0.0}
+    for leap in reversed(LEAPS):
+        scales = {**ahead_of_gps, "UTC": -float(leap)}
+        for of_data, of_table in permutations(scales, 2):
+            if leap == LEAPS[-1] or "UTC" in (of_data, of_table):
+                yield of_data, of_table, scales[of_table] - scales[of_data]
 
 
 SIGNIFICANT = 5.0

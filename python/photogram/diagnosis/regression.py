@@ -24,7 +24,6 @@ UNKNOWN = 1e6  # Misfit of a photo without predictions
 class Regression:
     """Regression of observed on predicted image coordinates of k photos."""
 
-    misfit: Floats  # (k,) m
     scale: Floats  # (k,) k
     turn: Floats  # (k, 2, 2) V
     shift: Floats  # (k, 2) t, millimetres
@@ -105,9 +104,8 @@ def regressions(block: Block, photos: Indices) -> Regression:
     """Compute the regression for some photos with enough points."""
     predicted = predictions(block)
     rows = [_rows(block, predicted, photo) for photo in photos]
-    given = [(block.image_xy[own], predicted[own]) for own in rows]
-    columns = zip(*(_regressed(*each) for each in given), strict=True)
-    return Regression(np.array([relative(*each) for each in given]), *map(np.array, columns))
+    columns = zip(*(_regressed(block.image_xy[own], predicted[own]) for own in rows), strict=True)
+    return Regression(*map(np.array, columns))
 
 
 def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floats, float]:
