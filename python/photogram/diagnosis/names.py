@@ -59,10 +59,11 @@ def _around_worst(result: Result, sizes: Floats) -> list[Indices]:
     photos, second = photos[count > 1], sizes[bad[first[count > 1] + 1]]
     groups: list[Indices] = []
     for photo in photos[np.argsort(-second, kind="stable")].tolist():
-        if len(groups) == CENTRES:
-            break
-        if not any(photo in group for group in groups):
-            groups.append(_neighbours(block, photo))
+        if len(groups) < CENTRES and not any(photo in group for group in groups):
+            seen = np.isin(block.image_points, block.image_points[block.image_photos == photo])
+            shared = np.bincount(block.image_photos[seen], minlength=len(block.photo_ids))
+            order = np.argsort(-shared, kind="stable")[: AROUND + 1]
+            groups.append(np.union1d([photo], order[shared[order] >= SHARED]))
     return groups
 
 
@@ -82,21 +83,16 @@ def _sizes(result: Result) -> Floats:
     return np.where(np.array(harmful)[block.image_points], np.inf, sizes)
 
 
-def _neighbours(block: Block, photo: int) -> Indices:
-    seen = np.zeros(len(block.point_ids), dtype=bool)
-    seen[block.image_points[block.image_photos == photo]] = True
-    shared = np.bincount(block.image_photos[seen[block.image_points]], minlength=len(block.photo_ids))
-    order = np.argsort(-shared, kind="stable")[: AROUND + 1]
-    chosen: Indices = np.union1d([photo], order[shared[order] >= SHARED])
-    return chosen
-
-
 def _among(block: Block, photos: Indices, sizes: Floats) -> list[Exchange]:
     """Return exchanged names on photos oriented by image observations alone."""
     kept = np.zeros(len(block.photo_ids), dtype=bool)
     kept[photos] = True
+    part = of_photos(kept_images(block, _chosen(block, photos, sizes)), kept)
+    names = ("point_positions", "photo_positions", "photo_attitudes")
+    unknown = {name: np.full(getattr(part, name).shape, np.nan) for name in names}
+    alone = view(part, np.arange(len(photos))).replace(spheroid=None, **unknown)
     try:
-        found = first_values(_images_alone(kept_images(block, _chosen(block, photos, sizes)), kept))
+        found = first_values(alone)
     except (AdjustmentError, InputError):
         return []
     started = np.array([name in found.sources for name in found.block.photo_ids])
@@ -118,11 +114,3 @@ def _chosen(block: Block, photos: Indices, sizes: Floats) -> Bools:
         for order in (np.lexsort((-rays[seen], -worst[seen])), np.argsort(-rays[seen], kind="stable")):
             points[seen[order[:EACH]]] = True
     return np.asarray(own & points[block.image_points])
-
-
-def _images_alone(block: Block, kept: Bools) -> Block:
-    """Return some photos with unknown poses and points, without other observations."""
-    free = view(of_photos(block, kept), np.arange(int(kept.sum())))
-    names = ("point_positions", "photo_positions", "photo_attitudes")
-    unknown = {name: np.full(getattr(free, name).shape, np.nan) for name in names}
-    return free.replace(spheroid=None, **unknown)
