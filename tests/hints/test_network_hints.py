@@ -9,7 +9,7 @@ from message_codes import as_check, nested_codes
 from photogram import Camera, Distance, InputError, RankError, Spheroid, adjust, diagnose, simulate
 from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints, verdicts
-from photogram.diagnosis.regression import eligible, regressions, spread, view
+from photogram.diagnosis.regression import eligible, misfits, regressions, spread, view
 from photogram.giant import Project, write_project
 from photogram.network import project
 from photogram.network.directions import image_directions, without_lenses
@@ -53,7 +53,7 @@ def test_the_table_of_the_specification(network, mistake):
     if turn is not None:
         assert np.array_equal(np.round(np.median(seen.turn, axis=0)), turn)
     if misfit is not None:
-        assert np.median(seen.misfit) == pytest.approx(misfit, rel=0.08, abs=0.006)
+        assert np.median(misfits(view(block, photos), photos)) == pytest.approx(misfit, rel=0.08, abs=0.006)
 
 
 NAMED = {
