@@ -61,6 +61,7 @@ def refused(folder, old, new, read=read_night, name="night.toml"):
         ("width_px = 6000", "width_px = -6000", coded("error.key", table="camera", key="width_px")),
         ("width_px = 6000", f"width_px = 1{'0' * 400}", coded("error.key", table="camera", key="width_px")),
         ("width_px = 6000", f"width_px = {'9' * 5000}", coded("toml.digits", key="width_px")),
+        ("width_px = 6000", f"width_px = 0x{'f' * 5000}", coded("toml.digits", key="width_px")),
         ("width_px = 6000", f"width_px = {'[' * 3000}", coded("error.nested")),
         ("width_px = 6000", "", coded("toml.missing", table="camera", key="width_px")),
         ("field_of_view_deg = 36.9", "field_of_view_deg = 0", coded("stars.field-of-view", field=0.0)),

@@ -21,7 +21,8 @@ from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
 MOST_DIGITS = 1000
-_ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")  # Python reports no line for such integers
+# Python reports no line for such integers, and cannot print them.
+_ENDLESS = re.compile(rf"\d(?:[\d_]{{{MOST_DIGITS}}}|x[\da-fA-F_]{{{MOST_DIGITS}}})")
 
 
 class TomlFile:
@@ -254,6 +255,6 @@ def _value(text: str) -> Any:
     """Return a value in TOML syntax, or the text itself."""
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
-    except ValueError:  # TOMLDecodeError, endless numbers, and a line with several values
+    except ValueError:  # TOMLDecodeError, and a line with several values
         return text
-    return value
+    return text if _ENDLESS.search(text) else value
