@@ -34,21 +34,6 @@ _Identity = tuple[int, int]
 _Buffer = io.BufferedRandom | io.BufferedWriter
 
 
-@dataclass(frozen=True)
-class Target:
-    """The target of an output."""
-
-    given: Path  # The path of the user, for errors
-    place: str  # The path after all symbolic links
-    status: os.stat_result | None  # Status of the existing file; None without
-    descriptor: int | None = None  # Of standard output or error, if it is the target
-
-    @property
-    def regular(self) -> bool:
-        """Whether the target is a (new) regular file, not a pipe or device."""
-        return self.descriptor is None and (self.status is None or stat.S_ISREG(self.status.st_mode))
-
-
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
     """Add the path of the user to an :class:`OSError`."""
@@ -58,7 +43,95 @@ def naming(path: Path) -> Iterator[None]:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from None
 
 
-def follow(path: Path) -> Target:
+class _File(io.FileIO):
+    """An open descriptor whose errors contain the path of the user."""
+
+    def __init__(self, descriptor: int, given: Path, mode: str = "wb") -> None:
+        super().__init__(descriptor, mode)
+        self.given = given
+
+    def write(self, data: ReadableBuffer) -> int:
+        with naming(self.given):
+            return os.write(self.fileno(), data)
+
+    def close(self) -> None:
+        with naming(self.given):
+            super().close()
+
+
+@dataclass(eq=False)
+class _Target:
+    """The target of an output; a file has a temporary name until its set is complete."""
+
+    given: Path  # The path of the user, for errors
+    place: str  # The path after all symbolic links
+    status: os.stat_result | None  # Status of the existing file; None without
+    descriptor: int | None = None  # Of standard output or error, if it is the target
+    path: str = ""  # The temporary name
+    file: io.BufferedRandom | None = None
+    is_moved: bool = False  # Or is being moved
+
+    @property
+    def regular(self) -> bool:
+        """Whether the target is a (new) regular file, not a pipe or device."""
+        return self.descriptor is None and (self.status is None or stat.S_ISREG(self.status.st_mode))
+
+    @property
+    def old(self) -> str:
+        """Second name of the file that is replaced."""
+        return f"{self.path}.old"
+
+    def open(self) -> io.BufferedRandom:
+        """Create the temporary file, with the permissions of the existing one."""
+        mode = stat.S_IMODE(self.status.st_mode) & 0o777 if self.status else 0o666
+        descriptor = os.open(self.path, NEW, mode)
+        self.file = io.BufferedRandom(_File(descriptor, self.given, "w+b"))
+        if self.status and sys.platform != "win32":
+            os.fchmod(descriptor, mode)
+        return self.file
+
+    def stream(self) -> io.BufferedWriter:
+        """Open a pipe or device for direct writing."""
+        with naming(self.given):
+            if self.descriptor is None:
+                descriptor = os.open(self.given, os.O_WRONLY | getattr(os, "O_NOCTTY", 0))
+            else:
+                # Previous output to the same target must precede.
+                for stream in filter(None, (sys.stdout, sys.stderr)):
+                    stream.flush()
+                descriptor = os.dup(self.descriptor)
+        return io.BufferedWriter(_File(descriptor, self.given))
+
+    def complete(self) -> None:
+        """Write a file to disk."""
+        if self.file is not None and not self.file.closed:
+            with naming(self.given):
+                self.file.flush()
+                os.fsync(self.file.fileno())
+            self.file.close()
+
+    def move(self) -> None:
+        if self.status:
+            with suppress(OSError):
+                os.link(self.place, self.old, follow_symlinks=False)
+        with naming(self.given):
+            self.is_moved = True
+            os.replace(self.path, self.place)
+
+    def remove(self, *, restore: bool) -> None:
+        """Remove the temporary names; restore the previous file if this one was moved."""
+        with suppress(OSError):
+            if restore and self.is_moved and not os.path.lexists(self.path):
+                if self.status:
+                    os.replace(self.old, self.place)
+                else:
+                    os.unlink(self.place)
+        for path in (self.path, self.old):
+            with suppress(OSError):
+                os.unlink(path)
+
+
+def follow(path: Path) -> _Target:
     """Return the target of an output path."""
     if "\0" in str(path):
         raise InputError(phrase("file.nul"), file=path)
@@ -70,7 +143,7 @@ def follow(path: Path) -> Target:
     place = os.path.realpath(path)
     if path.name in ("", os.pardir) or (status and stat.S_ISDIR(status.st_mode)):
         raise InputError(phrase("file.directory"), file=path)
-    return Target(path, place, status, _standard_stream(status) if status else None)
+    return _Target(path, place, status, _standard_stream(status) if status else None)
 
 
 def _standard_stream(status: os.stat_result) -> int | None:
@@ -99,7 +172,7 @@ class Guard:
             place = os.path.realpath(path)
             self._above |= {_spelling(place), *_above(place)}
 
-    def add(self, path: Path) -> Target:
+    def add(self, path: Path) -> _Target:
         """Check an output and return its target."""
         target = follow(path)
         if not target.regular:
@@ -141,78 +214,6 @@ def _identity(status: os.stat_result) -> _Identity:
     return status.st_dev, status.st_ino
 
 
-class _File(io.FileIO):
-    """An open descriptor whose errors contain the path of the user."""
-
-    def __init__(self, descriptor: int, given: Path, mode: str = "wb") -> None:
-        super().__init__(descriptor, mode)
-        self.given = given
-
-    def write(self, data: ReadableBuffer) -> int:
-        with naming(self.given):
-            return os.write(self.fileno(), data)
-
-    def close(self) -> None:
-        with naming(self.given):
-            super().close()
-
-
-@dataclass
-class _Staged:
-    """A file under a temporary name, which is renamed when its set is complete."""
-
-    target: Target
-    path: str
-    file: io.BufferedRandom | None = None
-    is_moved: bool = False  # Or is being moved
-
-    @property
-    def old(self) -> str:
-        """Second name of the file that is replaced."""
-        return f"{self.path}.old"
-
-    def open(self) -> io.BufferedRandom:
-        status = self.target.status
-        mode = stat.S_IMODE(status.st_mode) & 0o777 if status else 0o666
-        descriptor = os.open(self.path, NEW, mode)
-        file = self.file = io.BufferedRandom(_File(descriptor, self.target.given, "w+b"))
-        if status and sys.platform != "win32":
-            made = os.fstat(descriptor)
-            if (made.st_uid, made.st_gid) != (status.st_uid, status.st_gid):
-                with suppress(OSError):
-                    os.fchown(descriptor, status.st_uid, status.st_gid)
-            os.fchmod(descriptor, mode)
-        return file
-
-    def complete(self) -> None:
-        """Write a file to disk."""
-        if self.file is not None and not self.file.closed:
-            with naming(self.target.given):
-                self.file.flush()
-                os.fsync(self.file.fileno())
-            self.file.close()
-
-    def move(self) -> None:
-        if self.target.status:
-            with suppress(OSError):
-                os.link(self.target.place, self.old, follow_symlinks=False)
-        with naming(self.target.given):
-            self.is_moved = True
-            os.replace(self.path, self.target.place)
-
-    def remove(self, *, restore: bool) -> None:
-        """Remove the temporary names; restore the previous file if this one was moved."""
-        with suppress(OSError):
-            if restore and self.is_moved and not os.path.lexists(self.path):
-                if self.target.status:
-                    os.replace(self.old, self.target.place)
-                else:
-                    os.unlink(self.target.place)
-        for path in (self.path, self.old):
-            with suppress(OSError):
-                os.unlink(path)
-
-
 class OutputSet:
     """A set of files that are either all written or not at all; a context manager.
 
@@ -225,9 +226,9 @@ class OutputSet:
 
     def __init__(self, inputs: Iterable[Path] = ()) -> None:
         self._guard = Guard(inputs)
-        self._staged: list[_Staged] = []
+        self._staged: list[_Target] = []
         self._streams: list[io.BufferedWriter] = []
-        self._late: list[tuple[Target, Content]] = []
+        self._late: list[tuple[_Target, Content]] = []
         self._made: list[str] = []
         self._pending: list[Future[None]] = []
         self._disk = ThreadPoolExecutor(MOST_PENDING)
@@ -249,7 +250,7 @@ class OutputSet:
                 for file in self._streams:
                     file.close()
                 for target, content in self._late:
-                    with _stream(target) as file:
+                    with target.stream() as file:
                         _put(file, content)
                 for staged in self._staged:
                     staged.move()
@@ -263,7 +264,7 @@ class OutputSet:
         target = self._target(path)
         if target.regular:
             return self._stage(target)
-        file = _stream(target)
+        file = target.stream()
         self._streams.append(file)
         return file
 
@@ -273,26 +274,26 @@ class OutputSet:
         if target.regular:
             _put(self._stage(target), content)
             # Meanwhile other results are computed and written.
-            self._pending.append(self._disk.submit(self._staged[-1].complete))
+            self._pending.append(self._disk.submit(target.complete))
             if len(self._pending) > MOST_PENDING:
                 self._pending[-MOST_PENDING].result()
         else:
             self._late.append((target, content))
 
-    def _target(self, path: Path) -> Target:
+    def _target(self, path: Path) -> _Target:
         target = self._guard.add(path)
         if target.regular and target.status and not os.access(target.place, os.W_OK):
             raise PermissionError(errno.EACCES, "is write-protected", str(path))
         return target
 
-    def _stage(self, target: Target) -> io.BufferedRandom:
+    def _stage(self, target: _Target) -> io.BufferedRandom:
         with naming(target.given):
             directory = os.path.dirname(target.place)
             self._make(directory)
             # Registered before its creation, so that a signal always removes it.
-            staged = _Staged(target, os.path.join(directory, f".photogram-{secrets.token_hex(8)}"))
-            self._staged.append(staged)
-            return staged.open()
+            target.path = os.path.join(directory, f".photogram-{secrets.token_hex(8)}")
+            self._staged.append(target)
+            return target.open()
 
     def _make(self, directory: str) -> None:
         if os.path.isdir(directory):
@@ -344,17 +345,3 @@ def _put(file: _Buffer, content: Content) -> None:
         content(file)
     else:
         file.write(content)
-
-
-def _stream(target: Target) -> io.BufferedWriter:
-    """Open a pipe or device for direct writing."""
-    with naming(target.given):
-        if target.descriptor is None:
-            descriptor = os.open(target.given, os.O_WRONLY | getattr(os, "O_NOCTTY", 0))
-        else:
-            # Previous output to the same target must precede.
-            for stream in (sys.stdout, sys.stderr):
-                if stream is not None:
-                    stream.flush()
-            descriptor = os.dup(target.descriptor)
-    return io.BufferedWriter(_File(descriptor, target.given))
