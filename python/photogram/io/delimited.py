@@ -42,6 +42,7 @@ Spelling = Callable[[Sequence[str]], Sequence[str]]
 _SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)  # First line of tables from Excel
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
+_LINE = re.compile(r"(.*)\n?")
 
 
 def read_columns(
@@ -220,7 +221,8 @@ def _head(
     If title lines precede it, it is the first line below them with several known columns.
     """
     comment: Place | None = None
-    for record, line in enumerate(_lines(text), 1):
+    for record, match in enumerate(_LINE.finditer(text), 1):
+        line = match[1]
         if line.lstrip().startswith(COMMENT):
             comment = Place(path, record, line.lstrip()[1:])
             continue
@@ -231,8 +233,8 @@ def _head(
             if place is not None and not set(known).isdisjoint(_spelled(place, spelling)):
                 return place, _delimiter(place)
         if known and comment is None:
-            for number, row in enumerate(itertools.islice(_lines(text), record, TITLES), record + 1):
-                below = Place(path, number, row)
+            for number, row in enumerate(itertools.islice(_LINE.finditer(text), record, TITLES), record + 1):
+                below = Place(path, number, row[1])
                 if len(set(known).intersection(_spelled(below, spelling))) > 2:
                     return below, _delimiter(below)
             if hint is not None:
@@ -242,16 +244,6 @@ def _head(
     if comment is not None and not set(known).isdisjoint(_spelled(comment, spelling)):
         return comment, _delimiter(comment)
     raise Place(path).error(phrase("error.empty-file", content="a table"))
-
-
-def _lines(text: str) -> Iterator[str]:
-    """Yield the lines of a text without copying the unused rest."""
-    start = 0
-    while (end := text.find("\n", start)) >= 0:
-        yield text[start:end]
-        start = end + 1
-    if start < len(text):
-        yield text[start:]
 
 
 def _spelled(place: Place, spelling: Spelling) -> Sequence[str]:
