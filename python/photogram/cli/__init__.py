@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from photogram.cli.process import end_by_signals, finish, ignore_signals, open_streams, stream_fault
 
 if TYPE_CHECKING:
-    from photogram.cli.commands import app
+    from typer import Typer
+
+    app: Typer
 
 __all__ = ["app", "main"]
 
@@ -42,8 +44,9 @@ def main() -> None:
 
 
 def __getattr__(name: str) -> object:
-    if name == "app":
-        from photogram.cli.commands import app
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from photogram.cli.commands import application
 
-        return app
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = application()
+    return globals()[name]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from photogram.cli.command_classes import Command, Group, GroupWithMain
 from photogram.cli.console import output
 from photogram.cli.options import declarations
-
-if TYPE_CHECKING:
-    app: typer.Typer
 
 ADJUST = (
     "Examples: `photogram adjust --example`,"
@@ -111,10 +108,3 @@ def _photogram(
     from photogram.words import on_command_line  # the help has no messages
 
     context.with_resource(on_command_line())
-
-
-def __getattr__(name: str) -> object:
-    if name != "app":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = application()
-    return globals()[name]
