@@ -20,6 +20,7 @@ from photogram import _photocore
 from photogram.errors import InputError
 from photogram.io.column_table import NameColumn
 from photogram.io.files import read_bytes
+from photogram.io.json import holding
 from photogram.io.parquet import Column, Sheet, packed, parquet_content, read_sheet, unpacked
 from photogram.io.seals import SEAL, check_seal, check_sealed, recorded, seal
 from photogram.io.structure import Decoder, Encoder
@@ -163,11 +164,8 @@ class Saved:
     def state(self) -> _photocore.BlockState:
         unknowns = read_sheet(self.folder / f"{_STATE}.parquet").numbers("unknown")
         rest = self.decoder.value(self.summary["kept"][_STATE])
-        try:
+        with holding("state of an adjustment", self.folder / SUMMARY):
             return _photocore.BlockState(unknowns.tolist(), *rest)
-        except (TypeError, ValueError):
-            fields = {"content": "state of an adjustment", "reason": phrase("error.member")}
-            raise InputError(phrase("error.content", **fields), file=self.folder / SUMMARY) from None
 
 
 _RENAMED = {"standardized": "test", "d": "difference"}  # Names in Parquet
