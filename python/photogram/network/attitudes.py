@@ -15,10 +15,11 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import frozen, numbers, one_of, shaped
+from photogram.arguments.fields import array, check_arrays
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -68,15 +69,12 @@ class Attitudes:
     array([[  0.,   0., -90.]])
     """
 
-    matrices: Floats
-    step_covariances: Floats | None = None
+    matrices: Floats = field(metadata=array("photos", 3, 3))
+    step_covariances: Floats | None = field(default=None, metadata=array("photos", 3, 3))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "matrices", shaped("matrices", self.matrices, (None, 3, 3)))
+        check_arrays(self)
         _check_orthonormal(self.matrices)
-        if self.step_covariances is not None:
-            covariances = shaped("step_covariances", self.step_covariances, (len(self), 3, 3))
-            object.__setattr__(self, "step_covariances", covariances)
 
     def __len__(self) -> int:
         return len(self.matrices)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, number, numbers, object_name, shaped, whole_number
-from photogram.arguments.fields import check_fields
+from photogram.arguments.fields import array, check_arrays, check_fields
 from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -145,10 +145,10 @@ class Table:
     """
 
     times: Floats
-    positions: Floats
+    positions: Floats = field(metadata=array("times", 3))
     attitude_times: Floats
     attitudes: Floats
-    velocities: Floats | None = None
+    velocities: Floats | None = field(default=None, metadata=array("times", 3))
     interpolation: Interpolation = "linear"
     attitude_interpolation: AttitudeInterpolation = "linear"
 
@@ -163,14 +163,9 @@ class Table:
             other="hermite",
         )
         times, turned = increasing("times", self.times), increasing("attitude_times", self.attitude_times)
-        vars(self).update(
-            times=times,
-            attitude_times=turned,
-            positions=shaped("positions", self.positions, (len(times), 3)),
-            attitudes=rotations("attitudes", self.attitudes, len(turned)),
-        )
-        if self.velocities is not None:
-            vars(self)["velocities"] = shaped("velocities", self.velocities, (len(times), 3))
+        attitudes = rotations("attitudes", self.attitudes, len(turned))
+        vars(self).update(times=times, attitude_times=turned, attitudes=attitudes)
+        check_arrays(self, times=len(times))
 
     @property
     def span(self) -> tuple[float, float]:
