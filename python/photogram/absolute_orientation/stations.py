@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, shaped, text
+from photogram.arguments.arrays import names, numbers, text
+from photogram.arguments.fields import array, check_arrays, check_fields
 from photogram.arguments.objects import path_of
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import NONE, ZERO, Array, Bools, Floats, OptionalArray
 from photogram.errors import InputError
 from photogram.io.delimited import cells, read_records
 from photogram.io.files import read_lines
 from photogram.io.places import Place, at_place
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import converting_dataclass, dataclass, field
 from photogram.summaries import Brief
 from photogram.words import phrase
 
@@ -31,7 +31,7 @@ CONTROL_SD_COLUMNS = ("sd_X", "sd_Y", "sd_Z")
 MODEL_SD_COLUMNS = ("sd_x", "sd_y", "sd_z")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@converting_dataclass(frozen=True, eq=False, repr=False)
 class Stations(Brief):
     """Stations with model and control coordinates; arrays are copied and checked.
 
@@ -63,36 +63,17 @@ class Stations(Brief):
     """
 
     ids: Sequence[str]
-    control: Floats
-    model: Floats
-    control_sd: Floats
-    model_sd: Floats | None
-    ground_unit: str
-    model_unit: str
+    control: Array = field(metadata=array("stations", 3, missing=True, one_row=True))
+    model: Array = field(metadata=array("stations", 3, one_row=True))
+    control_sd: Array = field(default=ZERO, kw_only=True, metadata=array("stations", 3, one_row=True))
+    model_sd: OptionalArray = field(default=NONE, kw_only=True, metadata=array("stations", 3, one_row=True))
+    ground_unit: str = field(default="ground unit", kw_only=True, metadata={"check": text})
+    model_unit: str = field(default="model unit", kw_only=True, metadata={"check": text})
 
-    def __init__(
-        self,
-        ids: Iterable[object],
-        control: ArrayLike,
-        model: ArrayLike,
-        *,
-        control_sd: ArrayLike = 0.0,
-        model_sd: ArrayLike | None = None,
-        ground_unit: str = "ground unit",
-        model_unit: str = "model unit",
-    ) -> None:
-        found = names("ids", ids)
-        shape = len(found), 3
-        put = object.__setattr__  # the dataclass is frozen
-        put(self, "ids", tuple(found))
-        put(self, "control", shaped("control", control, shape, missing=True, one_row=True))
-        put(self, "model", shaped("model", model, shape, one_row=True))
-        put(self, "control_sd", shaped("control_sd", control_sd, shape, one_row=True))
-        if model_sd is not None:
-            model_sd = shaped("model_sd", model_sd, shape, one_row=True)
-        put(self, "model_sd", model_sd)
-        put(self, "ground_unit", text("ground_unit", ground_unit))
-        put(self, "model_unit", text("model_unit", model_unit))
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ids", tuple(names("ids", self.ids)))
+        check_arrays(self, stations=len(self.ids))
+        check_fields(self)
         self._check()
 
     @classmethod
@@ -120,7 +101,7 @@ class Stations(Brief):
         ]
         weighted = all(name in table for name in MODEL_SD_COLUMNS)
         return cls(
-            table["id"],
+            table["id"].tolist(),
             table[list(CONTROL_COLUMNS)],
             table[list(MODEL_COLUMNS)],
             control_sd=np.column_stack(control_sd) if len(table) else 0.0,

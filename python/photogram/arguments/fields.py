@@ -54,7 +54,9 @@ def option(
     return field(default=default, metadata=metadata)
 
 
-def array(*shape: int | str, rule: str = "", missing: bool = False, index: str = "") -> dict[str, Any]:
+def array(
+    *shape: int | str, rule: str = "", missing: bool = False, one_row: bool = False, index: str = ""
+) -> dict[str, Any]:
     """Declare an array field.
 
     Parameters
@@ -65,10 +67,12 @@ def array(*shape: int | str, rule: str = "", missing: bool = False, index: str =
         Rule of its numbers, of `arrays.RULES`.
     missing
         Whether NaN is valid.
+    one_row
+        Whether a single row applies to all, as a single number does.
     index
         Name of the size that its indices are below; empty: an array of numbers.
     """
-    return {"shape": shape, "rule": rule, "missing": missing, "index": index}
+    return {"shape": shape, "rule": rule, "missing": missing, "one_row": one_row, "index": index}
 
 
 def check_arrays(made: Any, **sizes: int) -> None:
@@ -77,7 +81,7 @@ def check_arrays(made: Any, **sizes: int) -> None:
 
     for each in fields(made):
         name, declared, value = each.name, each.metadata, getattr(made, each.name)
-        if "shape" not in declared or value is None:
+        if "shape" not in declared or (value is None and each.default is None):
             continue
         if isinstance(rows := declared["shape"][0], str) and rows not in sizes:
             sizes[rows] = arrays.length(name, value)
@@ -85,7 +89,8 @@ def check_arrays(made: Any, **sizes: int) -> None:
         if limit := declared["index"]:
             value = arrays.indices(name, value, shape[0], sizes[limit])
         else:
-            value = arrays.shaped(name, value, shape, declared["rule"], missing=declared["missing"])
+            permitted = {option: declared[option] for option in ("missing", "one_row")}
+            value = arrays.shaped(name, value, shape, declared["rule"], **permitted)
         object.__setattr__(made, name, value)
 
 

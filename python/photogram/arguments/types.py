@@ -15,6 +15,7 @@ Bools = NDArray[np.bool_]
 # Defaults of fields that convert their arguments
 NONE: Any = None
 FREE: Any = np.inf
+ZERO: Any = 0.0
 ONE: Any = 1.0
 ALL: Any = True
 
