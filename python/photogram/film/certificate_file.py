@@ -274,7 +274,8 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
         raise table.head.error(unknown_name("column", unknown[0], _COLUMNS))
     rows, name = _rows_of(table, camera)
     marks = [by_side(each) for each in table.texts("fiducial")]
-    on = [row for row in rows if _used(table, row)]
+    use = table.words("use", ("on", "off"))
+    on = [row for row in rows if use[row] == "on"]
     xy = table.vectors(("x", "y"))
     table.check_given(xy, ("x", "y"))
     sd = table.vectors(("sd_x", "sd_y"), SD_PLACE)
@@ -306,14 +307,6 @@ def _rows_of(table: ColumnTable, camera: str | None) -> tuple[list[int], str]:
     if name is None or name not in cameras.names:
         raise InputError(unknown_name("camera", str(name), cameras.names), file=table.path)
     return np.flatnonzero(cameras.rows == cameras.names.index(name)).tolist(), name
-
-
-def _used(table: ColumnTable, row: int) -> bool:
-    word = table.texts("use")[row].lower()
-    if word not in ("", "on", "off"):
-        message = phrase("error.choice", value=word, names=["on", "off"])
-        raise table.error(row, phrase("error.column", column="use", message=message))
-    return word != "off"
 
 
 def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Floats:
