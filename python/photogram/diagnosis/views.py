@@ -12,18 +12,6 @@ from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.subset import kept_images
 
-_SHARED = (
-    "photo_positions",
-    "photo_attitudes",
-    "photo_position_sd",
-    "photo_positions_observed",
-    "observations",
-    "photo_to_ground",
-    "point_positions",
-    "point_sd",
-)
-"""Attributes that a block shares with its view, except image observations."""
-
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -54,10 +42,8 @@ class View:
         meant = change(self.seen)
         if meant is self.seen:
             return self
-        if self.seen is self.block:
-            return replace(self, block=meant, seen=meant)
         same = meant.image_xy is self.seen.image_xy or np.array_equal(meant.image_xy, self.seen.image_xy)
-        if same and np.array_equal(meant.known_distances("checks"), self.seen.known_distances("checks")):
-            block = self.block.replace(**{name: getattr(meant, name) for name in _SHARED})
-            return replace(self, block=block, seen=meant)
-        return replace(self, block=meant, seen=meant)
+        same = same and np.array_equal(meant.known_distances("checks"), self.seen.known_distances("checks"))
+        if self.seen is self.block or not same:
+            return replace(self, block=meant, seen=meant)
+        return replace(self, block=change(self.block), seen=meant)
