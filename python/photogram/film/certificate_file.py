@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import date
 from pathlib import Path
 from typing import Any, cast, get_args
 
@@ -30,7 +29,7 @@ from photogram.film.marks import DataStrip, by_side, turned, turned_name
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns
 from photogram.io.places import at_place
-from photogram.io.toml import TomlTree, day_of, read_document
+from photogram.io.toml import TomlTree, read_document
 from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
@@ -59,7 +58,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     found: dict[str, Any] = {
         "name": table.get("camera", path.stem).word(),
         "camera_type": table.get("type", "").text(),
-        "day": _day(table),
+        "day": table["date"].day() if "date" in table else None,
         "c": abs(table["c"].number(-LARGEST, LARGEST)) if "c" in table else None,
         "sd_c": _positive(table, "sd_c"),
         "reference": table.get("principal_point", "fiducial-centre").choice(REFERENCES),
@@ -163,16 +162,6 @@ def _text(value: Any) -> str:
 
 def _positive(table: TomlTree, key: str) -> float | None:
     return table[key].positive() if key in table else None
-
-
-def _day(table: TomlTree) -> date | None:
-    value = table.value.get("date")
-    if value is None:
-        return None
-    try:
-        return day_of(value)
-    except ValueError:
-        raise table["date"].error(phrase("error.day", value=str(value))) from None
 
 
 def _numbers(table: TomlTree, key: str, *counts: int) -> Floats:

@@ -205,6 +205,13 @@ class TomlTree(Tree):
                     message = phrase("error.at", what=f"[{self.name}]", message=message)
                 raise self.source.error(key, message, self.name)
 
+    def day(self) -> date:
+        """Return a date."""
+        try:
+            return day_of(self.value)
+        except ValueError:
+            raise self.value_error("error.day") from None
+
     def says(self, today: str, report: str) -> bool:
         """Return whether the key in present units is set; reject both keys."""
         if today in self and report in self:

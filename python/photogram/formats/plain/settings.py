@@ -23,7 +23,7 @@ from photogram.formats.plain.schema import TABLES, WITH_SD
 from photogram.formats.project import Frame
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import at_place
-from photogram.io.toml import TomlTree, day_of, quoted_text, read_document, read_toml
+from photogram.io.toml import TomlTree, quoted_text, read_document, read_toml
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
 from photogram.results.features import KINDS, Definition
@@ -79,10 +79,7 @@ class Key(NamedTuple):
             case "moment":
                 return _moment(table, name, value)
             case "day":
-                try:
-                    return day_of(value)
-                except ValueError:
-                    raise table[name].value_error("error.day") from None
+                return table[name].day()
             case "date" if type(value) is date:
                 return value.isoformat()
             case "length" | "area":
