@@ -15,7 +15,7 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.crs import GEOCENTRIC as EARTH
 from photogram.formats.crs import GEOGRAPHIC
 from photogram.formats.format import FORMATS
-from photogram.formats.images import Y_DOWN, checked_rotation, known_size, lens_with, to_corner
+from photogram.formats.images import Y_DOWN, checked_rotation, known_size, lens_with, pixel_rows
 from photogram.formats.models import (
     KnownPoints,
     attitude_matrices,
@@ -453,12 +453,9 @@ def _written_markers(project: Project, world: _World) -> list[str]:
 
 
 def _written_locations(project: Project, markers: Mapping[int, int]) -> list[str]:
-    block, corner = project.block, to_corner(project).tolist()
     shown = known_poses(project.block)
     images: dict[int, list[str]] = {k: [] for k in markers.values()}
-    for photo, point, (x, y) in zip(
-        block.image_photos.tolist(), block.image_points.tolist(), corner, strict=True
-    ):
+    for photo, point, x, y in pixel_rows(project):
         if point in markers and shown[photo]:
             images[markers[point]].append(
                 f'<location camera_id="{photo}" pinned="true" x="{x!r}" y="{y!r}"/>'

@@ -15,7 +15,7 @@ from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
-from photogram.formats.images import Y_DOWN, checked_rotation, lens_with, sizes_of, to_corner
+from photogram.formats.images import Y_DOWN, checked_rotation, lens_with, pixel_rows, sizes_of
 from photogram.formats.models import attitude_matrices, known_cameras, known_points
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
@@ -406,12 +406,10 @@ def _written_photo(
 
 def _points(project: Project) -> list[str]:
     block = project.block
-    corner = (to_corner(project) - CENTER).tolist()
     images: list[list[str]] = [[] for _ in block.point_ids]
-    for photo, point, (x, y) in zip(
-        block.image_photos.tolist(), block.image_points.tolist(), corner, strict=True
-    ):
-        images[point].append(f"<Measurement><PhotoId>{photo}</PhotoId><x>{x!r}</x><y>{y!r}</y></Measurement>")
+    for photo, point, x, y in pixel_rows(project):
+        xy = f"<x>{x - CENTER!r}</x><y>{y - CENTER!r}</y>"
+        images[point].append(f"<Measurement><PhotoId>{photo}</PhotoId>{xy}</Measurement>")
     known = known_points(project)
     places = {row: k for k, row in enumerate(known.rows)}
     control, ties = ["<ControlPoints>"], ["<TiePoints>"]

@@ -9,22 +9,20 @@ its words but fillers have one meaning (`X/Easting`, `Punkt-Nr.`).
 
 from __future__ import annotations
 
-import csv
-import itertools
 import math
 import re
 import unicodedata
 from collections.abc import Collection, Mapping
-from pathlib import Path
+
+from photogram.formats.declarations import declared
 
 ROLE = "use"  # Column of the roles: control or check
 
 
 def _declared() -> dict[str, dict[str, str]]:
     """Return the meaning of each word by the kind of its row."""
-    text = (Path(__file__).parent / "headings.csv").read_text(encoding="utf-8")
     found: dict[str, dict[str, str]] = {}
-    for kind, meaning, _, words in itertools.islice(csv.reader(text.splitlines()), 1, None):
+    for kind, meaning, _, words in declared(__file__, "headings.csv"):
         for word in words.split(", "):
             found.setdefault(kind, {}).setdefault(word, meaning)
     return found

@@ -7,12 +7,12 @@ parts of projects. Modules of readers and writers are imported at the first call
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
+from photogram.formats.declarations import declared
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
@@ -87,17 +87,16 @@ class Format:
 
 
 def _declared() -> Iterator[Format]:
-    text = (Path(__file__).parent / "formats.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines()):
-        functions = ("recognises", "read", "write", "cannot_hold", "results", "adjusting")
+    functions = ("recognises", "read", "write", "cannot_hold", "results", "adjusting")
+    for name, title, *homes, files, folders, coordinates, holds in declared(__file__, "formats.csv"):
         yield Format(
-            name=row["name"],
-            title=row["title"],
-            **{name: later(row[name]) for name in functions if row[name]},
-            files=tuple(row["files"].split()),
-            folders=tuple(row["folders"].split()),
-            **dict.fromkeys(row["coordinates"].split(), True),
-            holds=None if row["holds"] == "all" else frozenset(row["holds"].split()),
+            name=name,
+            title=title,
+            **{own: later(home) for own, home in zip(functions, homes, strict=True) if home},
+            files=tuple(files.split()),
+            folders=tuple(folders.split()),
+            **dict.fromkeys(coordinates.split(), True),
+            holds=None if holds == "all" else frozenset(holds.split()),
         )
 
 

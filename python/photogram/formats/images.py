@@ -63,12 +63,17 @@ def to_corner(project: Project) -> Floats:
     )
 
 
+def pixel_rows(project: Project) -> Iterator[tuple[int, int, float, float]]:
+    """Yield rows of photo and point, and column and row of image observations as :func:`to_corner`."""
+    block, corner = project.block, to_corner(project)
+    columns = (block.image_photos, block.image_points, corner[:, 0], corner[:, 1])
+    return zip(*(column.tolist() for column in columns), strict=True)
+
+
 def named_pixels(project: Project) -> Iterator[tuple[str, str, float, float]]:
-    """Yield photo, point, column and row of the image observations as :func:`to_corner`."""
-    block = project.block
-    columns = (block.image_photos.tolist(), block.image_points.tolist(), to_corner(project).tolist())
-    for photo, point, (column, row) in zip(*columns, strict=True):
-        yield block.photo_ids[photo], block.point_ids[point], column, row
+    """Yield names of photo and point, column and row of image observations as :func:`to_corner`."""
+    photos, points = project.block.photo_ids, project.block.point_ids
+    return ((photos[photo], points[point], *xy) for photo, point, *xy in pixel_rows(project))
 
 
 def known_size(camera: Camera, size: Size | None) -> Size:

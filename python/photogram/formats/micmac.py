@@ -14,6 +14,7 @@ from photogram.errors import InputError
 from photogram.film.interior import is_mirrored
 from photogram.formats.models import known_cameras
 from photogram.formats.plain.films import WrittenFilms
+from photogram.formats.plain.tables import columns_of, columns_of_records
 from photogram.formats.project import Project
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.files import read_lines
@@ -36,24 +37,18 @@ class MicmacMarks:
 
     def tables(self, camera: str) -> dict[str, dict[str, Any]]:
         """Return the tables `fiducials` and `fiducial_images` of a camera."""
-        rows = [(photo, mark, xy) for photo, own in self.readings.items() for mark, xy in own.items()]
-        places, read = (
-            np.array(list(each)).reshape(-1, 2) for each in (self.places.values(), [r[2] for r in rows])
-        )
-        return {
-            "fiducials": {
-                "camera": [camera] * len(self.places),
-                "fiducial": list(self.places),
-                "x": places[:, 0],
-                "y": places[:, 1],
-            },
-            "fiducial_images": {
-                "photo": [row[0] for row in rows],
-                "fiducial": [row[1] for row in rows],
-                "column": read[:, 0],
-                "row": read[:, 1],
-            },
+        rows = {
+            "fiducials": (
+                {"camera": camera, "fiducial": mark} | columns_of(("x", "y"), xy)
+                for mark, xy in self.places.items()
+            ),
+            "fiducial_images": (
+                {"photo": photo, "fiducial": mark} | columns_of(("column", "row"), xy)
+                for photo, own in self.readings.items()
+                for mark, xy in own.items()
+            ),
         }
+        return {name: columns_of_records(own) for name, own in rows.items()}
 
 
 def has_marks(folder: Path) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import FORMATS
-from photogram.formats.images import Y_DOWN, lens_with, named_pixels, sizes_of, to_corner
+from photogram.formats.images import Y_DOWN, lens_with, named_pixels, pixel_rows, sizes_of
 from photogram.formats.models import (
     attitude_matrices,
     chosen_model,
@@ -305,21 +305,14 @@ def _camera_member(camera: Camera, size: Size) -> dict[str, Any]:
     }
 
 
-def _tracks_file(project: Project, sizes: Any, which: list[int], shots: set[int]) -> bytes:
-    block = project.block
-    corner = to_corner(project)
-    of_images = np.asarray(which)[block.image_photos]
-    scale = np.array([max(size) for size in sizes], dtype=float)[of_images]
-    middle = np.array(sizes, dtype=float)[of_images] / 2
-    xy = (corner - middle) / scale[:, np.newaxis]
-    counts: dict[int, int] = {}
-    lines = [VERSION]
-    for photo, point, (x, y) in zip(
-        block.image_photos.tolist(), block.image_points.tolist(), xy.tolist(), strict=True
-    ):
+def _tracks_file(project: Project, sizes: Sequence[Size], which: list[int], shots: set[int]) -> bytes:
+    block, counts, lines = project.block, dict[int, int](), [VERSION]
+    for photo, point, column, row in pixel_rows(project):
         if photo not in shots:
             continue
         feature = counts[photo] = counts.get(photo, -1) + 1
+        size = sizes[which[photo]]
+        x, y = (column - size[0] / 2) / max(size), (row - size[1] / 2) / max(size)
         name = block.photo_ids[photo].replace("\t", " ")
         lines.append(f"{name}\t{block.point_ids[point]}\t{feature}\t{x!r}\t{y!r}\t0.0004\t0\t0\t0\t-1\t-1")
     return ("\n".join(lines) + "\n").encode()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from os import SEEK_END
 from pathlib import Path
@@ -201,25 +201,19 @@ def serial_number(label: Group, path: Path) -> str:
 
 
 def read_cube(path: Path) -> Isd:
-    """Return the support data in the label and the tables of a cube.
+    """Return the support data in the label and the tables of a cube of the LRO Narrow Angle Camera.
 
-    Sub-areas, maps and unknown instruments are rejected. An unknown instrument requires an ISD.
+    Sub-areas, maps and other instruments are rejected. Another instrument requires an ISD.
     """
     label = read_label(path)
     cube = label.need("IsisCube", path)
-    for name in _CHANGED:
-        if cube.groups(name):
-            raise InputError(phrase("csm.derived", name=name), file=path)
+    for changed in _CHANGED:
+        if cube.groups(changed):
+            raise InputError(phrase("csm.derived", name=changed), file=path)
     instrument = _members(cube.need("Instrument", path), path)
-    known = _CAMERAS.get(_named(instrument))
-    if known is None:
-        spacecraft, name = _named(instrument)
+    spacecraft, name = _named(instrument)
+    if spacecraft != _LRO or name not in _NAC:
         raise InputError(phrase("csm.instrument", instrument=name, spacecraft=spacecraft), file=path)
-    return known(label, cube, instrument, path)
-
-
-def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
-    """Return support data of the LRO Narrow Angle Camera."""
     keywords = _members(label.need("NaifKeywords", path), path)
     code = f"INS{_members(cube.need('Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
     size = _members(cube.need("Core", path).need("Dimensions", path), path)
@@ -231,7 +225,8 @@ def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
     return Isd(
         path,
         "line",
-        *_named(instrument),
+        spacecraft,
+        name,
         (samples, count),
         _radii(keywords),
         not_zero(keywords[f"{code}_FOCAL_LENGTH"]),
@@ -286,12 +281,6 @@ def _start(instrument: Tree, keywords: Tree) -> float:
             except (ValueError, struct.error):
                 raise value.error(phrase("csm.time", value=str(value.value))) from None
     raise keywords.error(phrase("csm.clock"))
-
-
-_CAMERAS: dict[tuple[str, str], Callable[[Group, Group, Tree, Path], Isd]] = {
-    (_LRO, name): _nac for name in _NAC
-}
-"""Readers of cubes by spacecraft and instrument."""
 
 
 def read_support(path: Path) -> Isd:

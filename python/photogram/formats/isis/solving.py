@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import itertools
 import math
 import re
 import shlex
@@ -17,6 +15,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.csm.isd import Isd, Polynomials, Positions, Turns, fitted, of_angles, to_angles
 from photogram.formats.csm.photos import trajectory_of
+from photogram.formats.declarations import declared
 from photogram.io.column_table import FALSE, TRUE
 from photogram.io.files import read_lines
 from photogram.lazy_dataclasses import dataclass, replace
@@ -265,8 +264,7 @@ class Parameter(NamedTuple):
 
 
 def _declared() -> Iterator[Parameter]:
-    text = (Path(__file__).parent / "jigsaw.csv").read_text(encoding="utf-8")
-    for names, kind, words, *rest in itertools.islice(csv.reader(text.splitlines()), 1, None):
+    for names, kind, words, *rest in declared(__file__, "jigsaw.csv"):
         known = dict(word.split("=") for word in words.split())
         yield Parameter(names.split(), kind, known, *rest)
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, starmap
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,6 +12,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.crs_results import Placed, placed
+from photogram.formats.declarations import declared
 from photogram.formats.project import frame_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
@@ -51,9 +50,8 @@ class DrawnLayer(NamedTuple):
 
 
 def _declared() -> Mapping[str, list[DrawnLayer]]:
-    text = (Path(__file__).parent / "layers.csv").read_text(encoding="utf-8")
-    _, *rows = csv.reader(text.splitlines())
-    return {name: list(own) for name, own in groupby(starmap(DrawnLayer, rows), lambda row: row.layer)}
+    rows = starmap(DrawnLayer, declared(__file__, "layers.csv"))
+    return {name: list(own) for name, own in groupby(rows, lambda row: row.layer)}
 
 
 LAYERS = _declared()

@@ -16,18 +16,17 @@ or `body matrix` (with covariances).
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from photogram import _photocore
 from photogram.formats.column_words import KINDS_OF_UNITS, UNITS
 from photogram.formats.columns import Units
+from photogram.formats.declarations import declared
 from photogram.lazy_dataclasses import dataclass
 
 AXES = ("x", "y", "z")
@@ -262,9 +261,7 @@ class Schema:
 
 def _declared() -> Iterator[tuple[str, Schema]]:
     """Yield the tables of the file."""
-    text = (Path(__file__).parent / "tables.csv").read_text(encoding="utf-8")
-    _, *rows = csv.reader(text.splitlines())
-    for name, group in groupby(rows, lambda row: row[0]):
+    for name, group in groupby(declared(__file__, "tables.csv"), lambda row: row[0]):
         (_, _, class_name, system, deviations, *_), *own = group
         columns = []
         for _, names, *cells in own:

@@ -6,11 +6,10 @@ Each row of `keys.csv` declares a key: its section, `kind`, allowed words (the f
 
 from __future__ import annotations
 
-import csv
 import difflib
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from datetime import date, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +18,7 @@ from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.arrays import value_field
 from photogram.errors import InputError, message_of
 from photogram.formats.columns import Columns, columns_given
+from photogram.formats.declarations import declared
 from photogram.formats.plain.schema import TABLES, WITH_SD
 from photogram.formats.project import Frame
 from photogram.formats.read_options import ReadOptions
@@ -130,13 +130,7 @@ def _existing(table: TomlTree, key: str, name: str, kind: str = "file") -> Path:
     return path
 
 
-def _declared() -> Iterator[Key]:
-    text = (Path(__file__).parent / "keys.csv").read_text(encoding="utf-8")
-    _, *rows = csv.reader(text.splitlines())
-    yield from (Key(*row) for row in rows)
-
-
-KEYS = tuple(_declared())
+KEYS = tuple(Key(*row) for row in declared(__file__, "keys.csv"))
 """Keys in the order of reading and writing."""
 
 
