@@ -223,10 +223,10 @@ def test_events_in_weeks_and_in_degrees_minutes_seconds(tmp_path):
         "2264 384233.500  47 22 48.0  -8 32 24.0  551.2  2  9  0.02 0.03 0.05\n"
     )
     assert is_events(path)
-    (event,) = read_events(path)
-    assert event.seconds == 2264 * 604800 + 384233.5
-    assert event.said.position == pytest.approx((-8.54, 47.38, 551.2))
-    assert (event.said.sd, event.said.fix, event.said.heights) == (
+    ((seconds, said),) = read_events(path)
+    assert seconds == 2264 * 604800 + 384233.5
+    assert said.position == pytest.approx((-8.54, 47.38, 551.2))
+    assert (said.sd, said.fix, said.heights) == (
         (0.03, 0.02, 0.05),
         "float",
         "above sea level",
@@ -256,14 +256,14 @@ def test_geocentric_events_are_the_same_positions_with_their_covariances(tmp_pat
         f"2024/05/17 10:07:45.500 {' '.join(words[:3])} 1 12 {' '.join(words[3:])} 0.00 3.5\n"
     )
     assert is_events(path)
-    (event,) = read_events(path)
-    np.testing.assert_allclose(event.said.position, (8.54, 47.38, 551.2), rtol=0, atol=2e-6)
-    assert event.said.position[2] == pytest.approx(551.2, abs=2e-6)
-    np.testing.assert_allclose(event.said.sd, (0.03, 0.02, 0.05), rtol=1e-3)
-    assert (event.said.fix, event.said.heights) == ("fixed", "")
+    ((_, said),) = read_events(path)
+    np.testing.assert_allclose(said.position, (8.54, 47.38, 551.2), rtol=0, atol=2e-6)
+    assert said.position[2] == pytest.approx(551.2, abs=2e-6)
+    np.testing.assert_allclose(said.sd, (0.03, 0.02, 0.05), rtol=1e-3)
+    assert (said.fix, said.heights) == ("fixed", "")
     text = path.read_text()
     path.write_text(text.replace(" ".join(words[:3]), "0 0 0"))
-    assert read_events(path)[0].said.position is None
+    assert read_events(path)[0][1].position is None
     path.write_text(text.replace(f" {words[-1]} 0.00 3.5", ""))
     with refused("format.words n=12"):
         read_events(path)

@@ -89,15 +89,11 @@ class Format:
 def _declared() -> Iterator[Format]:
     functions = ("recognises", "read", "write", "cannot_hold", "results", "adjusting")
     for name, title, *homes, files, folders, coordinates, holds in declared(__file__, "formats.csv"):
-        yield Format(
-            name=name,
-            title=title,
-            **{own: later(home) for own, home in zip(functions, homes, strict=True) if home},
-            files=tuple(files.split()),
-            folders=tuple(folders.split()),
-            **dict.fromkeys(coordinates.split(), True),
-            holds=None if holds == "all" else frozenset(holds.split()),
-        )
+        values: dict[str, Any] = dict.fromkeys(coordinates.split(), True)
+        values |= {own: later(home) for own, home in zip(functions, homes, strict=True) if home}
+        values |= {"files": tuple(files.split()), "folders": tuple(folders.split())}
+        values["holds"] = None if holds == "all" else frozenset(holds.split())
+        yield Format(name=name, title=title, **values)
 
 
 FORMATS: dict[str, Format] = {each.name: each for each in _declared()}

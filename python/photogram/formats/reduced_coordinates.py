@@ -81,7 +81,7 @@ class ReducedBuilder(BlockBuilder):
         angles = card.numbers(first, "omega phi kappa") * RADIANS[unit]
         if (most := abs(angles).max()) > LARGEST:
             raise card.place.error(phrase("format.angles", most=LARGEST, unit="rad", value=float(most)))
-        return Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
+        return np.asarray(Attitudes.of("omega_phi_kappa", [angles]).matrices[0])
 
     def principal_distance(self, c: float, place: Place) -> str:
         """Return the name of the camera of a principal distance in millimetres."""

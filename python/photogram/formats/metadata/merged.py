@@ -402,8 +402,8 @@ def _of_events(path: Path, photos: Sequence[str], directory: Path | None) -> Map
         raise InputError(phrase("photos.events-count", **counts, source=source), file=path)
     if len(times) == len(names):
         for (first, second), (before, after) in zip(pairwise(events), pairwise(names), strict=True):
-            elapsed, taken = second.seconds - first.seconds, times[after] - times[before]
+            elapsed, taken = second[0] - first[0], times[after] - times[before]
             if abs(elapsed - taken) > MAX_INTERVAL_DIFFERENCE:
                 fields = {"elapsed": elapsed, "photo": after, "taken": taken}
-                raise second.said.place.error(phrase("photos.interval", **fields))
-    return {name: event.said for name, event in zip(names, events, strict=True)}
+                raise second[1].place.error(phrase("photos.interval", **fields))
+    return {name: said for name, (_, said) in zip(names, events, strict=True)}

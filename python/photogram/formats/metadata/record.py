@@ -208,14 +208,6 @@ _WORDS = re.compile(r"[,;\s]+")
 _EPOCH = datetime(1980, 1, 6)
 
 
-@dataclass(frozen=True)
-class Event:
-    """The time of an exposure in seconds since the first GPS week, and its position."""
-
-    seconds: float
-    said: Said
-
-
 def is_events(path: Path) -> bool:
     """Return whether a text file has the header of RTKLIB solutions."""
     return any(_is_header(line) for line in islice(read_lines(path), HEADER_LINES))
@@ -225,9 +217,9 @@ def _is_header(line: str) -> bool:
     return line.startswith(_COMMENT) and ("latitude(" in line or "x-ecef(" in line or "e-baseline(" in line)
 
 
-def read_events(path: Path) -> list[Event]:
-    """Read the events of a file in order of time."""
-    head, heights, events = Place(path), "", list[Event]()
+def read_events(path: Path) -> list[tuple[float, Said]]:
+    """Read times of exposures (seconds since the first GPS week) and their positions, in order of time."""
+    head, heights, events = Place(path), "", list[tuple[float, Said]]()
     for record, line in enumerate(read_lines(path), 1):
         if line.startswith(_COMMENT):
             heights = SEA_LEVEL if "/geodetic" in line else heights
@@ -236,10 +228,10 @@ def read_events(path: Path) -> list[Event]:
             events.append(_event(Place(path, record, line), head, heights))
     if not events:
         raise head.error(phrase("format.missing", what="events of RTKLIB"))
-    return sorted(events, key=lambda event: event.seconds)
+    return sorted(events, key=lambda event: event[0])
 
 
-def _event(place: Place, head: Place, heights: str) -> Event:
+def _event(place: Place, head: Place, heights: str) -> tuple[float, Said]:
     columns = head.text or ""
     if "e-baseline(" in columns:
         raise head.error(phrase("photos.baselines"))
@@ -268,7 +260,7 @@ def _event(place: Place, head: Place, heights: str) -> Event:
         rtk=True,
         flag=_FLAGS.get(quality),
     )
-    return Event(_seconds(time, place), said)
+    return _seconds(time, place), said
 
 
 def _geographic(xyz: Sequence[float], deviations: Sequence[float]) -> tuple[Triple, Triple]:

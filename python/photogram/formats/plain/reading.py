@@ -94,14 +94,13 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     spheroid = Spheroid(*transform.frame.ellipsoid) if geographic else None
     photos = placed(photos, timed, spheroid)
     images = read_images(tables, photos)
-    points = _points(tables, transform, images, given)
-    known = np.where(np.isfinite(points.positions), points.positions, points.starts)
+    block = BlockBuilder(settings.path, "plain project")
+    places, control_rows, known = _add_points(block, tables, transform, images, given)
     scanned = read_scanned(tables, images, known, photos, cameras, covariances)
     cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     source = ImageSource(tables, photos, cameras, np.asarray(photo_cameras), scanned.photos)
     xy, sd = source.converted(images)
-    block = BlockBuilder(settings.path, "plain project")
     for row, own in enumerate(cameras.rows):
         block.camera(own.camera, own.size, own.pixel_mm, key=row)
     block.photos(photos.names, photo_cameras, photos.centres, photos.matrices)
@@ -110,7 +109,6 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     owners |= dict(zip(photos.taken, photo_cameras, strict=True))
     block.rigs(read_frames(tables, rigs, photos.names, photos.taken), owners)
     block.mounts = mounted_halves(seams, block.mounts, timed, photos.names)
-    places = points.places
     photo_rows = {name: row for row, name in enumerate(photos.names)}
     known_objects = Known(places, photo_rows, photos.times.tolist(), trajectories)
     observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
@@ -121,15 +119,9 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
         message = phrase("plain.trajectory-frame", frame=str(transform.frame))
         raise InputError(message, file=settings.path)
     assumed = not images.sd_given
-    block.points(
-        points.names,
-        points.starts,
-        point_positions=points.positions,
-        point_sd=points.sd,
-        point_check_sd=points.check_sd,
-    )
     block.images(images.photos, images.points, xy, sd)
-    block.observations += [observations, *priors, *photos.observed, *points.observed, *scanned.observations]
+    controlled = () if given is None else given.observed
+    block.observations += [observations, *priors, *photos.observed, *controlled, *scanned.observations]
     block.frame, block.messages = transform.frame, list(tables.messages)
     if assumed and sd is not None:
         block.lacks.append(Phrase("read.levels", {"number": 1.0, "option": option_sd("images")}))
@@ -158,11 +150,11 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     )
     for name, (_, wanted) in settings.features.items():
         with at_place(Place(settings.path), f"[features] {name}"):
-            named_points(wanted, points.names)
+            named_points(wanted, block.point_ids)
     if control is not None and given is not None:
         from photogram.formats.control import check_systems
 
-        check_systems(project, settings, control, points.control_rows, control.vectors(AXES), free=False)
+        check_systems(project, settings, control, control_rows, control.vectors(AXES), free=False)
     return project, source
 
 
@@ -248,19 +240,10 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     return _Given(table, names, values, held, check_sd, observed, vegetated)
 
 
-@dataclass(frozen=True)
-class _Points:
-    names: list[str]
-    places: Mapping[str, int]
-    control_rows: Indices
-    starts: Floats
-    positions: Floats
-    sd: Floats
-    check_sd: Floats
-    observed: list[Observation]
-
-
-def _points(tables: Tables, transform: Transform, images: Images, control: _Given | None) -> _Points:
+def _add_points(
+    block: BlockBuilder, tables: Tables, transform: Transform, images: Images, control: _Given | None
+) -> tuple[Mapping[str, int], Indices, Floats]:
+    """Add all points; return rows by name, rows of control, and (n, 3) observed or initial positions."""
     table = tables.read("points")
     own = table.names_once("point") if table is not None else []
     listed = [*(control.names if control else ()), *own]
@@ -283,7 +266,6 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
             raise table.error(row, phrase("plain.sd-alone", value="x, y, z"))
         positions[rows] = np.where(held[:, np.newaxis], given, np.nan)
         sd[rows] = own_sd
-    observed: list[Observation] = []
     rows = np.array([rows_of_names[name] for name in control.names] if control else [], dtype=np.int64)
     if control is not None:
         apart = np.abs(starts[rows] - control.positions)
@@ -293,8 +275,8 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
             raise control.table.error(row, phrase("plain.other-position", **fields))
         positions[rows], sd[rows], check_sd[rows] = control.positions, control.sd, control.check_sd
         positions[[rows_of_names[each.points[0]] for each in control.observed]] = np.nan
-        observed = control.observed
         starts[rows] = np.where(np.isnan(control.positions), starts[rows], control.positions)
     complete = len(rows_of_names) == len(names)
     places = rows_of_names if complete else NamedValues(names, range(len(names)))
-    return _Points(names, places, rows, starts, positions, sd, check_sd, observed)
+    block.points(names, starts, point_positions=positions, point_sd=sd, point_check_sd=check_sd)
+    return places, rows, np.where(np.isfinite(positions), positions, starts)
