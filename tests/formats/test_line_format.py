@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from line_format import FORMAT
 
-from photogram import InputError
+from photogram import InputError, formats
 from photogram.formats import ReadOptions
 from photogram.formats.models import lost
 
@@ -53,3 +53,11 @@ def test_a_fault_is_named_with_its_line(tmp_path, old, new, record, code):
     with pytest.raises(InputError) as raised:
         project_of(tmp_path, TEXT.replace(old, new))
     assert (raised.value.record, raised.value.code) == (record, code)
+
+
+def test_a_format_of_another_program_is_added(tmp_path, monkeypatch):
+    project = project_of(tmp_path, TEXT)
+    monkeypatch.setitem(formats.FORMATS, "lines", FORMAT)
+    assert formats.recognised(tmp_path / "block.lines") is FORMAT
+    assert set(formats.to_files(project, "lines")) == {"block.lines"}
+    assert formats.read(tmp_path / "block.lines").block.photo_ids == ["A", "B"]

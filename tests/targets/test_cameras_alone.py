@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from message_codes import refused
 from photogram import Camera, InputError, formats
 from photogram.cli import app
-from photogram.formats.registry import FORMATS_OF_CAMERAS
+from photogram.formats.format import FORMATS_OF_CAMERAS
 from photogram.formats.targets import adjusted_project, rig_of_project
 from photogram.targets import camera_files
 from photogram.targets.camera_formats import CAMERA_FORMATS

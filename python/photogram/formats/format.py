@@ -21,12 +21,16 @@ if TYPE_CHECKING:
     from photogram.results.result import Result
     from photogram.words import Phrase
 
-__all__ = ["FORMATS", "Format", "later"]
+__all__ = ["FORMATS", "FORMATS_OF_CAMERAS", "Format", "later"]
 
 
-def later(name: str) -> Callable[..., Any]:
-    """Return the function `MODULE:NAME` of this package, whose module is imported at the first call."""
-    return lambda *arguments: resolve_name(f"photogram.formats.{name}")(*arguments)
+def later(home: str) -> Callable[..., Any]:
+    """Return the function `MODULE:NAME`, whose module of this package is imported at the first call.
+
+    Words after the name are its first arguments.
+    """
+    name, *words = home.split()
+    return lambda *arguments: resolve_name(f"photogram.formats.{name}")(*words, *arguments)
 
 
 @dataclass(frozen=True)
@@ -96,5 +100,8 @@ def _declared() -> Iterator[Format]:
         yield Format(name=name, title=title, **values)
 
 
-FORMATS: dict[str, Format] = {each.name: each for each in _declared()}
-"""Formats by name, in the order of the help."""
+_ALL = {each.name: each for each in _declared()}
+FORMATS = {name: each for name, each in _ALL.items() if each.read is not None}
+"""Formats of projects by name, in the order of the help."""
+FORMATS_OF_CAMERAS = {name: own for name, own in _ALL.items() if name not in FORMATS}
+"""Formats of cameras by name, as in `photogram.targets.camera_files`."""

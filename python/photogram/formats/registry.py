@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from photogram.arguments.fields import options_of
 from photogram.errors import InputError, PhotogramError, message_of
-from photogram.formats.format import FORMATS, Format, later
+from photogram.formats.format import FORMATS, FORMATS_OF_CAMERAS, Format
 from photogram.formats.models import (
     check_images,
     in_pixels,
@@ -32,7 +31,6 @@ from photogram.words import phrase
 
 __all__ = [
     "FORMATS",
-    "FORMATS_OF_CAMERAS",
     "adjusting",
     "cannot_hold",
     "read",
@@ -41,34 +39,7 @@ __all__ = [
     "to_files",
 ]
 
-
-def _written(name: str, project: Project) -> Mapping[str, bytes]:
-    from photogram.formats.targets import rig_of_project
-    from photogram.targets.camera_formats import CAMERA_FORMATS
-
-    return CAMERA_FORMATS[name](rig_of_project(project))
-
-
-FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
-    {
-        name: Format(
-            name=name,
-            title=title,
-            write=partial(_written, name),
-            cannot_hold=later("targets:lost_beside_cameras"),
-            pixels=True,
-            geographic=True,
-        )
-        for name, title in (
-            ("opencv_yaml", "YAML of OpenCV"),
-            ("ros_camera_info", "camera_info of ROS"),
-            ("kalibr_camchain", "camchain.yaml of Kalibr"),
-            ("mrcal", "a .cameramodel of mrcal"),
-        )
-    }
-)
-"""Formats of cameras by name, as in `photogram.targets.camera_files`."""
-_TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
+_TO_WRITE: Mapping[str, Format] = ChainMap(FORMATS_OF_CAMERAS, FORMATS)  # The order is that of FORMATS
 SD = ("images", "control", "check", "gnss")
 """Types of data of any format to which the user may add standard deviations."""
 MOST = 200  # Largest number of files that are examined in a folder without format

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -292,3 +293,10 @@ def lost_beside_cameras(project: Project) -> list[Phrase]:
     found.append(phrase("lost.calibration"))
     cameras = [camera.title for camera, fixed in zip(block.cameras, known, strict=True) if not fixed]
     return found + ([phrase("lost.sensors", names=cameras)] if cameras else [])
+
+
+def camera_file(name: str, project: Project) -> Mapping[str, bytes]:
+    """Return the file of cameras in a format of cameras."""
+    from photogram.targets.output.formats import CAMERA_FORMATS
+
+    return CAMERA_FORMATS[name](rig_of_project(project))
