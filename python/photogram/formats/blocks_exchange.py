@@ -21,7 +21,6 @@ from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place, image_size, one_word, positive
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
@@ -50,23 +49,13 @@ BETTER, NOTICED = 3.0, 0.1
 """Ratio of agreement for another definition that rejects a file, and the smallest median for it."""
 
 
-@dataclass
-class _Group:
-    """Photos of one camera."""
-
-    camera: Camera
-    size: Size
-    axes: Floats
-    pixel: float | None
-
-
 class _Reader:
     """The contents of a file in the order of reading."""
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
         self.block, self.options = BlockBuilder(path, FORMATS["blocks_exchange"].title), options
         self.systems: dict[str, str] = {}
-        self.groups: list[_Group] = []
+        self.axes: list[Floats] = []  # Of each camera
         self.positions = 0  # Number of observed positions
         self.names: set[str] = set()  # Of points
         self.images: list[tuple[int, int, float, float, bool]] = []
@@ -100,11 +89,11 @@ def _group(found: _Reader, element: Element) -> None:
     one_word(element, "CameraOrientation", orientation, ORIENTATIONS)
     axes = np.array(ORIENTATIONS[orientation], dtype=float)
     pixel = _pixel(element, size)
-    name = f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
+    name = f"{element.word('Name') or 'camera'} {len(found.axes) + 1}"
     with at_place(element):
         camera = _camera(element, size, axes, pixel, name)
-    found.block.camera(camera, size, pixel, key=len(found.groups))
-    found.groups.append(_Group(camera, size, axes, pixel))
+    found.block.camera(camera, size, pixel, key=len(found.axes))
+    found.axes.append(axes)
     srs = element.word("SRSId")
     for photo in element.all("Photo"):
         _photo(found, photo, srs)
@@ -165,14 +154,14 @@ def _photo(found: _Reader, element: Element, srs: str) -> None:
     number, path, pose = element.whole("Id"), element.word("ImagePath"), element.child("Pose")
     if not path:
         raise element.error(phrase("format.member", name="ImagePath"))
-    found.block.photo(number, len(found.groups) - 1, element, name=path)
+    found.block.photo(number, len(found.axes) - 1, element, name=path)
     if pose is None:
         return
     centre, rotation = np.full(3, np.nan), np.full((3, 3), np.nan)
     if (own := pose.child("Center")) is not None:
         centre, srs = _position(own), own.word("SRSId") or srs
     if (turn := pose.child("Rotation")) is not None:
-        rotation = found.groups[-1].axes.T @ _rotation(turn)
+        rotation = found.axes[-1].T @ _rotation(turn)
     found.block.pose(number, centre, rotation.T, crs=srs)
     metadata = pose.child("Metadata")
     if metadata is not None and (own := metadata.child("Center")) is not None:
@@ -283,18 +272,20 @@ def _corner(found: _Reader, images: list[tuple[int, int, float, float, bool]], g
     xy = np.array([each[2:4] for each in images], dtype=float).reshape(-1, 2)
     millimetres = np.array([each[4] for each in images], dtype=bool)
     corner = xy + CENTER
-    for row, group in enumerate(found.groups):
+    for row, (camera, axes, pixel) in enumerate(
+        zip(found.block.cameras, found.axes, found.block.pixel_mm, strict=True)
+    ):
         own = millimetres & (groups == row)
         if not own.any():
             continue
-        if group.pixel is None:
+        if pixel is None:
             assert found.in_millimetres is not None
             raise found.in_millimetres.error(phrase("format.sensor-size"))
-        right, up = (xy[own] @ group.axes[:2, :2] / group.pixel).T
-        values = group.camera.parameters
+        right, up = (xy[own] @ axes[:2, :2] / pixel).T
+        values = camera.parameters
         cx, cy = values["cx"], values["cy"]
-        if group.camera.model == "agisoft_frame":
-            cx, cy = cx + group.size[0] / 2, cy + group.size[1] / 2
+        if camera.model == "agisoft_frame":
+            cx, cy = cx + values["w"] / 2, cy + values["h"] / 2
         corner[own] = np.column_stack([cx + right, cy - up])
     return corner
 

@@ -9,7 +9,8 @@ Tables have commas, `#` comments, and columns by comment or script.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -255,25 +256,7 @@ def is_export(path: Path) -> bool:
     return counts[0] in (2, 4) and all(n >= least for n, least in zip(counts, _HEAD, strict=True))
 
 
-class _Lines:
-    """A reader of consecutive lines of the file."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self._lines, self._next = path, read_lines(path), 0
-
-    def take(self, what: str) -> Card:
-        if self._next >= len(self._lines):
-            raise InputError(phrase("format.end", name=what), file=self.path, record=self._next)
-        self._next += 1
-        return Card(Place(self.path, self._next, self._lines[self._next - 1]))
-
-    def until_empty(self) -> Iterator[Card]:
-        """Yield lines up to an empty line or the end."""
-        while self._next < len(self._lines):
-            card = self.take("")
-            if not card.words:
-                return
-            yield card
+_Take = Callable[[str], Card]  # The next line, by its meaning
 
 
 def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
@@ -283,20 +266,32 @@ def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
     `c px py width height K1 K2 K3 P1 P2` in mm, and its standard deviations. Then six lines for each photo,
     control, points and observations follow, with an empty line after each list. Later lines are not read.
     """
-    lines = _Lines(path)
-    content = DbatBuilder(path, TITLE)
-    lines.take("the title")
-    size = _size(lines.take("tolerance and iterations"))
-    lines.take("nine standard deviations")
-    default = lines.take("the camera")
-    lines.take("standard deviations of the camera")
+    cards = [Card(Place(path, record, line)) for record, line in enumerate(read_lines(path), 1)]
+    lines, content = iter(cards), DbatBuilder(path, TITLE)
+
+    def take(what: str) -> Card:
+        if (card := next(lines, None)) is None:
+            raise InputError(phrase("format.end", name=what), file=path, record=len(cards))
+        return card
+
+    def until_empty() -> Iterator[Card]:
+        return takewhile(lambda card: bool(card.words), lines)
+
+    take("the title")
+    size = _size(take("tolerance and iterations"))
+    take("nine standard deviations")
+    default = take("the camera")
+    take("standard deviations of the camera")
     cameras = _Cameras(content, default, size)
-    for card in lines.until_empty():
-        _photo(card, lines, cameras)
-    _control(lines, content, options)
-    for card in lines.until_empty():
+    for card in until_empty():
+        _photo(card, take, cameras)
+    _control(until_empty(), content, options)
+    for card in until_empty():
         content.start(_number(card, 0), card.numbers(1, "X Y Z"), card.place)
-    _measurements(lines, content)
+    for card in until_empty():
+        sd = card.numbers(4, "sx sy") if len(card.words) >= 6 else np.full(2, np.nan)
+        (x, y), sd = card.numbers(2, "x y").tolist(), np.where(sd > 0, sd, np.nan)
+        content.image(_number(card, 0), _number(card, 1), x, y, card.place, sd=sd)
     return content
 
 
@@ -347,11 +342,11 @@ class _Cameras:
         return self.others[words]
 
 
-def _photo(head: Card, lines: _Lines, cameras: _Cameras) -> None:
+def _photo(head: Card, take: _Take, cameras: _Cameras) -> None:
     number, content = _number(head, 0), cameras.content
     if number in content.photo_rows:
         raise head.place.error(phrase("format.repeated", what="photo", name=str(number)))
-    pose, _, _, camera, _ = (lines.take(f"the {what} of photo {number}") for what in _PHOTO)
+    pose, _, _, camera, _ = (take(f"the {what} of photo {number}") for what in _PHOTO)
     for card in (pose, camera):
         if _number(card, 0) != number:
             raise card.place.error(phrase("dbat.photo", number=number, other=card.words[0]))
@@ -361,9 +356,9 @@ def _photo(head: Card, lines: _Lines, cameras: _Cameras) -> None:
     content.pose(number, pose.numbers(1, "X Y Z"), Attitudes.of("omega_phi_kappa", angles).matrices[0])
 
 
-def _control(lines: _Lines, content: DbatBuilder, options: ReadOptions) -> None:
+def _control(cards: Iterable[Card], content: DbatBuilder, options: ReadOptions) -> None:
     given, negative = options.sd.get("control"), 0
-    for card in lines.until_empty():
+    for card in cards:
         number, position = _number(card, 0), card.numbers(1, "X Y Z")
         sd: Floats = card.numbers(4, "sx sy sz") if given is None else np.broadcast_to(given, 3)
         if (sd < 0).all():
@@ -376,10 +371,3 @@ def _control(lines: _Lines, content: DbatBuilder, options: ReadOptions) -> None:
         content.lacks.append(Phrase("read.negative", fields))
     if content.controls:
         content.messages.append(Message(phrase("dbat.control"), content.path))
-
-
-def _measurements(lines: _Lines, content: DbatBuilder) -> None:
-    for card in lines.until_empty():
-        sd = card.numbers(4, "sx sy") if len(card.words) >= 6 else np.full(2, np.nan)
-        (x, y), sd = card.numbers(2, "x y").tolist(), np.where(sd > 0, sd, np.nan)
-        content.image(_number(card, 0), _number(card, 1), x, y, card.place, sd=sd)
