@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -40,10 +40,7 @@ from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import Spheroid
-from photogram.network.moving_photos import Timed
-from photogram.network.observations import Control, Observation, Observations, of_records
-from photogram.network.rigs import Mount
-from photogram.network.unknowns import Unknown
+from photogram.network.observations import Control, Observation, Observations
 from photogram.results.features import named_points
 from photogram.words import Phrase, option_sd, phrase
 
@@ -113,15 +110,13 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     known_objects = Known(places, photo_rows, photos.times.tolist(), trajectories)
     observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
     boards, bends, regularise = read_boards(tables)
-    common = [*_unknowns(observations, block.mounts, timed), *(each.bend for each in bends)]
-    priors = covariances.priors(common)
     if trajectories and transform.frame != settings.frame:
         message = phrase("plain.trajectory-frame", frame=str(transform.frame))
         raise InputError(message, file=settings.path)
     assumed = not images.sd_given
     block.images(images.photos, images.points, xy, sd)
-    controlled = () if given is None else given.observed
-    block.observations += [observations, *priors, *photos.observed, *controlled, *scanned.observations]
+    controlled = [] if given is None else given.observed
+    block.observations = [observations, *photos.observed, *controlled, *scanned.observations]
     block.frame, block.messages = transform.frame, list(tables.messages)
     if assumed and sd is not None:
         block.lacks.append(Phrase("read.levels", {"number": 1.0, "option": option_sd("images")}))
@@ -148,6 +143,9 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
         control_crs=settings.crs.get("control", ""),
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
+    if priors := covariances.priors(project.block.unknowns):
+        every = Observations.of([observations, *priors, *block.observations[1:]])
+        project = project.replace(block=project.block.replace(observations=every))
     for name, (_, wanted) in settings.features.items():
         with at_place(Place(settings.path), f"[features] {name}"):
             named_points(wanted, block.point_ids)
@@ -170,20 +168,6 @@ def _unused(source: ImageSource, images: Images) -> Unused:
         xy=xy,
         sd=np.ones_like(xy) if sd is None else sd,
     )
-
-
-def _unknowns(
-    observations: Observations[Observation], mounts: Sequence[Mount], timed: Sequence[Timed]
-) -> list[Unknown]:
-    """Return the shared parameters that may have covariances."""
-    found = [one for own in dict.fromkeys(observations.column("unknowns")) for one in own if one is not None]
-    found += of_records(observations)
-    found += [each.sensor for each in mounts]
-    for each in timed:
-        found += [*([] if each.sensor is None else [each.sensor]), *each.scalars]
-        if each.trajectory is not None:
-            found += [one for own in each.trajectory.coefficients for one in own]
-    return found
 
 
 @dataclass(frozen=True)
