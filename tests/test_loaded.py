@@ -94,8 +94,8 @@ def test_a_project_loads_what_is_of_it(tmp_path):
 
 def test_giant_does_not_wait_for_readers_of_other_formats(tmp_path):
     program = COMMAND.format(arguments=["giant", "--example", "--no-html", "--quiet"])
-    among = ("photogram.formats.registry", "photogram.formats.colmap", "photogram.formats.planes")
-    assert loaded(program, among, tmp_path) == ["photogram.formats.planes"]
+    among = ("photogram.formats.registry", "photogram.formats.colmap", "photogram.formats.crs")
+    assert loaded(program, among, tmp_path) == ["photogram.formats.crs"]
 
 
 def test_adjust_and_its_block_load_no_pictures(tmp_path):

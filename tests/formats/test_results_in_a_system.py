@@ -11,7 +11,7 @@ from test_plain_project import EXAMPLE, change
 from message_codes import refused
 from photogram import Attitudes, Spheroid, adjust, formats, simulate
 from photogram.formats import Frame
-from photogram.formats.planes import bend, plane_remarks
+from photogram.formats.crs import bend, plane_remarks
 from photogram.giant import Project, write_project
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")

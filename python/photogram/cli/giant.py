@@ -55,7 +55,7 @@ def giant(
     from photogram import AsPublished, adjust
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.errors import AdjustmentError
-    from photogram.formats.planes import plane_remarks
+    from photogram.formats.crs import plane_remarks
     from photogram.giant import Limits, read_project
     from photogram.giant import listing as printout
     from photogram.giant.assembly import job_refraction

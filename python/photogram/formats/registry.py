@@ -9,6 +9,7 @@ from typing import Any
 
 from photogram.arguments.fields import options_of
 from photogram.errors import InputError, PhotogramError, message_of
+from photogram.formats.crs import plane_remarks
 from photogram.formats.format import FORMATS, FORMATS_OF_CAMERAS, Format
 from photogram.formats.models import (
     check_images,
@@ -19,7 +20,6 @@ from photogram.formats.models import (
     topocentric_remarks,
 )
 from photogram.formats.plain.statement_tables import parts_of_asked
-from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import check_root

@@ -12,6 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
+from photogram.formats.crs import plane_remarks
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.models import carried, intersected, is_free
 from photogram.formats.names import with_names, with_other_names
@@ -20,7 +21,6 @@ from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.statement_tables import with_cover
 from photogram.formats.plain.tables import Tables, Transform, indices_of
-from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable

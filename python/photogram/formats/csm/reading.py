@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -20,6 +20,7 @@ from photogram.formats.csm.isd import (
     Turns,
     of_quaternions,
 )
+from photogram.formats.declarations import declared
 from photogram.io.places import at_place, positive
 from photogram.io.tree import Tree, unknown
 from photogram.lazy_dataclasses import dataclass
@@ -341,10 +342,6 @@ def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tup
 
 
 _FRAME = "USGS_ASTRO_FRAME_SENSOR_MODEL"
-_SUMMING = "the number of detector {} that one {} of the image combines"
-_START = "the {} of the detector, from 0, at which the image begins"
-_CENTER = "the {} of the detector at which the axis of the camera meets it, in pixels"
-_PLANE = "three numbers: the {} of the detector at x = y = 0 mm, and its change for 1 mm of x and of y"
 
 
 def _middle(axis: str) -> Callable[[Tree], float | None]:
@@ -364,34 +361,30 @@ def _only_time(tree: Tree) -> Any:
     return times[0] if isinstance(times, list) and len(times) == 1 else None
 
 
-_RULES: tuple[tuple[str, str, Callable[[Tree], Any] | None, str], ...] = (
-    ("focal_length_model/focal_length", "FOCAL_LENGTH", None, "the focal length in millimetres"),
-    ("focal2pixel_samples", "ITRANSS", None, _PLANE.format("sample")),
-    ("focal2pixel_lines", "ITRANSL", None, _PLANE.format("line")),
-    ("detector_sample_summing", "", None, _SUMMING.format("samples", "sample")),
-    ("detector_line_summing", "", None, _SUMMING.format("lines", "line")),
-    ("starting_detector_sample", "", None, _START.format("sample")),
-    ("starting_detector_line", "", None, _START.format("line")),
-    ("detector_center/sample", "BORESIGHT_SAMPLE", _middle("sample"), _CENTER.format("sample")),
-    ("detector_center/line", "BORESIGHT_LINE", _middle("line"), _CENTER.format("line")),
-    ("center_ephemeris_time", "", _only_time, "the time of the exposure in ephemeris seconds"),
-)
-"""Path of a value, keyword of the instrument, derivation from other fields, meaning."""
+_VALUES = tuple(declared(__file__, "isd.csv"))
+_DERIVED: Mapping[str, Callable[[Tree], Any]] = {
+    "detector_center/sample": _middle("sample"),
+    "detector_center/line": _middle("line"),
+    "center_ephemeris_time": _only_time,
+}
+"""Functions that derive a value from other fields."""
 
 
 def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple[Phrase, ...]]:
     """Return support data completed from other fields, and remarks.
 
-    `code` is the prefix of the instrument's keywords.
+    `isd.csv` declares the values, the keywords of an instrument that replace them, and their meaning. `code`
+    is the prefix of the keywords.
     """
     remarks = []
-    for path, keyword, derive, meaning in _RULES:
+    for path, keyword, meaning in _VALUES:
         group, _, name = path.rpartition("/")
         holder = tree.get(group, {}).value if group else tree.value
         if not isinstance(holder, dict) or holder.get(name) is not None:
             continue
         known = f"{code}_{keyword}"
-        value = keywords[known].value if known in keywords else derive and derive(tree)
+        derive = _DERIVED.get(path, lambda _: None)
+        value = keywords[known].value if known in keywords else derive(tree)
         if value is None:
             if name in holder or tree.value.get(group or name, 0) is None:
                 raise Tree(None, tree.file, f"/{path}").error(phrase("csm.null", meaning=meaning))
