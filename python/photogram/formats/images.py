@@ -132,6 +132,21 @@ def checked_rotation(place: Failing, matrix: Floats, tolerance: float = 1e-6) ->
     return np.asarray(matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2)
 
 
+def scaled_camera(camera: Camera, factors: Mapping[str, float]) -> Camera:
+    """Return a camera whose parameters are multiplied, with standard deviations and covariances."""
+    covariance = camera.covariance
+    if covariance is not None:
+        names, matrix = covariance
+        own = np.array([factors[name] for name in names])
+        covariance = names, np.asarray(matrix) * np.outer(own, own)
+    deviations = zip(camera.names, camera.deviations.tolist(), strict=True)
+    return camera.replace(
+        parameters={name: value * factors[name] for name, value in camera.parameters.items()},
+        sd={name: sd * abs(factors[name]) for name, sd in deviations},
+        covariance=covariance,
+    )
+
+
 _TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
 """Models that count from the image centre, y up."""

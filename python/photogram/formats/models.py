@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.images import scaled_camera
 from photogram.formats.project import Frame, Project, Size
 from photogram.io.places import Failing
 from photogram.messages import Message
@@ -239,7 +240,9 @@ def in_pixels(project: Project) -> Project:
         negative = camera.model == "perspective" and camera.parameters["c"] > 0
         xy[own] *= -scale if negative else scale
         sd[own] *= scale
-        made.append(_camera(camera, scale, negative))
+        sign = -1.0 if negative else 1.0
+        factors = {name: sign * scale**power for name, power in camera.powers.items()}
+        made.append(scaled_camera(camera, factors).replace(unit="px"))
         sizes.append(_size(camera, xy[own]) if size is None and _is_free(camera) else size)
     return project.replace(
         block=block.replace(
@@ -272,23 +275,6 @@ def _unsized(project: Project) -> bool:
 def _is_free(camera: Camera) -> bool:
     """Return whether coordinates do not depend on the image size."""
     return camera.image_y == "up" or camera.unit == "mm"
-
-
-def _camera(camera: Camera, scale: float, negative: bool) -> Camera:
-    powers = camera.powers
-    factors = {name: (-1.0 if negative else 1.0) * scale ** powers[name] for name in camera.names}
-    covariance = None
-    if camera.covariance is not None:
-        names, matrix = camera.covariance
-        own = np.array([factors[name] for name in names])
-        covariance = (names, np.asarray(matrix) * np.outer(own, own))
-    deviations = zip(camera.names, camera.deviations.tolist(), strict=True)
-    return camera.replace(
-        parameters={name: value * factors[name] for name, value in camera.parameters.items()},
-        sd={name: own * abs(factors[name]) for name, own in deviations},
-        covariance=covariance,
-        unit="px",
-    )
 
 
 def _size(camera: Camera, xy: Floats) -> Size:

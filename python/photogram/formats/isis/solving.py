@@ -213,7 +213,7 @@ MOST = 8  # The highest degree of a polynomial
 _FREE: Sigmas = (None, None, None)
 
 
-class Parameter(NamedTuple):
+class JigsawSetting(NamedTuple):
     """A setting of `jigsaw.csv`, or three that are one field.
 
     Kinds `otherwise` are settings that photogram replaces; `field` is the code of the remark.
@@ -263,14 +263,14 @@ class Parameter(NamedTuple):
         return "NONE" if value is None else word.upper()
 
 
-def _declared() -> Iterator[Parameter]:
+def _declared() -> Iterator[JigsawSetting]:
     for names, kind, words, *rest in declared(__file__, "jigsaw.csv"):
         known = dict(word.split("=") for word in words.split())
-        yield Parameter(names.split(), kind, known, *rest)
+        yield JigsawSetting(names.split(), kind, known, *rest)
 
 
 DECLARED = tuple(_declared())
-PARAMETERS: Mapping[str, Parameter] = {
+PARAMETERS: Mapping[str, JigsawSetting] = {
     name: each for each in DECLARED if each.kind != "otherwise" for name in each.names
 }
 OTHERWISE: Mapping[str, str] = {

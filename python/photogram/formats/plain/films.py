@@ -15,6 +15,7 @@ from photogram.film.interior import (
     conformal,
     interior_orientation,
 )
+from photogram.formats.images import scaled_camera
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.certificates import marks_of, read_fiducials
 from photogram.formats.plain.film_readings import (
@@ -306,13 +307,8 @@ def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[M
     for row in used:
         camera = found[row].camera
         if camera.image_y == "up" and camera.parameters.get("c", -1.0) > 0:
-            covariance = camera.covariance
-            if covariance is not None:
-                names, matrix = covariance
-                signs = signs_in_files(names)
-                covariance = names, np.asarray(matrix) * signs * signs[:, np.newaxis]
-            parameters = {**camera.parameters, "c": -camera.parameters["c"]}
-            camera = camera.replace(parameters=parameters, covariance=covariance)
+            signs = signs_in_files(camera.names).tolist()
+            camera = scaled_camera(camera, dict(zip(camera.names, signs, strict=True)))
             messages.append(Message(phrase("plain.negative-distance", camera=camera.name)))
         if camera.direction == "backward" and not found[row].weights_given:
             camera = camera.replace(weights="measured")
