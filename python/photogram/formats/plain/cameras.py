@@ -37,51 +37,6 @@ _PITCH = ("pitch_x", "pitch_y")
 Exposure = Shutter | LineSensor | None
 
 
-def _line_sensor(tables: Tables, table: ColumnTable, row: int, cells: Mapping[str, Any]) -> LineSensor | None:
-    """Return the line sensor of a row of a camera table; None for frame cameras."""
-    pitches = [cells.get(name, 0.0) for name in _PITCH]
-    if not cells.keys() & set(_PITCH):
-        if cells.get("model", "").lower() == LINE:
-            raise table.cell_error(row, "pitch_x", "error.empty")
-        return None
-    if not any(pitches):
-        raise table.cell_error(row, "pitch_x, pitch_y", "plain.pitch")
-    if not cells.keys() & {"s0", "width"}:
-        raise table.cell_error(row, "s0", "plain.s0")
-    numbers = np.array([*pitches, *(cells.get(name, 0.0) for name in OF_LINES[:2])])
-    *pitch, x0, y0 = scaled(numbers, 1e-3 if tables.settings.image == "um" else 1.0).tolist()
-    return LineSensor((pitch[0], pitch[1]), cells.get("s0", cells.get("width", 0) / 2), x0, y0)
-
-
-def _shutter(
-    tables: Tables,
-    table: ColumnTable,
-    row: int,
-    cells: Mapping[str, Any],
-    camera: Camera,
-    size: Size | None,
-) -> Shutter | None:
-    """Return the rolling shutter of a row of a camera table; None without."""
-    if "readout" not in cells:
-        if cells.keys() & {"readout_direction", "shutter"} or cells.get("sd_readout"):
-            raise table.cell_error(row, "readout", "error.empty")
-        return None
-    settings, direction = tables.settings, cells.get("readout_direction", "down")
-    pixels = settings.image == "px"
-    given = np.array([[cells.get(f"readout_{end}", np.nan)] * 2 for end in ("begin", "end")])
-    if np.isnan(given).all():
-        extent = np.array([cells.get(name, np.nan) for name in ("width", "height")], dtype=float)
-        edges = picture_edges(camera, direction, extent * (1.0 if pixels else cells.get("pixel_mm", np.nan)))
-    else:
-        there = in_unit(settings, given, pixels=pixels and settings.image_y == "down")
-        edges = made(table, row, from_tables, settings, camera, size, there)[:, _counted(direction)]
-    if np.isnan(edges).any():
-        raise table.error(row, phrase("plain.picture-edges"))
-    title, sd = cells.get("shutter", camera.name), cells.get("sd_readout", 0.0)
-    readout = tables.shared.one(table, row, "shutter", Readout, title, value=cells["readout"], sd=sd)
-    return made(table, row, Shutter, readout, tuple(edges.tolist()), direction)
-
-
 def _counted(direction: str) -> int:
     """Return the index of the image coordinate along the readout direction."""
     return 1 if direction in ("down", "up") else 0
@@ -181,24 +136,17 @@ def read_cameras(tables: Tables) -> Cameras:
     certificates, covariances = read_certificates(tables), read_covariances(tables)
     rows, in_mm = list[TableCamera](), list[str]()
     for row, cells in enumerate(tables.records("cameras")):
-        line = _line_sensor(tables, table, row, cells)
-        correlated = bool(covariances.names("camera", cells["camera"]))
-        own = _row(table, row, cells, behind_a_lens=line is not None, is_correlated=correlated)
-        size = None
-        if {"width", "height"} <= cells.keys():
-            size = image_size(table.at(row), cells["width"], cells["height"])
-        parts = 1000.0 if tables.settings.image == "um" else 1.0
-        if size is not None and line is None:
-            parts, converted = _from_mm(tables.settings.image, table, row, own, size[0], parts)
-            in_mm += [own.name] * converted
-        certificate = _of_camera(tables, table, row, own, certificates)
+        is_correlated = bool(covariances.names("camera", cells["camera"]))
+        own = _Row(tables, table, row, cells, is_correlated)
+        parts, converted = own.divisor()
+        in_mm += [own.name] * converted
+        certificate = own.certificate(certificates)
         if certificate is None:
-            camera = made(table, row, _camera, tables, table, row, own, size, parts)
+            camera = made(table, row, own.camera, parts)
         else:
             camera = made(table, row, certified, tables, own.name, own.model, certificate)
-        shutter = _shutter(tables, table, row, cells, camera, size)
         further = cells.get("pixel_mm"), cells.get("for_each", "all"), "weights" in cells
-        rows.append(TableCamera(camera, size, *further, line, shutter))
+        rows.append(TableCamera(camera, own.size, *further, own.line, own.shutter(camera)))
     if both := [name for name in in_mm if covariances.names("camera", name)]:
         raise table.head.error(phrase("plain.mm-covariances", camera=both[0]))
     if in_mm:
@@ -208,135 +156,163 @@ def read_cameras(tables: Tables) -> Cameras:
     return Cameras(rows, certificates)
 
 
-def _from_mm(
-    image: str, table: ColumnTable, row: int, own: _Row, width: int, parts: float
-) -> tuple[float, bool]:
-    """Return the divisor to camera units, and whether the row is in mm."""
-    pixel = own.cells.get("pixel_mm", math.nan)
-    least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel * parts)
-    small = [name for name in _DISTANCES if abs(own.values.get(name, math.inf)) < least]
-    if not small:
-        return parts, False
-    value = own.values[small[0]]
-    of_mm = [abs(own.values[name]) / pixel for name in _DISTANCES if name in own.values]
-    in_mm = image == "px" and all(each >= SMALLEST_DISTANCE * width for each in of_mm)
-    if in_mm and not {"cx", "cy"} & own.values.keys():
-        return pixel, True
-    remedy = "in-mm" if in_mm else "in-px" if image == "px" else "in-other"
-    fields = {"value": value, "unit": image, "least": least, "width": width}
-    remedies = {"remedy": phrase(f"plain.{remedy}", pixels=value / pixel, pixel=pixel)}
-    raise table.cell_error(row, small[0], "plain.principal-distance", **fields, **remedies)
+class _Row:
+    """A row of the table, with existing numbers by column name."""
 
+    def __init__(
+        self, tables: Tables, table: ColumnTable, row: int, cells: Mapping[str, Any], is_correlated: bool
+    ) -> None:
+        self.tables, self.table, self.row, self.cells = tables, table, row, cells
+        self.is_correlated = is_correlated  # Whether the table of covariances contains parameters
+        self.name, self.image = cells["camera"], tables.settings.image
+        self.size: Size | None = None
+        if {"width", "height"} <= cells.keys():
+            self.size = image_size(table.at(row), cells["width"], cells["height"])
+        self.line, self.model = self._line_sensor(), cells.get("model", "").lower()
+        self.values = {column: value for column, value in cells.items() if column in _ALL}
+        self.deviations = {name[3:]: value for name, value in cells.items() if name.startswith("sd_")}
+        if self.line is not None:
+            # The columns of a line sensor are not parameters of its lens.
+            self.model = "brown" if self.model == LINE else self.model
+            own = {name.lower() for name, _ in _MODELS[self.model][1]} if self.model in _MODELS else set()
+            if both := own.intersection(OF_LINES):
+                raise table.cell_error(row, min(both), "plain.line-parameter", model=self.model)
+            if unknown := [column for column in OF_LINES if self.deviations.get(column)]:
+                raise table.cell_error(row, f"sd_{unknown[0]}", "plain.line-sd")
+            self.values = {name: value for name, value in self.values.items() if name not in OF_LINES}
 
-def _of_camera(
-    tables: Tables, table: ColumnTable, row: int, own: _Row, certificates: Mapping[str, Certificate]
-) -> Certificate | None:
-    """Return the certificate that defines a camera; None if the table defines it."""
-    certificate = certificates.get(own.name)
-    if certificate is None or certificate.c is None:
-        return None
-    if own.values or own.deviations or "calibration" in own.cells:
-        c = abs(own.values.get("c", certificate.c))
-        if abs(c - certificate.c) > OTHER_LENS:
-            message = phrase("plain.other-lens", camera=own.name, c=c, certificate=certificate.c)
-            raise ContradictionError.of(table.error(row, message))
-        tables.remark("plain.marks-only", table.path, camera=own.name)
-        return None
-    if own.is_correlated:
-        raise table.error(row, phrase("plain.certificate-covariance", camera=own.name))
-    return certificate
+    def _line_sensor(self) -> LineSensor | None:
+        """Return the line sensor; None for frame cameras."""
+        table, row, cells = self.table, self.row, self.cells
+        pitches = [cells.get(name, 0.0) for name in _PITCH]
+        if not cells.keys() & set(_PITCH):
+            if cells.get("model", "").lower() == LINE:
+                raise table.cell_error(row, "pitch_x", "error.empty")
+            return None
+        if not any(pitches):
+            raise table.cell_error(row, "pitch_x, pitch_y", "plain.pitch")
+        if not cells.keys() & {"s0", "width"}:
+            raise table.cell_error(row, "s0", "plain.s0")
+        numbers = np.array([*pitches, *(cells.get(name, 0.0) for name in OF_LINES[:2])])
+        *pitch, x0, y0 = scaled(numbers, 1e-3 if self.image == "um" else 1.0).tolist()
+        return LineSensor((pitch[0], pitch[1]), cells.get("s0", cells.get("width", 0) / 2), x0, y0)
 
+    def shutter(self, camera: Camera) -> Shutter | None:
+        """Return the rolling shutter; None without."""
+        table, row, cells, settings = self.table, self.row, self.cells, self.tables.settings
+        if "readout" not in cells:
+            if cells.keys() & {"readout_direction", "shutter"} or cells.get("sd_readout"):
+                raise table.cell_error(row, "readout", "error.empty")
+            return None
+        direction, pixels = cells.get("readout_direction", "down"), self.image == "px"
+        given = np.array([[cells.get(f"readout_{end}", np.nan)] * 2 for end in ("begin", "end")])
+        if np.isnan(given).all():
+            extent = np.array([cells.get(name, np.nan) for name in ("width", "height")], dtype=float)
+            unit = 1.0 if pixels else cells.get("pixel_mm", np.nan)
+            edges = picture_edges(camera, direction, extent * unit)
+        else:
+            there = in_unit(settings, given, pixels=pixels and settings.image_y == "down")
+            own = made(table, row, from_tables, settings, camera, self.size, there)
+            edges = own[:, _counted(direction)]
+        if np.isnan(edges).any():
+            raise table.error(row, phrase("plain.picture-edges"))
+        title, sd = cells.get("shutter", camera.name), cells.get("sd_readout", 0.0)
+        shared, value = self.tables.shared, cells["readout"]
+        readout = shared.one(table, row, "shutter", Readout, title, value=value, sd=sd)
+        return made(table, row, Shutter, readout, tuple(edges.tolist()), direction)
 
-class _Row(NamedTuple):
-    """One row of the table; existing numbers by column name."""
+    def divisor(self) -> tuple[float, bool]:
+        """Return the divisor to camera units, and whether the row is in mm."""
+        parts = 1000.0 if self.image == "um" else 1.0
+        if self.size is None or self.line is not None:
+            return parts, False
+        pixel, width = self.cells.get("pixel_mm", math.nan), self.size[0]
+        least = SMALLEST_DISTANCE * width * (1.0 if self.image == "px" else pixel * parts)
+        small = [name for name in _DISTANCES if abs(self.values.get(name, math.inf)) < least]
+        if not small:
+            return parts, False
+        value = self.values[small[0]]
+        of_mm = [abs(self.values[name]) / pixel for name in _DISTANCES if name in self.values]
+        in_mm = self.image == "px" and all(each >= SMALLEST_DISTANCE * width for each in of_mm)
+        if in_mm and not {"cx", "cy"} & self.values.keys():
+            return pixel, True
+        remedy = "in-mm" if in_mm else "in-px" if self.image == "px" else "in-other"
+        fields = {"value": value, "unit": self.image, "least": least, "width": width}
+        remedies = {"remedy": phrase(f"plain.{remedy}", pixels=value / pixel, pixel=pixel)}
+        raise self.table.cell_error(self.row, small[0], "plain.principal-distance", **fields, **remedies)
 
-    name: str
-    model: str
-    values: dict[str, float]
-    deviations: dict[str, float]
-    cells: Mapping[str, Any]
-    is_correlated: bool  # Whether the table of covariances contains parameters
+    def certificate(self, certificates: Mapping[str, Certificate]) -> Certificate | None:
+        """Return the certificate that defines the camera; None if the table defines it."""
+        certificate = certificates.get(self.name)
+        if certificate is None or certificate.c is None:
+            return None
+        if self.values or self.deviations or "calibration" in self.cells:
+            c = abs(self.values.get("c", certificate.c))
+            if abs(c - certificate.c) > OTHER_LENS:
+                message = phrase("plain.other-lens", camera=self.name, c=c, certificate=certificate.c)
+                raise ContradictionError.of(self.table.error(self.row, message))
+            self.tables.remark("plain.marks-only", self.table.path, camera=self.name)
+            return None
+        if self.is_correlated:
+            raise self.table.error(self.row, phrase("plain.certificate-covariance", camera=self.name))
+        return certificate
 
+    def _calibrated(self) -> Camera:
+        """Return a camera with parameters and covariances of its stellar calibration."""
+        from photogram.stellar.cameras import camera_from
 
-def _row(
-    table: ColumnTable, row: int, cells: Mapping[str, Any], *, behind_a_lens: bool, is_correlated: bool
-) -> _Row:
-    """Return a row; the columns of a line sensor `behind_a_lens` are not parameters of the lens."""
-    model = cells.get("model", "").lower()
-    values = {column: value for column, value in cells.items() if column in _ALL}
-    sd = {column[3:]: value for column, value in cells.items() if column.startswith("sd_")}
-    if behind_a_lens:
-        model = "brown" if model == LINE else model
-        own = {name.lower() for name, _ in _MODELS[model][1]} if model in _MODELS else set()
-        if both := own.intersection(OF_LINES):
-            raise table.cell_error(row, min(both), "plain.line-parameter", model=model)
-        if unknown := [column for column in OF_LINES if sd.get(column)]:
-            raise table.cell_error(row, f"sd_{unknown[0]}", "plain.line-sd")
-        values = {column: value for column, value in values.items() if column not in OF_LINES}
-    return _Row(cells["camera"], model, values, sd, cells, is_correlated)
+        if self.model or self.values or self.deviations or self.is_correlated:
+            raise self.table.error(self.row, phrase("plain.calibrated-camera", camera=self.name))
+        found = camera_from(self.table.path.parent / self.cells["calibration"], self.name)
+        if (found.unit == "px") != (self.image == "px"):
+            fields = {"camera": self.name, "unit": found.unit}
+            raise self.table.error(self.row, phrase("plain.calibration-unit", **fields))
+        return found
 
-
-def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Camera:
-    """Return a camera with parameters and covariances of its stellar calibration."""
-    from photogram.stellar.cameras import camera_from
-
-    beside = given.model or given.values or given.deviations
-    if beside or given.is_correlated:
-        raise table.error(row, phrase("plain.calibrated-camera", camera=given.name))
-    found = camera_from(table.path.parent / given.cells["calibration"], given.name)
-    if (found.unit == "px") != (tables.settings.image == "px"):
-        fields = {"camera": given.name, "unit": found.unit}
-        raise table.error(row, phrase("plain.calibration-unit", **fields))
-    return found
-
-
-def _camera(
-    tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None, parts: float
-) -> Camera:
-    if "calibration" in given.cells:
-        return _calibrated(tables, table, row, given)
-    known = given.values
-    model = given.model or ("brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole")
-    if model not in _MODELS:
-        raise table.unknown_error(row, "model", "camera model", model, _MODELS)
-    powers = dict(_MODELS[model][1])
-    own = {name.lower(): name for name in powers}
-    image = tables.settings.image
-    if size is None and "w" in own:
-        raise table.error(row, phrase("error.requires", name=f"the model {model}", other="width and height"))
-    parameters = _spread(own, known)
-    signs = signs_in_files([*parameters]).tolist()
-    parameters = {name: sign * parameters[name] for name, sign in zip(parameters, signs, strict=True)}
-    deviations = _spread(own, given.deviations)
-    if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
-        raise table.error(row, unknown_name(f"parameter of the model {model}", strange[0], powers))
-    values = {own[k]: v / parts ** powers[own[k]] for k, v in parameters.items() if k in own}
-    if size is not None and image == "px":
-        if "w" in own:
-            values |= {own["w"]: float(size[0]), own["h"]: float(size[1])}
-        elif "cx" in own:
-            values = {own["cx"]: size[0] / 2, own["cy"]: size[1] / 2} | values
-    elif "cx" in own and image != "px":
-        values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
-    constants = [*powers][len(powers) - _MODELS[model][2] :]
-    camera = Camera(
-        model,
-        values,
-        {
-            own[k]: v / parts ** powers[own[k]]
-            for k, v in deviations.items()
-            if k in own and own[k] not in constants
-        },
-        name=given.name,
-        unit="px" if image == "px" else "mm",
-        weights=given.cells.get("weights", "corrected"),
-    )
-    if not given.deviations.get("f") or "fx" not in own:
-        return camera
-    single = with_one_focal_length(camera, size if image == "px" else None)
-    message = focal_length_message(camera, single)
-    tables.remark("plain.focal-length", table.path, names=[given.name], message=message)
-    return single
+    def camera(self, parts: float) -> Camera:
+        """Return the camera; `parts` are the units of the table in a unit of the camera."""
+        if "calibration" in self.cells:
+            return self._calibrated()
+        known, table, row, size, image = self.values, self.table, self.row, self.size, self.image
+        model = self.model or ("brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole")
+        if model not in _MODELS:
+            raise table.unknown_error(row, "model", "camera model", model, _MODELS)
+        powers = dict(_MODELS[model][1])
+        own = {name.lower(): name for name in powers}
+        if size is None and "w" in own:
+            need = {"name": f"the model {model}", "other": "width and height"}
+            raise table.error(row, phrase("error.requires", **need))
+        parameters, deviations = _spread(own, known), _spread(own, self.deviations)
+        signs = signs_in_files([*parameters]).tolist()
+        parameters = {name: sign * parameters[name] for name, sign in zip(parameters, signs, strict=True)}
+        if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
+            raise table.error(row, unknown_name(f"parameter of the model {model}", strange[0], powers))
+        values, sd = (
+            {own[k]: v / parts ** powers[own[k]] for k, v in each.items() if k in own}
+            for each in (parameters, deviations)
+        )
+        if size is not None and image == "px":
+            if "w" in own:
+                values |= {own["w"]: float(size[0]), own["h"]: float(size[1])}
+            elif "cx" in own:
+                values = {own["cx"]: size[0] / 2, own["cy"]: size[1] / 2} | values
+        elif "cx" in own and image != "px":
+            values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
+        constants = [*powers][len(powers) - _MODELS[model][2] :]
+        camera = Camera(
+            model,
+            values,
+            {name: own_sd for name, own_sd in sd.items() if name not in constants},
+            name=self.name,
+            unit="px" if image == "px" else "mm",
+            weights=self.cells.get("weights", "corrected"),
+        )
+        if not self.deviations.get("f") or "fx" not in own:
+            return camera
+        single = with_one_focal_length(camera, size if image == "px" else None)
+        message = focal_length_message(camera, single)
+        self.tables.remark("plain.focal-length", table.path, names=[self.name], message=message)
+        return single
 
 
 def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:
