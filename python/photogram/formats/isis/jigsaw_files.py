@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +26,10 @@ _CELLS = ("initial", "correction", "final", "apriori sigma", "adj sigma")
 _COEFFICIENTS = (("X", "Y", "Z"), ("RA", "DEC", "TWIST"))
 _UNITS = ("km", "deg")
 
+_Coefficient = tuple[str, int, str, float, float, float, str, float | str]
+"""Name, power, unit (km or degrees), initial value, correction, final value; a-priori standard deviation in
+metres or degrees, `N/A` if fixed, `FREE` if free; a-posteriori one in the unit, `N/A` if fixed.
+"""
 _Columns = Sequence[tuple[tuple[str, ...], Any]]  # Columns with the lines of their header
 
 
@@ -61,7 +65,7 @@ def _rms(outcome: Outcome, image: Image) -> list[float]:
     return list(np.sqrt([*squares, squares.mean()]))
 
 
-def _images(outcome: Outcome, images: Mapping[Image, list[Parameter]]) -> _Columns:
+def _images(outcome: Outcome, images: Mapping[Image, list[_Coefficient]]) -> _Columns:
     # Images with fixed poses have fewer coefficients.
     names = [each[:2] for each in max(images.values(), key=len)]
     rows = []
@@ -128,7 +132,7 @@ def _residuals(outcome: Outcome) -> _Columns:
     ]
 
 
-def _report(outcome: Outcome, images: Mapping[Image, list[Parameter]], points: _Columns) -> Iterator[str]:
+def _report(outcome: Outcome, images: Mapping[Image, list[_Coefficient]], points: _Columns) -> Iterator[str]:
     """Yield the lines of `bundleout.txt`."""
     network, settings = outcome.contents.network, outcome.contents.settings
     facts: dict[str, dict[str, object]] = {
@@ -207,24 +211,7 @@ def _counts(outcome: Outcome) -> dict[str, object]:
     }
 
 
-class Parameter(NamedTuple):
-    """A coefficient of an image, X, Y, Z in km or angles in degrees.
-
-    `apriori` is the a-priori standard deviation in metres or degrees: `N/A` if fixed, `FREE` if free;
-    `adjusted` is the a-posteriori one in the unit, `N/A` if fixed.
-    """
-
-    name: str
-    power: int
-    unit: str
-    initial: float
-    correction: float
-    final: float
-    apriori: str
-    adjusted: float | str
-
-
-def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
+def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[_Coefficient]:
     """Return the coefficients of an image that are free or of degree 0."""
     solving, own = image.solving, adjusted.given
     # The inertial position and angles at the centre of the tables
@@ -237,7 +224,7 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
         (own.coefficients[0], adjusted.position, adjusted.position_sd, solving.position, places, 1 / KM),
         (own.coefficients[1], adjusted.rotation, adjusted.rotation_sd, solving.angles, angles, degrees),
     )
-    found = []
+    found = list[_Coefficient]()
     for part, (coefficients, values, sd, begun, middle, unit) in enumerate(kinds):
         given = np.array([each.deviations for each in coefficients]).reshape(-1, 3)
         start = np.array([each.position for each in coefficients]).reshape(-1, 3)
@@ -245,7 +232,7 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
         for axis, name in enumerate(_COEFFICIENTS[part]):
             if not solved:
                 initial = float(middle[axis] * unit)
-                found.append(Parameter(name, 0, _UNITS[part], initial, 0.0, initial, "N/A", "N/A"))
+                found.append((name, 0, _UNITS[part], initial, 0.0, initial, "N/A", "N/A"))
             for k in range(solved):
                 initial = float(begun[axis, k] * unit)
                 change = float(values[k, axis] - start[k, axis]) * unit
@@ -253,5 +240,5 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
                 text = "N/A" if apriori == 0 else repr(apriori) if np.isfinite(apriori) else "FREE"
                 deviation = "N/A" if apriori == 0 else float(sd[k, axis] * unit)
                 numbers = (initial, change, initial + change, text, deviation)
-                found.append(Parameter(name, k, _UNITS[part], *numbers))
+                found.append((name, k, _UNITS[part], *numbers))
     return found
