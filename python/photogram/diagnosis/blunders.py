@@ -18,7 +18,15 @@ from photogram.diagnosis.findings import Finding, Section, section_of
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.misfits import Misfits, exchanged, list_test_values
 from photogram.diagnosis.mistakes import Adjuster
-from photogram.diagnosis.tested_values import FOUND, ROUNDING, mad_sd, outliers, sizes_of_tests, spread_of
+from photogram.diagnosis.tested_values import (
+    FOUND,
+    ROUNDING,
+    grouped,
+    mad_sd,
+    outliers,
+    sizes_of_tests,
+    spread_of,
+)
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
@@ -86,9 +94,8 @@ def _fitting(block: Block, suspects: Suspects, adjusted: Adjuster, edited: Edite
     bad, good = suspects.photos, kept_images(block, ~suspects.points[block.image_points])
     edited.first, edited.reason = _adjusted(good, adjusted)
     if edited.first is not None and edited.first.converged and spread_of(edited.first) < HOPELESS:
-        values = edited.first.standardized
-        own = [mad_sd(values[good.image_photos == photo]) for photo in range(len(bad))]
-        bad = bad & ~(np.array(own) < HOPELESS)
+        values = grouped(edited.first.standardized, good.image_photos, len(bad))
+        bad = bad & ~(np.array([mad_sd(own) for own in values]) < HOPELESS)
     if not bad.any():
         return block
     names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.findings import Level, Section, section_of
-from photogram.diagnosis.tested_values import mad_sd
+from photogram.diagnosis.tested_values import grouped, mad_sd
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
@@ -98,12 +98,8 @@ def _medians(rays: Rays) -> Floats:
     """(P,) median size of each photo's residuals; NaN with fewer than three."""
     block, sizes = rays.block, rays.intersect().sizes
     rows = np.flatnonzero(rays.used & np.isfinite(sizes))
-    order = rows[np.lexsort((sizes[rows], block.image_photos[rows]))]
-    photos, starts, counts = np.unique(block.image_photos[order], return_index=True, return_counts=True)
-    medians = np.full(len(block.photo_ids), np.nan)
-    enough = counts >= 3
-    medians[photos[enough]] = sizes[order][(starts + counts // 2)[enough]]
-    return medians
+    each_photo = grouped(sizes[rows], block.image_photos[rows], len(block.photo_ids))
+    return np.array([np.sort(own)[len(own) // 2] if len(own) >= 3 else np.nan for own in each_photo])
 
 
 def _control(rays: Rays, section: Section) -> Bools:

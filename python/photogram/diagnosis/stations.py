@@ -7,7 +7,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.findings import Level, Section, section_of
-from photogram.diagnosis.tested_values import MAD_TO_SD
+from photogram.diagnosis.tested_values import MAD_TO_SD, grouped
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.rays import local_axes
@@ -165,10 +165,8 @@ def two_ray_heights(result: Result) -> Section:
     plan = local_axes(block).positions(result.point_positions)[:, :2]
     heights = result.point_positions[:, 2]
     two = np.flatnonzero(used & (result.point_rays == 2) & ~np.isfinite(block.point_sd[:, 2]))
-    on_photos, of_points = (
-        _grouped(*pair)
-        for pair in ((block.image_points, block.image_photos), (block.image_photos, block.image_points))
-    )
+    on_photos = grouped(block.image_points, block.image_photos, len(block.photo_ids))
+    of_points = grouped(block.image_photos, block.image_points, len(block.point_ids))
     judged, departures, cofactors = list[int](), list[float](), list[float]()
     for point in two.tolist():
         others = np.unique(np.concatenate([on_photos[photo] for photo in of_points[point].tolist()]))
@@ -210,9 +208,3 @@ def _plane(offset: Floats, heights: Floats) -> tuple[float, float]:
         plane = np.linalg.solve(normal, design[kept].T @ heights[kept])
         kept[np.abs(heights - design @ plane).argmax()] = last
     return float(plane[0]), float(np.linalg.inv(normal)[0, 0])
-
-
-def _grouped(values: Indices, rows: Indices) -> list[Indices]:
-    """Return the values with each row number."""
-    order = np.argsort(rows, kind="stable")
-    return np.split(values[order], np.cumsum(np.bincount(rows))[:-1])

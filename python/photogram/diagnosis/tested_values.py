@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
@@ -27,6 +29,12 @@ def mad_sd(values: Floats) -> float:
     """Return the robust standard deviation about zero (MAD); NaN without values."""
     finite = np.abs(values[np.isfinite(values)])
     return MAD_TO_SD * float(np.median(finite)) if finite.size else float("nan")
+
+
+def grouped(values: NDArray[Any], groups: Indices, count: int) -> list[NDArray[Any]]:
+    """Return the values of each of `count` groups."""
+    order = np.argsort(groups, kind="stable")
+    return np.split(values[order], np.cumsum(np.bincount(groups, minlength=count))[:-1])
 
 
 def spread_of(result: AdjustedNetwork) -> float:
