@@ -234,13 +234,18 @@ def _images(change: Callable[[Survey, float], np.ndarray]) -> Mistake:
     return lambda survey, size: replace(survey, xy=survey.xy + change(survey, size))
 
 
+def _velocity(survey: Survey, photo: int) -> np.ndarray:
+    """Return the velocity of a photo in its strip, per exposure."""
+    pose, near = survey.poses[photo], survey.poses[max(photo - 1, 0) : photo + 2]
+    strip = near[(np.abs(near - pose)[:, [1, 5]] < [15, 1]).all(axis=1)]
+    return np.asarray((strip[-1] - strip[0])[:3] / (len(strip) - 1))
+
+
 def _readout(survey: Survey, size: float) -> np.ndarray:
     """Return changes of images with a readout time in exposures: the photo moves while it is read."""
     change = np.zeros_like(survey.xy)
     for photo, pose in enumerate(survey.poses):
-        near = survey.poses[max(photo - 1, 0) : photo + 2]
-        strip = near[(np.abs(near - pose)[:, [1, 5]] < [15, 1]).all(axis=1)]
-        velocity = (strip[-1] - strip[0])[:3] / (len(strip) - 1)
+        velocity = _velocity(survey, photo)
         own = survey.photos == photo
         seconds = size * (survey.xy[own, 1] / HEIGHT - 0.5)
         moved = [
@@ -338,6 +343,25 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
         lambda s: s.gnss is not None,
         _gnss(lambda s, d: np.linspace(-d, d, len(s.poses))[:, np.newaxis] * np.array([0.6, 0.6, 0.5])),
     ),
+    "GNSS of one flight": (
+        "gnss-half",
+        lambda s: s.gnss is not None,
+        _gnss(
+            lambda s, d: (
+                (np.arange(len(s.poses)) < len(s.poses) // 2)[:, np.newaxis] * np.array([0.6, 0.6, 0.5]) * d
+            )
+        ),
+    ),
+    "time of GNSS": (
+        "time-offset",
+        lambda s: s.gnss is not None,
+        _gnss(lambda s, d: d * np.array([_velocity(s, photo) for photo in range(len(s.poses))])),
+    ),
+    "origin of one photo": (
+        "photo",
+        lambda s: True,
+        _images(lambda s, d: (s.photos == len(s.poses) // 2)[:, np.newaxis] * np.array([0.7, -0.7]) * d),
+    ),
     "one position": (
         "position X",
         lambda s: s.gnss is not None,
@@ -407,6 +431,7 @@ GIVEN = {
     "control-rotation": 0.005,
     "camera-f": 36.0,
     "camera-point": 20.0,
+    "photo": 20.0,
     "camera-radial": 0.005,
     "camera-affinity": 1e-3,
     "camera-f-strip": 10.0,

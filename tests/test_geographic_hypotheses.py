@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from photogram import Position, Spheroid, adjust
-from photogram.network import rotation_angles, rotation_matrix
-from photogram.network.geometry import Cartesian, lengths_of_units, local_frames
+from photogram.network import lengths_of_units, local_frames, rotation_angles, rotation_matrix
+from photogram.network.geometry import Cartesian
 from photogram.results.network_trial import block_facts
 from test_hypotheses import GOLDEN, block_of, facts_of
 
@@ -15,7 +15,7 @@ SPHEROID, ORIGIN = Spheroid.wgs84(), np.array([[0.2, 0.8, 0.0]])
 
 
 def geographic(block):
-    """Return a rectangular block with coordinates in metres as a geographic one: its axes are those at the origin."""
+    """Return a rectangular block as a geographic one; its axes are east, north and up at the origin."""
     axes, (frame,) = Cartesian(SPHEROID), local_frames(ORIGIN)
 
     def moved(positions):
@@ -79,7 +79,7 @@ def test_errors_of_positions_are_named(code):
     moved = {
         "time-offset": places + 0.02 * np.array(GOLDEN["velocity"]),
         "gnss-next": np.vstack([places[1:], places[-1:]]),
-        "gnss-shift": places + [0.4, -0.5, 0.3],
+        "gnss-shift": places + np.array([0.4, -0.5, 0.3]),
         "gnss-drift": places + np.linspace(-0.5, 0.5, len(places))[:, np.newaxis] * [1, -1, 1],
     }[code]
     gnss = [replace(each, position=place) for each, place in zip(gnss, moved, strict=True)]

@@ -10,7 +10,7 @@ import pytest
 
 from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result, score_test, simulate
 from photogram.network import Attitude, rotation_matrix
-from photogram.results.findings import duplicates
+from photogram.results.duplicates import duplicates
 from photogram.statistics.findings import IMAGES, Removed
 from photogram.words import phrase
 
@@ -170,6 +170,14 @@ def test_the_verdict_names_the_errors_that_the_data_cannot_distinguish(case, ver
     assert bool(found) is bool(codes)
 
 
+def test_errors_with_correlated_scores_are_named_in_a_line():
+    result = adjust(block_of("f wrong by 0.3 %"))
+    (line,) = [line for line in result.verdict.lines if line.code == "line.inseparable"]
+    assert line.fields["named"].code == "hypothesis.control-heights"
+    assert [other.code for other in line.fields["others"]] == ["hypothesis.lever-arm"]
+    assert not any(line.code == "line.inseparable" for line in adjust(block_of("clean")).verdict.lines)
+
+
 def twice(block, difference, rng):
     """Return a block with each photo twice; image coordinates of the second one have a `difference` in sd."""
     count = len(block.photo_ids)
@@ -211,6 +219,23 @@ def test_points_that_were_entered_twice_are_not_accepted():
         )
     ).verdict
     assert (verdict.code, verdict.exit) == ("duplicates", 4)
+
+
+def test_observations_that_were_entered_twice_are_not_accepted():
+    block = block_of("clean")
+    verdict = adjust(block.replace(observations=[*block.observations, *block.observations[:3]])).verdict
+    assert (verdict.code, verdict.exit) == ("duplicates", 4)
+    assert verdict.message.fields["duplicates"][0].fields["n"] == 3
+    again = adjust(block.replace(observations=[*block.observations, block.observations[-1]])).verdict
+    assert "distance" in again.headline
+
+
+def test_equal_readings_of_a_repeated_distance_are_not_duplicates():
+    """The last digit of a rounded length is as large as its standard deviation."""
+    block = block_of("clean")
+    *gnss, distance = block.observations
+    rounded = replace(distance, length=round(distance.length, 2), sd=0.01)
+    assert not duplicates(block.replace(observations=[*gnss, rounded, rounded]))
 
 
 def test_repeated_exposures_from_one_station_are_not_duplicates():
@@ -400,6 +425,75 @@ def test_errors_of_principal_distances_and_points_agree_with_tests_of_their_part
     exchange = np.ones_like(partials) * [1.0, -1.0]
     expected = score_test(result, partials=[exchange]).statistic
     assert found["camera-exchanged", 0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_shift_of_the_images_of_a_photo_agrees_with_the_test_of_its_partials():
+    result = adjust(block_of("lever arm (0.2, 0, 0) m"))
+    found = evaluated(result, photos=[1, 4])
+    for photo in (1, 4):
+        own = (result.block.image_photos == photo)[:, np.newaxis]
+        expected = score_test(result, partials=[own * [1.0, 0.0], own * [0.0, 1.0]]).statistic
+        assert found["photo", photo] == pytest.approx(expected, rel=1e-7)
+    assert [photo for code, photo in found if code == "photo"] == [1, 4]
+
+
+def test_a_misplaced_target_agrees_with_the_test_of_its_partials():
+    """Images of a point with control and a distance, changed by its coordinates."""
+    block, camera = block_of("clean"), GOLDEN["camera"]
+    *gnss, distance = block.observations
+    control = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))
+    ends = [block.point_ids[k] for k in control[:2]]
+    length = float(np.linalg.norm(np.diff(block.point_positions[control[:2]], axis=0))) + 0.01
+    bar = Distance(*ends, length, 0.01)
+    result = adjust(block.replace(observations=[*gnss, distance, bar]))
+    found = evaluated(result)
+    targets = [index for code, index in found if code == "object-point"]
+    assert targets == control[:2].tolist()
+    own = (block.image_points == targets[0])[:, np.newaxis]
+    of, points = block.image_photos, result.point_positions[block.image_points]
+
+    def images(points):
+        u = np.einsum(
+            "nij,nj->ni", rotation_matrix(result.photo_attitudes)[of], points - result.photo_positions[of]
+        )
+        xy = -u[:, :2] / u[:, 2:] * [1.0, -1.0]
+        return camera["f"] * xy * (1 + camera["k1"] * (xy**2).sum(axis=1, keepdims=True))
+
+    steps = 1e-3 * np.eye(3)
+    partials = [own * (images(points + step) - images(points - step)) / 2e-3 for step in steps]
+    assert found["object-point", targets[0]] == pytest.approx(
+        score_test(result, partials=partials).statistic, rel=1e-5
+    )
+
+
+def test_a_target_that_was_measured_on_a_neighbour_is_named():
+    """The point is an end of three distances without control."""
+    block = block_of("clean")
+    *gnss, _ = block.observations
+    places, control = adjust(block).point_positions, np.isfinite(block.point_sd).all(axis=1)
+    point, *others = np.flatnonzero(np.isfinite(places).all(axis=1) & ~control)[[3, 10, 20, 30]].tolist()
+    bars = [
+        Distance(block.point_ids[point], block.point_ids[k], np.linalg.norm(places[point] - places[k]), 0.01)
+        for k in others
+    ]
+    moved = [
+        replace(bar, length=bar.length + error) for bar, error in zip(bars, (0.8, -0.6, 0.7), strict=True)
+    ]
+    first = adjust(block.replace(observations=[*gnss, *moved])).verdict.message.fields["errors"][0]
+    assert first.fields["named"].code == "hypothesis.object-point"
+    assert first.fields["named"].fields["point"] == block.point_ids[point]
+
+
+@pytest.mark.parametrize("strips", [1, 4])
+@pytest.mark.parametrize(("share", "position_sd"), [(0.005, 0.05), (0.1, np.inf)])
+def test_another_origin_of_the_images_of_a_photo_is_named(strips, share, position_sd):
+    """Of few photos all are tested, of many those with large mean residuals."""
+    block = simulate(strips=strips, photos_per_strip=8, position_sd=position_sd, seed=4).block
+    xy = block.image_xy.copy()
+    xy[block.image_photos == 3] += share * np.ptp(xy, axis=0)
+    first = adjust(block.replace(image_xy=xy)).verdict.message.fields["errors"][0].fields["named"]
+    assert first.code == "hypothesis.photo"
+    assert first.fields["photo"] == block.photo_ids[3]
 
 
 def test_a_scale_of_one_of_two_distances_is_an_error_of_this_distance():

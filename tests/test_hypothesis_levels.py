@@ -19,7 +19,8 @@ CATALOGUE = frozenset(
         *("control-rotation", "gnss-heights", "gnss-shift", "gnss-set", "gnss-drift", "time-offset"),
         *("lever-arm", "boresight", "camera-f", "camera-point", "camera-term", "readout-time", "scale"),
         *("bending", "observation", "gnss-next", "gnss-previous", "camera-affinity", "camera-f-strip"),
-        *("camera-f-half", "camera-exchanged", "control-bending", "readout-time-columns"),
+        *("camera-f-half", "camera-exchanged", "control-bending", "readout-time-columns", "photo"),
+        "gnss-half",
     }
 )
 """Codes of all hypotheses that the golden network with observed attitudes permits."""
@@ -87,6 +88,7 @@ def test_p_values_are_uniform_without_an_error(photos, points, known):
             centre=[0.0, 0.0, 0.0],
             estimated=None if known else (omega, freedom),
             detection=(0.001, 0.8),
+            photos=[0, 2],
             limit=6.0,
             effects=0,
         )

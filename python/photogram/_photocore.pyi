@@ -1430,6 +1430,7 @@ class NetworkTrial:
         check_sd: _Floats | None = None,
         check_weights: _Floats | None = None,
         by_component: bool = False,
+        photos: list[int] = ...,
     ) -> dict[str, Any]:
         """Test errors that sets of observations have in common, and errors of groups except images.
 
@@ -1463,6 +1464,8 @@ class NetworkTrial:
             of all differences, row by row, zero for missing ones; None if only single points are tested.
         by_component
             Whether check points also test errors of each component of groups.
+        photos
+            Photos that are tested for a shift of all their image observations; by default none.
 
         Returns
         -------
@@ -1473,9 +1476,10 @@ class NetworkTrial:
         beyond the limit, points other than those of the group that the largest undetected error moves so far,
         the largest change in standard deviations, its point and coordinate, the largest change, and the
         changes of `checks`. `sets`: dictionaries with `parameters`, `plausible`, `estimate`, its
-        `cofactors`, `error`, and the changes of check points by each parameter, (c, 3, k) row by row;
-        `groups`: the same by row of groups with effects, if `by_component`. `correlations`: (s, s), of the
-        scores of sets.
+        `cofactors`, `error`, `sd_between_photos` (standard deviation of a significant readout time if it
+        differs between photos; else None), and the changes of check points by each parameter, (c, 3, k)
+        row by row; `groups`: the same by row of groups with effects, if `by_component`. `correlations`:
+        (s, s), of the scores of sets.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photogram.arguments.arrays import names, numbers, text
+from photogram.arguments.arrays import names, text
 from photogram.arguments.fields import array, check_arrays, check_fields
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import NONE, ZERO, Array, Bools, Floats, OptionalArray
@@ -17,7 +17,7 @@ from photogram.errors import InputError
 from photogram.io.delimited import cells, read_records
 from photogram.io.files import read_lines
 from photogram.io.places import Place, at_place
-from photogram.lazy_dataclasses import converting_dataclass, dataclass, field
+from photogram.lazy_dataclasses import converting_dataclass, field
 from photogram.summaries import Brief
 from photogram.words import phrase
 

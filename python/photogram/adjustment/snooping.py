@@ -35,7 +35,7 @@ from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
 from photogram.results.fixed_tests import held_remark, held_tested
-from photogram.results.hypotheses import hypotheses
+from photogram.results.hypothesis_tests import hypotheses
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.network_trial import (

@@ -297,6 +297,6 @@ def lost_beside_cameras(project: Project) -> list[Phrase]:
 
 def camera_file(name: str, project: Project) -> Mapping[str, bytes]:
     """Return the file of cameras in a format of cameras."""
-    from photogram.targets.output.formats import CAMERA_FORMATS
+    from photogram.targets.camera_formats import CAMERA_FORMATS
 
     return CAMERA_FORMATS[name](rig_of_project(project))

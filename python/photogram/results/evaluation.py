@@ -10,7 +10,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import finite_rows
-from photogram.results.hypotheses import DETECTION, Hypotheses, hypotheses
+from photogram.results.hypotheses import DETECTION, Hypotheses
+from photogram.results.hypothesis_tests import hypotheses
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import Facts, LostSupportError, Out
 from photogram.results.reliability import Reliability, downweighted

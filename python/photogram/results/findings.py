@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
-from photogram.arguments.types import Floats, Indices
 from photogram.messages import Undetermined
-from photogram.network.block import Block
-from photogram.results import hypotheses
+from photogram.results.duplicates import duplicates
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
+from photogram.results.hypotheses import FEWEST as FEWEST_MOVED
+from photogram.results.hypotheses import SHARE as SHARE_MOVED
+from photogram.results.hypothesis_tests import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
@@ -62,7 +63,8 @@ def network_findings(
     test = _whole_test(result)
     assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
-    rivals, known = hypotheses.largest_odds(fixed), result.KNOWN and summary is not None
+    rivals, known = largest_odds(fixed), result.KNOWN and summary is not None
+    inseparable = [] if summary is None else summary.hypotheses.inseparable(rivals)
     return Findings(
         status=result.status,
         observations=[
@@ -79,7 +81,7 @@ def network_findings(
         snooped=result.snooped if lost is None else lost.removed,
         robust=result.loss is not None,
         unsupported=[] if lost is None else lost.unsupported,
-        remarks=[*unseen(result), *assumptions],
+        remarks=[*unseen(result), *assumptions, *inseparable],
         unchecked=[]
         if summary is None
         else [*summary.hypotheses.unchecked(), *_unchecked_control(result, summary.types)],
@@ -105,7 +107,7 @@ def _unchecked_control(result: AdjustedNetwork, types: Iterable[TypeFactor]) -> 
     sd = result.point_sd[result.used_points & ~weighted.any(axis=1)]
     checks = getattr(result, "check_points", None)
     shown = math.inf if checks is None or checks.agreement is None else np.nanmedian(checks.agreement.sd)
-    fewest = max(hypotheses.FEWEST, math.ceil(hypotheses.SHARE * np.count_nonzero(result.used_points)))
+    fewest = max(FEWEST_MOVED, math.ceil(SHARE_MOVED * np.count_nonzero(result.used_points)))
     return [
         phrase("unchecked.sd", kind=each.group, factor=each.undetected)
         for each in found
@@ -219,50 +221,3 @@ def unseen(result: AdjustedNetwork) -> list[Phrase]:
     hidden = int(np.count_nonzero(redundancy <= TESTABLE))
     fields = {"hidden": hidden, "all": redundancy.size, "limit": TESTABLE}
     return [Phrase("line.unseen", fields)] if hidden else []
-
-
-FEWEST = 4  # Equal image observations of two photos
-SHARE = 0.5  # Share of equal observations of a photo
-FEWEST_OF_POINT = 2  # Equal image observations of two points
-EQUAL = 0.25  # Largest differences of copies, in standard deviations of image observations
-
-
-def duplicates(block: Block, factor: float = 1.0) -> list[Phrase]:
-    """Return messages on photos, and on points, that have the same image observations within their noise.
-
-    `factor` is the factor of the given standard deviations that the residuals indicate.
-    """
-    if not len(block.image_xy):
-        return []
-    # A factor that is not a number does not count.
-    limit = EQUAL * (factor if factor < 1.0 else 1.0) * float(np.median(block.image_sd))
-    messages = []
-    for name, owners, others, ids, fewest in (
-        ("photos", block.image_photos, block.image_points, block.photo_ids, FEWEST),
-        ("points", block.image_points, block.image_photos, block.point_ids, FEWEST_OF_POINT),
-    ):
-        pairs = _equal_pairs(owners, others, block.image_xy, limit, fewest)
-        if pairs:
-            names = [phrase("part.pair", first=str(ids[i]), second=str(ids[j])) for i, j in pairs]
-            messages.append(phrase(f"duplicates.{name}", n=len(names), names=names))
-    return messages
-
-
-def _equal_pairs(
-    owners: Indices, others: Indices, xy: Floats, limit: float, fewest: int
-) -> list[tuple[int, int]]:
-    """Return pairs of owners whose observations are mostly equal within a limit."""
-    # Sums of different coordinates on one photo, or of one point, are rarely near each other.
-    keys = xy[:, 0] + xy[:, 1] / np.pi
-    keys += others * (2.0 * float(np.ptp(keys)) + 1.0)
-    order = np.argsort(keys)
-    near = np.flatnonzero(np.diff(keys[order]) <= 2 * limit)
-    first, second = order[near], order[near + 1]
-    equal = (np.abs(xy[first] - xy[second]) <= limit).all(axis=1) & (others[first] == others[second])
-    pairs = np.sort(np.column_stack([owners[first[equal]], owners[second[equal]]]), axis=1)
-    if not len(pairs):
-        return []
-    found, counts = np.unique(pairs, axis=0, return_counts=True)
-    sizes = np.bincount(owners, minlength=int(owners.max()) + 1)
-    most = counts >= np.maximum(fewest, SHARE * sizes[found].min(axis=1))
-    return [(int(i), int(j)) for i, j in found[most] if i != j]

@@ -7,27 +7,22 @@ and external reliability (Baarda 1968). The core computes them (`photocore::netw
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.hypothesis_checks import Joint, single_checks, with_checks
-from photogram.results.network_trial import NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
+from photogram.results.network_trial import NamedSuspects
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
-from photogram.statistics.findings import ALTERNATIVES, NEARLY, NEARLY_EXCHANGED, Tested
+from photogram.statistics.findings import ALTERNATIVES, NEARLY, NEARLY_EXCHANGED
 from photogram.words import Phrase, phrase
 
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Smallest number of other points that it moves
-EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise ratios
-DRAWN = 300  # Largest number of points whose changes are stored for plots
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 OF_CAMERAS = frozenset(
     {
@@ -44,6 +39,9 @@ ABSURD = 5.0  # Standard deviations of plausible sizes beyond which an error has
 ABSURD_PART, UNKNOWN_PART = 0.9, 0.7
 """Least parts of this excess that errors without a plausible size, or with an unknown one, explain."""
 LISTED = 10  # Rows of each table of documents
+DIFFERS = 1.5  # Factor of standard deviations from which on a readout time differs between photos
+SEPARABLE = 0.9  # Largest correlation of the tests of separable errors (Foerstner 1983)
+NESTED = 1 - 1e-6  # Least correlation of an error with its special case
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 
@@ -57,6 +55,7 @@ DATUM = frozenset(
         "gnss-heights",
         "gnss-shift",
         "gnss-set",
+        "gnss-half",
         "distance-scale",
         "scale",
     }
@@ -68,11 +67,12 @@ their differences show the error of the datum."""
 
 UNGRADED = frozenset(
     {
-        *("attitude", "camera", "unknown", "bending", "control-bending"),
+        *("attitude", "photo", "object-point", "camera", "unknown", "bending", "control-bending"),
         *("camera-f-strip", "camera-f-half", "readout-time-columns"),
     }
 )
-"""Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
+"""Undetected errors that are no reason for a reservation: of single photos and targets, whose other
+observations have hypotheses of their own; of weighted parameters; bending,
 whose causes (terms of distortion) are hypotheses of their own; principal distances of a strip or a flight,
 and a readout by columns, which few cameras have."""
 
@@ -117,6 +117,7 @@ class Hypotheses:
     mdb: Floats  # (h, k); NaN if an error of any size remains undetected
     bias_to_noise: Floats
     sets: Sequence[Mapping[str, Any]]  # Other facts of the s sets; see `NetworkTrial.hypotheses`
+    correlations: Floats  # (s, s) of the scores of sets: largest canonical ones; 1 if one includes the other
     effects: Mapping[int, Effect]  # of some rows
     drawn: Indices  # (d,) points whose changes effects contain
     limit: float  # Standard deviations from which on an undetected error of a point counts
@@ -152,6 +153,10 @@ class Hypotheses:
         code, index, group = str(self.code[row]), int(self.index[row]), int(self.group[row])
         if group < 0:
             fields: dict[str, Any] = {"set": max(index, 0) + 1, "parameters": self.sets[row]["parameters"]}
+            if code == "photo":
+                fields["photo"] = str(self.suspects.given.photo_ids[index])
+            if code == "object-point":
+                fields["point"] = str(self.suspects.given.point_ids[index])
             if index >= 0 and code in OF_CAMERAS:
                 cameras = getattr(self.suspects.given, "camera_names", ())
                 other = phrase("hypothesis.camera", number=index + 1)
@@ -170,7 +175,7 @@ class Hypotheses:
             return f" {self.suspects.unit(int(self.suspects.row_starts[self.group[row]]))}".rstrip()
         units = {
             **dict.fromkeys(
-                ("camera-f", "camera-f-strip", "camera-f-half", "camera-f-single", "camera-point"),
+                ("camera-f", "camera-f-strip", "camera-f-half", "camera-f-single", "camera-point", "photo"),
                 self.suspects.given.image_unit,
             ),
             **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
@@ -251,6 +256,21 @@ class Hypotheses:
         special = [row for row in found if self.code[row] in SHARES and self._is_whole(row, found[0])]
         return special[:1] or [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
+    def inseparable(self, rivals: float = -math.inf) -> list[Phrase]:
+        """Return a message on errors of sets whose tests hardly differ from that of the likeliest one."""
+        found = self.common(rivals)
+        if not found:
+            return []
+        own = self.correlations[found[0]]
+        rows = np.flatnonzero(
+            (own > SEPARABLE) & (own < NESTED) & (self.probability[: len(own)] < DETECTION[0])
+        )
+        others = [row for row in rows.tolist() if row not in found]
+        others.sort(key=lambda row: -self.log_odds[row])
+        names = [self.name(row) for row in others]
+        fields = {"named": self.name(found[0]), "others": names, "correlation": SEPARABLE}
+        return [Phrase("line.inseparable", fields)] if names else []
+
     def _is_whole(self, row: int, first: int) -> bool:
         """Whether a share is 1 and explains as much as the likeliest error."""
         is_one = abs(self.estimate[row, 0] - 1.0) < 3 * WHOLE
@@ -302,10 +322,15 @@ class Hypotheses:
         return [int(row) for row in likely[once]]
 
     def _size(self, row: int) -> str:
-        """Return the estimate of a set with its standard deviation; the largest of several."""
+        """Return the estimate of a set with its standard deviation; the largest of several.
+
+        The readout time of a moving photo differs between photos that also rotate.
+        """
         estimate, parameters = self.sets[row]["estimate"], self.sets[row]["parameters"]
         k = int(np.argmax(np.abs(estimate)))
         sd = math.sqrt(max(self.sets[row]["cofactors"][k * (len(estimate) + 1)], 0.0))
+        between = self.sets[row]["sd_between_photos"] or 0.0
+        sd = between if between > DIFFERS * sd else sd
         axis = f"{parameters[k]} " if len(estimate) > 1 else ""
         return f"{axis}{estimate[k]:.4g}{self._unit(row)} (sd {sd:.2g})"
 
@@ -405,131 +430,3 @@ class Hypotheses:
             pairs = [pair for pair in zip(names, values, strict=False) if not math.isnan(pair[1])]
             texts.append(", ".join(f"{name} {value:.4g}".lstrip() for name, value in pairs))
         return column(name, np.array(texts, dtype=object), head, kind="name")
-
-
-def hypotheses(
-    trial: NetworkTrial,
-    tests: Tests,
-    facts: Facts,
-    axes: Sequence[Axis],
-    standing: tuple[float, float],
-    limit: float,
-    *,
-    known: bool,
-) -> Hypotheses:
-    """Return the hypotheses of an adjusted network with the `tests` of its observations.
-
-    `axes` are those of its points, `standing` the sum of squares and the degrees of freedom, `known` is
-    whether the unit weight is known. `limit`: standard deviations from which on an undetected error of a
-    point counts.
-    """
-    suspects, estimated = trial.suspects, None if known else standing
-    images = (suspects.kinds == 0) & tests.active
-    adjusted = np.flatnonzero(np.bincount(suspects.points[images]))
-    drawn = sampled(adjusted, DRAWN)
-    core = {**NO_FACTS, **facts}
-    timed, agreement = (core.pop(name, None) for name in ("timed", "agreement"))
-    checks = len(core["checks"])
-    core["checks"] = [*core["checks"], *drawn.tolist()]
-    joint: Joint | None = None
-    if agreement is not None:
-        core["check_sd"] = agreement.sd
-        if agreement.joint is not None:
-            flat, differences, covariance = agreement.joint
-            joint = flat, differences, np.linalg.inv(covariance)  # Once for all hypotheses
-            weights = np.zeros((3 * checks, 3 * checks))
-            weights[np.ix_(flat, flat)] = joint[2]
-            core["check_weights"] = weights.ravel()
-            # Otherwise, they differ no more than expected, and name no single component.
-            core["by_component"] = (
-                agreement.together is not None and agreement.together.probability_above < 0.5
-            )
-    found = trial.core.hypotheses(
-        **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
-    )
-    effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
-    groups = _groups(suspects, found["group"], found["index"])
-    for row, (*sizes, changes) in found["effects"].items():
-        effects[row] = Effect(changes[checks:], *sizes)
-    if known and joint is not None:
-        for row, own in [*enumerate(found["sets"]), *found["groups"].items()]:
-            if row in effects and with_checks(found, row, own, checks, joint):
-                relative.add(row)
-    statistic, estimate = found["statistic"], found["estimate"]
-    kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
-    numbers = Counter(kinds)
-    count = np.array([numbers[kind] for kind in kinds])
-    k = np.maximum(np.count_nonzero(~np.isnan(estimate), axis=1), 1)
-
-    def change(statistic: ArrayLike) -> Floats:
-        """Return twice the logarithms of the likelihood ratios against no error."""
-        if estimated is None:
-            return np.asarray(statistic)
-        omega, freedom = estimated
-        return -freedom * np.log(np.maximum(1 - np.asarray(statistic) / omega, 1e-300))
-
-    odds = _log_odds(change(statistic), k, np.maximum(found["observations"], k + 1), count)
-    odds -= np.nansum(np.square(estimate / found["plausible"]), axis=1) / 2
-    # Terms of distortion bend a network; that the heights of many control points do is rare.
-    odds[np.array(found["code"]) == "control-bending"] -= math.log(ALTERNATIVES)
-    shares = np.isin(found["code"], SHARES)
-    odds[shares] -= np.square((estimate[shares, 0] - 1.0) / WHOLE) / 2
-    largest = float(np.nanmax(tests.statistic[images], initial=0.0))
-    of_images = float(_log_odds(change(largest), 2, 3, max(int(np.count_nonzero(images)), 1)))
-    checked = -math.inf if agreement is None else largest_odds([agreement.points])
-    if joint is not None:
-        of_checks, dimension = single_checks(joint)
-        by_one = _log_odds(of_checks, dimension, dimension + 1, len(dimension))
-        checked = max(checked, float(by_one.max()))
-    sets = len(found["sets"])
-    same = ("index", "component", "probability", "estimate", "redundancy", "mdb", "bias_to_noise", "sets")
-    return Hypotheses(
-        **{name: found[name] for name in same},
-        code=np.array(found["code"], dtype=np.str_),
-        group=groups,
-        rank=found["rank"].astype(np.int64),
-        statistic=statistic,
-        log_odds=odds,
-        by_checks=(np.nan_to_num(statistic) - alone) / 2,
-        effects=effects,
-        drawn=drawn,
-        limit=limit,
-        suspects=suspects,
-        points=len(adjusted),
-        axes=axes,
-        times="s" if timed else "exposures",
-        excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
-        relative=relative,
-        compared=agreement is not None,
-        single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, checked))),
-    )
-
-
-def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:
-    """Return the groups with these types and subjects; -1 for a negative type."""
-    most = max(int(suspects.subjects.max(initial=0)), int(subjects.max(initial=0))) + 1
-    others = np.flatnonzero(suspects.kinds != 0)
-    keys = suspects.kinds[others] * most + suspects.subjects[others]
-    order = np.argsort(keys)
-    found = np.full(len(kinds), -1)
-    own = kinds >= 0
-    found[own] = others[order[np.searchsorted(keys, (kinds * most + subjects)[own], sorter=order)]]
-    return found
-
-
-def largest_odds(tests: Iterable[Tested]) -> float:
-    """Return the largest log odds of an error that tests of single values have."""
-    found = [-math.inf]
-    for each in tests:
-        k = np.asarray(each.dimension, dtype=np.float64)
-        values = np.square(each.values) if each.statistic == "w" else np.asarray(each.values)
-        values = values * k if each.statistic == "F" else values
-        odds = _log_odds(values, k, k + 1, max(int(np.count_nonzero(~np.isnan(values))), 1))
-        found.append(float(np.nanmax(odds, initial=-math.inf)))
-    return max(found)
-
-
-def _log_odds(statistic: ArrayLike, k: ArrayLike, observations: ArrayLike, count: ArrayLike) -> Floats:
-    """Return T/2 - k/2 ln n_h - ln N_h: the log odds of an error of any size against no error."""
-    half = np.asarray(k) / 2 * np.log(observations)
-    return np.asarray(np.asarray(statistic) / 2 - half - np.log(count))

@@ -26,7 +26,7 @@ pub struct Equation<'a> {
     pub of: EquationOf,
     /// Standard deviation of the observation; 1 if its components are weighted together.
     pub sd: f64,
-    row: &'a Row<'a>,
+    pub(super) row: &'a Row<'a>,
 }
 
 impl Equation<'_> {
@@ -100,6 +100,8 @@ pub struct Additional {
 pub(super) struct LocalRows {
     /// Number of unknowns of the block.
     width: usize,
+    /// The observation of each equation.
+    of: Vec<EquationOf>,
     /// Of each equation: observed minus computed; the coefficients of the unknowns of the block.
     constants: Vec<f64>,
     own: Vec<f64>,
@@ -131,8 +133,14 @@ impl LocalRows {
         &self.own
     }
 
+    /// The observation of each equation.
+    pub fn of(&self) -> &[EquationOf] {
+        &self.of
+    }
+
     fn clear(&mut self, width: usize) {
         self.width = width;
+        self.of.clear();
         self.constants.clear();
         self.own.clear();
         self.ends.clear();
@@ -142,7 +150,8 @@ impl LocalRows {
 
     /// Adds an equation; `first` is the first unknown of the block.
     fn push(&mut self, to: &Extended<'_>, (of, sd, row): (EquationOf, f64, &Row<'_>), first: usize) {
-        let Self { width, constants, own, ends, others, partials, scratch, shared } = self;
+        let Self { width, of: all, constants, own, ends, others, partials, scratch, shared } = self;
+        all.push(of);
         scratch.clear();
         to.parameters.partials(&Equation { of, sd, row }, shared, scratch);
         // All rows of a tie, whose components are whitened together, depend on the same parameters.
@@ -162,7 +171,7 @@ impl LocalRows {
 
     /// Each equation: observed minus computed, its coefficients of the block and of others, its partials.
     #[allow(clippy::type_complexity, reason = "the parts of an equation")]
-    fn rows(&self) -> impl Iterator<Item = (f64, &[f64], &[(usize, f64)], &[(usize, f64)])> {
+    pub fn rows(&self) -> impl Iterator<Item = (f64, &[f64], &[(usize, f64)], &[(usize, f64)])> {
         self.constants.iter().enumerate().map(|(k, &constant)| {
             let (others, partials) = if k == 0 { (0, 0) } else { self.ends[k - 1] };
             let ends = self.ends[k];
@@ -211,6 +220,27 @@ impl<'a> Extended<'a> {
         self.equations.each_prior(&self.terms, range, |unknown, row| {
             rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], row), first);
         });
+    }
+
+    /// Calls `add` with the equations of retained blocks: ties, then unknowns as observations, each with its standard deviation.
+    pub fn each_retained(&self, mut add: impl FnMut(EquationOf, f64, &Row<'_>)) {
+        let problem = self.equations.problem();
+        let (layout, mut buffers) = (problem.layout(), Buffers::default());
+        let (groups, first) = (layout.groups() * layout.rows(), layout.all_locals().end);
+        for tie in (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_none()) {
+            self.equations.each_row_of_tie(&mut buffers, tie, |row| {
+                let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
+                add(of, self.equations.deviation(row.number), row);
+            });
+        }
+        self.equations.each_prior(&self.terms, first..layout.unknowns(), |unknown, row| {
+            add(EquationOf::Unknown(unknown), problem.sd[unknown], row);
+        });
+    }
+
+    /// Unknowns of an equation that are not fixed, with their coefficients.
+    pub fn free(&self, row: &Row<'_>) -> Vec<(usize, f64)> {
+        row.taken().filter(|own| !self.fixed[own.0]).collect()
     }
 
     /// The inverse of the normal matrix of a local block; zero if it has none.
@@ -395,7 +425,7 @@ impl Sums {
 }
 
 impl Linearized {
-    fn extended<'a>(
+    pub(super) fn extended<'a>(
         &'a self,
         problem: &'a AnyProblem<'a>,
         parameters: &'a dyn AdditionalParameters,
@@ -503,20 +533,18 @@ impl Linearized {
 }
 
 /// Local blocks that a thread takes at least.
-const AT_LEAST: usize = 32;
+pub(super) const AT_LEAST: usize = 32;
 /// Largest number of parameters that are solved for together, for any number of threads: the rounding of products depends on it.
 const SOLVED: usize = 32;
 /// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
-const PARTS: usize = 64;
+pub(super) const PARTS: usize = 64;
 
 /// The sums over ties of retained blocks and over unknowns that are not local.
 fn retained(extended: &Extended<'_>, count: usize) -> Sums {
-    let problem = extended.equations.problem();
-    let (layout, mut sums) = (problem.layout(), Sums::new(count));
-    let (groups, first) = (layout.groups() * layout.rows(), layout.all_locals().end);
-    let (mut partials, mut work) = (vec![], Work::new(layout, count));
-    let (mut shared, mut others) = (Shared::default(), vec![]);
-    let mut add = |of: EquationOf, sd: f64, row: &Row<'_>| {
+    let layout = extended.equations.problem().layout();
+    let (mut sums, mut work) = (Sums::new(count), Work::new(layout, count));
+    let (mut partials, mut shared) = (vec![], Shared::default());
+    extended.each_retained(|of, sd, row| {
         partials.clear();
         extended.parameters.partials(&Equation { of, sd, row }, &mut shared, &mut partials);
         if partials.iter().all(|own| own.1 == 0.0) {
@@ -528,19 +556,7 @@ fn retained(extended: &Extended<'_>, count: usize) -> Sums {
         work.left.resize(work.columns.len(), 0.0);
         let left = &mut work.left;
         Work::each_active(&work.active, &partials, |column, partial| left[column] += partial);
-        others.clear();
-        others.extend(row.taken().filter(|own| !extended.fixed[own.0]));
-        sums.reduce(&others, &mut work);
-    };
-    let mut buffers = Buffers::default();
-    for tie in (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_none()) {
-        extended.equations.each_row_of_tie(&mut buffers, tie, |row| {
-            let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
-            add(of, extended.equations.deviation(row.number), row);
-        });
-    }
-    extended.equations.each_prior(&extended.terms, first..layout.unknowns(), |unknown, row| {
-        add(EquationOf::Unknown(unknown), problem.sd[unknown], row);
+        sums.reduce(&extended.free(row), &mut work);
     });
     sums
 }

@@ -81,6 +81,7 @@ mod problem;
 mod published;
 mod result;
 mod run;
+mod score_parts;
 mod secants;
 mod statistics;
 mod steps;
@@ -115,6 +116,7 @@ pub(crate) use run::between;
 #[doc(hidden)]
 pub use run::go_on;
 pub use run::{Requests, Watch, adjust, adjust_with};
+pub use score_parts::{Groups, ScoreParts};
 #[doc(hidden)]
 pub use statistics::median;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};

@@ -89,6 +89,7 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
         row.set_item("estimate", own.judged.estimate)?;
         row.set_item("cofactors", own.judged.cofactors)?;
         row.set_item("error", own.judged.error)?;
+        row.set_item("sd_between_photos", own.sd_between_photos)?;
         row.set_item("at_checks", PyArray1::from_vec(py, own.at_checks))?;
         Ok(row)
     };
@@ -206,7 +207,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, check_sd=None, check_weights=None, by_component=false))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, check_sd=None, check_weights=None, by_component=false, photos=vec![]))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -227,6 +228,7 @@ impl NetworkTrial {
         check_sd: Option<Array<'_>>,
         check_weights: Option<PyReadonlyArray1<'_, f64>>,
         by_component: bool,
+        photos: Vec<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let velocities = rows("velocities", &velocities)?;
         let observed = observed.map_or_else(|| Ok(vec![]), |own| rows("observed", &own))?;
@@ -239,6 +241,7 @@ impl NetworkTrial {
             control_sets,
             readouts,
             widths,
+            photos,
             checks,
             check_sd,
             check_weights: check_weights.map_or(vec![], |own| own.as_array().iter().copied().collect()),

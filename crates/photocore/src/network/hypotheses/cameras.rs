@@ -93,7 +93,12 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
         }
     }
     if let Some(columns) = exchanged {
-        catalogue.add_combination(("camera-exchanged", Some(camera)), "share", SHARE, &columns);
+        catalogue.add_combination(
+            ("camera-exchanged", Some(camera)),
+            &["share"],
+            &[SHARE],
+            vec![columns.to_vec()],
+        );
     }
     whole
 }
@@ -126,7 +131,8 @@ fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize], whole
         for set in sets {
             if let ("camera-f-half", Some(first), Some(whole)) = (code, first, whole) {
                 // The second half is the rest.
-                catalogue.add_combination((code, Some(set)), "f", size, &[(whole, 1.0), (first, -1.0)]);
+                let rest = vec![vec![(whole, 1.0), (first, -1.0)]];
+                catalogue.add_combination((code, Some(set)), &["f"], &[size], rest);
                 continue;
             }
             let column = catalogue.add((code, Some(set)), &["f"], &[size])[0];

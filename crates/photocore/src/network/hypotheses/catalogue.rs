@@ -43,6 +43,8 @@ pub(super) enum Seen {
     Positions,
     /// Attitudes of photos.
     Attitudes,
+    /// Images of points that are not local.
+    Images,
 }
 
 /// Deformations of the images of a photo, relative to its principal point.
@@ -77,6 +79,8 @@ pub(super) struct Catalogue<'a> {
     pub(super) shutters: Vec<Vec<(usize, [f64; 3])>>,
     /// Velocities of these photos in coordinates of the object space.
     pub(super) velocities: Vec<Vector3<f64>>,
+    /// Columns of the shift of the images of each photo that is tested.
+    pub(super) shifts: Vec<Option<[usize; 2]>>,
     /// Deformations of the images of each photo.
     pub(super) deformations: Vec<Option<Deformations>>,
 }
@@ -101,6 +105,7 @@ impl<'a> Catalogue<'a> {
             cameras: vec![vec![]; photos],
             shutters: vec![vec![]; photos],
             velocities: vec![Vector3::zeros(); photos],
+            shifts: vec![None; photos],
             deformations: vec![None; photos],
         }
     }
@@ -120,16 +125,16 @@ impl<'a> Catalogue<'a> {
         columns
     }
 
-    /// Adds a hypothesis of one parameter that changes several of these columns.
+    /// Adds a hypothesis whose parameters each change several of these columns.
     pub fn add_combination(
         &mut self,
         (code, set): (&'static str, Option<usize>),
-        parameter: &'static str,
-        plausible: f64,
-        columns: &[(usize, f64)],
+        parameters: &[&'static str],
+        plausible: &[f64],
+        columns: Vec<Vec<(usize, f64)>>,
     ) {
-        let (parameters, plausible) = (vec![parameter], vec![plausible]);
-        self.causes.push(Cause { code, set, parameters, plausible, columns: vec![columns.to_vec()] });
+        let (parameters, plausible) = (parameters.to_vec(), plausible.to_vec());
+        self.causes.push(Cause { code, set, parameters, plausible, columns });
     }
 
     /// Adds an error of some observations as a parameter; its column.
@@ -152,8 +157,13 @@ impl<'a> Catalogue<'a> {
             // Observed values are the computed ones plus the error; with fixed ones it is the computed that have it.
             self.fixed.entry(unknown).or_default().push((column, -value));
         } else {
-            self.displaced.entry((seen, unknown)).or_default().push((column, value));
+            self.displace_seen(seen, unknown, column, value);
         }
+    }
+
+    /// The same of unknowns that may be fixed, if only these observations have the error.
+    pub fn displace_seen(&mut self, seen: Seen, unknown: usize, column: usize, value: f64) {
+        self.displaced.entry((seen, unknown)).or_default().push((column, value));
     }
 
     /// Whether attitudes of photos were observed.
@@ -177,7 +187,7 @@ impl<'a> Catalogue<'a> {
     }
 
     /// The image of an equation; None if it is of something else.
-    fn image_of(&self, of: EquationOf) -> Option<(usize, usize, usize)> {
+    pub(super) fn image_of(&self, of: EquationOf) -> Option<(usize, usize, usize)> {
         match of {
             EquationOf::Group { group, local, row } => Some((group, local, row)),
             EquationOf::Tie { tie, row } if tie < self.bundle.tied_images() => {
@@ -197,7 +207,9 @@ impl AdditionalParameters for Catalogue<'_> {
     fn locals(&self) -> Option<Vec<usize>> {
         let cameras = self.cameras.iter().any(|own| !own.is_empty());
         let deformed = self.deformations.iter().any(Option::is_some);
-        if cameras || deformed || !self.fixed.is_empty() || self.shutters.iter().any(|own| !own.is_empty()) {
+        let shuttered = self.shutters.iter().any(|own| !own.is_empty());
+        let shifted = self.shifts.iter().any(Option::is_some);
+        if cameras || deformed || shuttered || shifted || !self.fixed.is_empty() {
             return None;
         }
         let single = self.single.keys().filter_map(|of| match *of {
@@ -217,7 +229,8 @@ impl AdditionalParameters for Catalogue<'_> {
         let image = self.image_of(equation.of);
         let seen = match equation.of {
             EquationOf::Unknown(unknown) => self.seen_by_itself(unknown),
-            EquationOf::Tie { tie, .. } if image.is_none() => {
+            EquationOf::Tie { .. } if image.is_some() => Some(Seen::Images),
+            EquationOf::Tie { tie, .. } => {
                 match self.bundle.observations[tie - self.bundle.tied_images()].observation.kind() {
                     "control" => Some(Seen::Control),
                     "position" => Some(Seen::Positions),
@@ -244,6 +257,7 @@ impl AdditionalParameters for Catalogue<'_> {
             self.camera_partials(image, equation, shared, partials);
             self.shutter_partials(image, equation, partials);
             self.deformation_partials(image, equation, partials);
+            self.shift_partials(image, equation, partials);
         }
     }
 }

@@ -10,7 +10,10 @@ use super::facts::Facts;
 use super::groups::{single_errors, worst};
 use super::hypothesis::{About, Hypotheses, Hypothesis};
 use super::judged::{Criteria, Judged};
-use super::{assignment, attitudes, cameras, control, deformations, distances, form, positions, shutter};
+use super::{
+    assignment, attitudes, cameras, control, deformations, distances, form, photos, points, positions,
+    shutter,
+};
 use crate::adjustment::{Leverages, correlation_above, whitening};
 use crate::geometry::PoseNumbers;
 use crate::{Threads, parallel};
@@ -18,17 +21,19 @@ use crate::{Threads, parallel};
 /// The errors of sets that are possible for a network.
 fn catalogue<'a>(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Catalogue<'a> {
     let mut catalogue = Catalogue::new(trial, found, facts);
-    let (bundle, points) = (catalogue.bundle, catalogue.control_points(trial));
-    control::add(&mut catalogue, &points);
+    let (bundle, control_points) = (catalogue.bundle, catalogue.control_points(trial));
+    control::add(&mut catalogue, &control_points);
     distances::add(&mut catalogue);
     cameras::add(&mut catalogue, trial);
     deformations::add(&mut catalogue, trial);
+    photos::add(&mut catalogue, trial);
+    points::add(&mut catalogue, &trial.assembled.points);
     // Poses that are made of several blocks, or are vectors, have no unknowns of their own that could be displaced.
     if bundle.mounts.is_empty() && matches!(bundle.poses, PoseNumbers::Angles(_)) {
         attitudes::add(&mut catalogue);
         positions::add(&mut catalogue);
         assignment::add(&mut catalogue);
-        form::add(&mut catalogue, &points);
+        form::add(&mut catalogue, &control_points);
         shutter::add(&mut catalogue, trial);
     }
     catalogue
@@ -87,6 +92,7 @@ impl Trial {
                 observations: observations(&own, &sums.observations),
                 plausible,
                 judged,
+                sd_between_photos: None,
                 effect: None,
                 at_checks: (at_checks.columns(0, of_sets) * own.rows(0, of_sets))
                     .transpose()
@@ -96,6 +102,8 @@ impl Trial {
             columns.push(own);
         }
         let sets = all.len();
+        let parts = (self, found, &*linearized, &catalogue);
+        shutter::add_sd_between_photos(parts, &sums.effects, &mut all, threads);
         for (&k, own) in worst.iter().zip(&shares) {
             let mut error = DVector::zeros(count);
             own.iter().for_each(|&(column, share)| error[column] = share);

@@ -19,6 +19,8 @@ pub struct Facts {
     pub readouts: Vec<Vec<[f64; 3]>>,
     /// Width of the image of each camera, in its unit; NaN if unknown.
     pub widths: Vec<f64>,
+    /// Photos that are tested for a shift of all their images.
+    pub photos: Vec<usize>,
     /// Check points, and other points whose changes are reported.
     pub checks: Vec<usize>,
     /// Standard deviations of the differences of the check points, which are the first of these.

@@ -124,6 +124,7 @@ impl Trial {
                 observations: count,
                 plausible: vec![],
                 judged: judged.in_units(&units),
+                sd_between_photos: None,
                 effect: None,
                 at_checks: vec![],
             };

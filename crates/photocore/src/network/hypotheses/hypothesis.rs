@@ -28,6 +28,8 @@ pub struct Hypothesis {
     pub plausible: Vec<f64>,
     /// Test and internal reliability, in the units of the parameters.
     pub judged: Judged,
+    /// Standard deviation of the estimate if the error differs between photos; only of significant readout times.
+    pub sd_between_photos: Option<f64>,
     /// What an undetected error changes: one of the size of the MDB or, if there is none, of the plausible size. None if its bias-to-noise
     /// ratio excludes an effect above the limit.
     pub effect: Option<Effect>,

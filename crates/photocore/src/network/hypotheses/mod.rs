@@ -18,7 +18,9 @@ mod form;
 mod groups;
 mod hypothesis;
 mod judged;
+mod photos;
 mod places;
+mod points;
 mod positions;
 mod shutter;
 

@@ -1,10 +1,12 @@
 //! A rolling shutter: the lines of an image are read one after the other while the photo moves.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::super::trial::Trial;
-use super::catalogue::{Catalogue, put};
-use crate::adjustment::Equation;
+use super::catalogue::{Catalogue, Cause, put};
+use super::hypothesis::{About, Hypothesis};
+use crate::Threads;
+use crate::adjustment::{Equation, Groups, Leverages, Linearized};
 
 /// Plausible readout time of a whole image, in units of time of the velocities.
 const READOUT: f64 = 0.1;
@@ -32,6 +34,37 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
             let velocity = Vector3::from(facts.velocities[photo]);
             catalogue.velocities[photo] = catalogue.place_of_photo(photo).change(&velocity);
         }
+    }
+}
+
+/// Adds the standard deviations of significant readout times. Their lines are not wrong by one velocity if photos also rotate.
+pub(super) fn add_sd_between_photos(
+    (trial, found, linearized, catalogue): (&Trial, &Leverages, &Linearized, &Catalogue<'_>),
+    effects: &DMatrix<f64>,
+    hypotheses: &mut [Hypothesis],
+    threads: &Threads,
+) {
+    let facts = catalogue.facts;
+    let tested = |own: &&mut Hypothesis| {
+        CODES.contains(&own.code) && own.judged.rank > 0 && own.judged.probability < facts.detection.0
+    };
+    let mut tested: Vec<&mut Hypothesis> = hypotheses.iter_mut().filter(tested).collect();
+    if tested.is_empty() {
+        return;
+    }
+    let of_all = catalogue.causes.iter().filter(|cause| CODES.contains(&cause.code));
+    let of_all: Vec<usize> = of_all.map(|cause| cause.columns[0][0].0).collect();
+    let mut alone = Catalogue::new(trial, found, facts);
+    add(&mut alone, trial);
+    // Observations other than images are a group of their own.
+    let photos = alone.bundle.cameras.len();
+    let group = |of| alone.image_of(of).map_or(photos, |own| alone.bundle.images[own.0].photo);
+    let groups: Groups<'_> = (photos + 1, &group);
+    let problem = &trial.assembled.problem;
+    let parts = linearized.score_parts(problem, &alone, &effects.select_columns(&of_all), groups, threads);
+    for own in &mut tested {
+        let same = |cause: &Cause| cause.code == own.code && About::Set(cause.set) == own.about;
+        own.sd_between_photos = alone.causes.iter().position(same).map(|column| parts.sd(column));
     }
 }
 
