@@ -23,7 +23,7 @@ def survey():
 
 
 def readout(result):
-    """Return the readout time and its standard deviations: for equal photos, different ones, the written one."""
+    """Return the readout time and its sd: for equal photos, for different ones, and the written one."""
     every = result._hypotheses()
     row = every.code.tolist().index("readout-time")
     own = every.sets[row]

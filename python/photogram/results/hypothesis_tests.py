@@ -63,7 +63,7 @@ def hypotheses(
                 agreement.together is not None and agreement.together.probability_above < 0.5
             )
     if core["widths"]:
-        core["photos"] = shifted_photos(trial, tests)
+        core["photos"] = shifted_photos(suspects, tests)
     found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
@@ -75,11 +75,11 @@ def hypotheses(
         for row, own in [*enumerate(found["sets"]), *found["groups"].items()]:
             if row in effects and with_checks(found, row, own, checks, joint):
                 relative.add(row)
-    # Residuals are smaller than errors by the root of the mean redundancy number (MacKinnon and White 1985).
-    mean_redundancy = min(standing[1] / max(int(np.count_nonzero(~np.isnan(tests.residual))), 1), 1.0)
     for own in found["sets"]:
         if own["sd_between_photos"] is not None:
-            own["sd_between_photos"] /= math.sqrt(mean_redundancy)
+            # Residuals are smaller than errors by the root of the mean redundancy number.
+            mean_redundancy = standing[1] / np.count_nonzero(~np.isnan(tests.residual))
+            own["sd_between_photos"] /= math.sqrt(min(mean_redundancy, 1.0))
     statistic, estimate = found["statistic"], found["estimate"]
     kinds = [*zip(found["code"], (found["component"] < 0).tolist(), strict=True)]
     numbers = Counter(kinds)
@@ -141,23 +141,20 @@ def hypotheses(
     )
 
 
-def shifted_photos(trial: NetworkTrial, tests: Tests) -> list[int]:
+def shifted_photos(suspects: NamedSuspects, tests: Tests) -> list[int]:
     """Return photos that may have an error in common of all their images; of few photos all.
 
     Of many, these are the photos with the largest means of the residuals of an image axis. Their standard
     deviations depend on the geometry: the limit is larger than the one of equal photos.
     """
-    suspects = trial.suspects
     count, images = len(suspects.given.photo_ids), np.flatnonzero(suspects.kinds == IMAGE)
     if count <= ALL_PHOTOS:
         return [*range(count)]
     photos, squares = suspects.photos[images], np.zeros(count)
-    sd, residuals = (own[: 2 * len(images)].reshape(-1, 2).T for own in (trial.deviations, tests.residual))
-    for of_axis, residual in zip(1 / sd, residuals, strict=True):
-        sums = np.bincount(photos, np.nan_to_num(of_axis * residual), minlength=count)
-        norms = np.bincount(photos, np.where(np.isnan(residual), 0.0, of_axis**2), minlength=count)
-        relative = np.divide(sums**2, norms, out=np.zeros(count), where=norms > 0)
-        squares += MEDIAN * relative / max(float(np.median(relative[norms > 0])), np.finfo(float).tiny)
+    numbers = np.maximum(np.bincount(photos, minlength=count), 1)
+    for residuals in np.nan_to_num(tests.residual[: 2 * len(images)]).reshape(-1, 2).T:
+        relative = np.bincount(photos, residuals, minlength=count) ** 2 / numbers
+        squares += MEDIAN * relative / max(float(np.median(relative)), np.finfo(float).tiny)
     largest = np.argsort(-squares, kind="stable")[:MOST_PHOTOS]
     return np.sort(largest[squares[largest] > NOTABLE + 4 * math.log(count)]).tolist()
 
