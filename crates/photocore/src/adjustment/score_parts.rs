@@ -64,7 +64,7 @@ impl Linearized {
         let extended = self.extended(problem, parameters, threads);
         let (layout, count) = (problem.layout(), parameters.count());
         let (first, effects) = (layout.all_locals().end, effects.transpose());
-        // Partials minus what the unknowns that are not local absorb.
+        // Partials without their part that unknowns of retained blocks absorb.
         let left = |others: &[(usize, f64)], partials: &[(usize, f64)]| {
             let mut left = DVector::zeros(count);
             partials.iter().for_each(|&(k, partial)| left[k] += partial);
