@@ -345,7 +345,7 @@ MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
     ),
     "GNSS of one flight": (
         "gnss-half",
-        lambda s: s.gnss is not None,
+        lambda s: s.gnss is not None and not 50 < np.ptp(s.poses[:, 1]) < 100,  # Two strips are two flights
         _gnss(
             lambda s, d: (
                 (np.arange(len(s.poses)) < len(s.poses) // 2)[:, np.newaxis] * np.array([0.6, 0.6, 0.5]) * d
