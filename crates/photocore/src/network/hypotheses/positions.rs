@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::catalogue::{Catalogue, Seen};
 use super::places::Place;
-use crate::sorting::median;
+use crate::adjustment::median;
 
 /// Plausible shift, lever arm and drift (over all photos) in units of the object space.
 const SHIFT: f64 = 1.0;
