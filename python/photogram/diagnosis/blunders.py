@@ -1,9 +1,9 @@
 """The adjustment of a check: exchanged names, and gross errors by data snooping (Appendix H, 3-sigma rule).
 
 The search is :func:`photogram.snoop`, with single components of control and an unknown unit weight, because
-standard deviations may be wrong by a factor. It starts without points that the adjustment cannot determine
-in spite of their rays, and without control far from its rays, and tests these against the others.
-Exchanged names are corrected before single errors are reported.
+standard deviations may be wrong by a factor. It starts without points whose rays miss each other, and without
+control far from its rays, and tests these against the others. Exchanged names are corrected before single
+errors are reported.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from photogram.adjustment.snooping import snoop_block
-from photogram.arguments.types import Bools
 from photogram.diagnosis.findings import Finding, Section, section_of
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.misfits import Misfits, exchanged, list_test_values
@@ -31,14 +30,12 @@ from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.subset import kept_images, of_photos
-from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
 from photogram.results.snooping_log import Aside, Exchange
 from photogram.results.snooping_options import SnoopOptions
 
 DISTORTING = 50.0  # Test value of control whose error distorts the photos
 HOPELESS = 5.0  # Spread of the test values of photos that are removed, if they did not fit before
-RAYS = 3  # Rays of a point whose position is undetermined only if one of them is wrong
 MOST_EXCHANGES = 5  # Maximum number of successive corrections of names
 
 
@@ -71,14 +68,13 @@ def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     edited = Edited(section_of("blunders"))
     block = _fitting(block, suspects, adjusted, edited)
     result = edited.last = edited.first
-    suspected = suspects.points[block.image_points]
     for _ in range(MOST_EXCHANGES):
-        exchanges = _remove(block, suspected, suspects.control, result, adjusted, edited)
+        exchanges = _remove(block, suspects, result, adjusted, edited)
         if not exchanges:
             break
         edited.gross += exchanged(exchanges)
         block = _with_names(block, exchanges)
-        suspected = np.zeros_like(suspected)
+        suspects = suspects._replace(points=np.zeros_like(suspects.points))
         result, edited.reason = _adjusted(block, adjusted)
         edited.last = result
     if edited.last is not None:
@@ -114,48 +110,24 @@ def _adjusted(block: Block, adjusted: Adjuster) -> tuple[Result | None, str]:
         return None, str(error)
 
 
-def _undetermined(block: Block, first: Result | None) -> Bools:
-    """(m,) images of points that the adjustment excluded, because their rays do not intersect."""
-    if first is None:
-        return np.zeros(len(block.image_xy), dtype=bool)
-    rays = np.bincount(block.image_points, minlength=len(block.point_ids)).tolist()
-    wrong = [
-        name in first.dropped and (first.dropped[name] in HARMFUL or count >= RAYS)
-        for name, count in zip(block.point_ids, rays, strict=True)
-    ]
-    return np.array(wrong)[block.image_points]
-
-
-def _distorting(block: Block, first: Result | None) -> Bools:
-    """(n,) the control point with the largest test value, if it distorts distant photos.
-
-    Otherwise these would be removed, because few observations test the point.
-    """
-    sizes = {} if first is None else sizes_of_tests(first)
-    worst = max((float(own.max(initial=0.0)) for own in sizes.values()), default=0.0)
-    if first is None or not worst > DISTORTING or sizes["control"].max() < worst:
-        return np.zeros(len(block.point_ids), dtype=bool)
-    return np.asarray(np.arange(len(block.point_ids)) == sizes["control"].max(axis=1).argmax())
-
-
 def _remove(
-    block: Block,
-    suspected: Bools,
-    control: Bools,
-    first: Result | None,
-    adjusted: Adjuster,
-    edited: Edited,
+    block: Block, suspects: Suspects, first: Result | None, adjusted: Adjuster, edited: Edited
 ) -> list[Exchange]:
     """Remove gross errors, and add the findings; return exchanged names instead, if there are any.
 
-    `first` is the adjustment without (m,) suspected images; (n,) `control` is also suspected.
+    `first` is the adjustment without images of suspected points.
     """
-    suspected = suspected | _undetermined(block, first)
+    suspected = suspects.points[block.image_points]
     converged = first if first is not None and first.converged else None
     fits = converged is not None and not any(own.any() for own in outliers(converged).values())
     if fits and not suspected.any():
         return []
-    control = control | _distorting(block, converged)
+    control = suspects.control
+    if converged is not None:
+        sizes = sizes_of_tests(converged)
+        worst = max(float(own.max(initial=0.0)) for own in sizes.values())
+        # Few observations test control at an edge: distant photos that its error distorts would be removed.
+        control = control | ((sizes["control"].max(axis=1) == worst) & (worst > DISTORTING))
     start = Aside(np.flatnonzero(suspected), {}, control=np.flatnonzero(control))
     # The variance of rounding errors would make all of them gross errors.
     rounded = converged is not None and mad_sd(converged.standardized) <= ROUNDING

@@ -65,19 +65,14 @@ def counted_lines(block: Block, adjusted: Adjuster) -> list[Finding]:
         rate = float(np.median(np.asarray(own.lines.table)[:, 2]))
         return replace(own, offset=clocks.setdefault(rate, Clock(f"lines of {rate:g} s")))
 
-    timed = [freed(each) for each in block.timed]
+    timed, found = [freed(each) for each in block.timed], list[Finding]()
     result = adjusted.converged(block.replace(timed=timed)) if clocks else None
-    return [] if result is None else list(_off(result, clocks, timed))
-
-
-def _off(result: Result, clocks: dict[float, Clock], timed: list[Timed]) -> Iterator[Finding]:
-    values = {id(each.given): each for each in result.unknowns}
-    for rate, clock in clocks.items():
-        lines, sd = (
-            float(each[0] / abs(rate)) for each in (values[id(clock)].position, values[id(clock)].sd)
-        )
-        near = any(abs(abs(lines) - half) < NEARLY for half in HALVES)
-        if near and abs(lines) > SIGNIFICANT * sd:
-            names = [each.photo for each in timed if each.offset is clock]
-            message = phrase("check.line-count", photos=names, lines=lines)
-            yield finding("look", message, names, values={"lines": lines, "sd": sd})
+    for own in () if result is None else result.unknowns:
+        for rate, clock in clocks.items():
+            lines, sd = float(own.position[0] / abs(rate)), float(own.sd[0] / abs(rate))
+            near = any(abs(abs(lines) - half) < NEARLY for half in HALVES)
+            if own.given is clock and near and abs(lines) > SIGNIFICANT * sd:
+                names = [each.photo for each in timed if each.offset is clock]
+                message = phrase("check.line-count", photos=names, lines=lines)
+                found.append(finding("look", message, names, values={"lines": lines, "sd": sd}))
+    return found

@@ -15,7 +15,7 @@ from photogram.diagnosis.hypotheses import KAPPA, TURNS
 from photogram.diagnosis.predictions import Predicted
 from photogram.diagnosis.views import View
 from photogram.network.block import Block
-from photogram.network.rays import Intersection, Rays, frame_radius
+from photogram.network.rays import Rays, frame_radius
 from photogram.words import phrase
 
 SUSPICIOUS = 0.25  # Cost of a doubtful orientation (0: rays meet, 1: rays miss)
@@ -71,7 +71,10 @@ def _sides(blocks: list[Block], view: View, explanations: list[Finding], words: 
     several = any(each.kind == "mirrored" and len(each.photos) > 1 for each in explanations)
     gone = _above(rays if several else whole).keys() - _above(after).keys()
     section.findings += [each for name, each in _above(rays).items() if name not in gone] + explanations
-    cost = _mean(np.where(good, _costs(after, met_after), np.nan))
+    sizes, radius = met_after.sizes[good], frame_radius(view.seen) / 2
+    # Residual over half the frame, 1 behind the camera
+    costs = np.where(met_after.in_front[good], np.minimum(sizes / radius, 1), 1.0)[np.isfinite(sizes)]
+    cost = float(costs.mean()) if costs.size else 0.0
     if cost > SUSPICIOUS:
         section.note("grave", "check.rays-do-not-meet", [], [], {"cost": cost}, sense=words.sense)
     known = np.isfinite(met.sizes)
@@ -104,11 +107,6 @@ def _median(values: Floats) -> float:
     return float(np.median(finite)) if finite.size else math.nan
 
 
-def _mean(values: Floats) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if finite.size else 0.0
-
-
 def _above(rays: Rays) -> dict[str, Finding]:
     """Return findings on control points above a camera that looks down, by their names."""
     block, met = rays.block, rays.intersect()
@@ -125,10 +123,3 @@ def _above(rays: Rays) -> dict[str, Finding]:
         )
         findings[name] = finding("grave", message, [photo], [name], values)
     return findings
-
-
-def _costs(rays: Rays, met: Intersection) -> Floats:
-    """(m,) costs of observations: residual over half the frame, 1 behind the camera."""
-    radius = frame_radius(rays.block) / 2
-    costs = np.minimum(met.sizes / radius, 1)
-    return np.where(np.isfinite(met.sizes) & ~met.in_front, 1.0, costs)
