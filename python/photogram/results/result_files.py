@@ -19,8 +19,7 @@ import orjson
 from photogram import _photocore
 from photogram.errors import InputError
 from photogram.io.column_table import NameColumn
-from photogram.io.files import read_bytes
-from photogram.io.json import holding
+from photogram.io.json import holding, read_json
 from photogram.io.parquet import Column, Sheet, packed, parquet_content, read_sheet, unpacked
 from photogram.io.seals import SEAL, check_seal, check_sealed, recorded, seal
 from photogram.io.structure import Decoder, Encoder
@@ -283,10 +282,7 @@ def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any
 def read_summary(folder: Path) -> Mapping[str, Any]:
     """Read the document of a folder; refuse missing, other and later ones."""
     path = folder / SUMMARY
-    try:
-        document = orjson.loads(read_bytes(path))
-    except orjson.JSONDecodeError as error:
-        raise InputError(phrase("error.parse", format="JSON", reason=str(error)), file=path) from None
+    document = read_json(path).value
     if not isinstance(document, dict) or not {"kind", "format", "kept", "tables"} <= document.keys():
         raise InputError(phrase("adjusted.summary"), file=path)
     if document["format"] != FORMAT:
