@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -12,7 +11,7 @@ import numpy as np
 from photogram.arguments.arrays import names, text
 from photogram.arguments.fields import array, check_arrays, check_fields
 from photogram.arguments.objects import path_of
-from photogram.arguments.types import NONE, ZERO, Array, Bools, Floats, OptionalArray
+from photogram.arguments.types import NONE, ZERO, Array, Bools, Floats, Identifiers, OptionalArray
 from photogram.errors import InputError
 from photogram.io.delimited import cells, read_records
 from photogram.io.files import read_lines
@@ -62,7 +61,7 @@ class Stations(Brief):
         finite, a standard deviation is invalid, or a coordinate is exact in both systems.
     """
 
-    ids: Sequence[str]
+    ids: Identifiers
     control: Array = field(metadata=array("stations", 3, missing=True, one_row=True))
     model: Array = field(metadata=array("stations", 3, one_row=True))
     control_sd: Array = field(default=ZERO, kw_only=True, metadata=array("stations", 3, one_row=True))
@@ -101,7 +100,7 @@ class Stations(Brief):
         ]
         weighted = all(name in table for name in MODEL_SD_COLUMNS)
         return cls(
-            table["id"].tolist(),
+            table["id"],
             table[list(CONTROL_COLUMNS)],
             table[list(MODEL_COLUMNS)],
             control_sd=np.column_stack(control_sd) if len(table) else 0.0,

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     BoolArray = Converted[ArrayLike, Bools]
     NamedIndices = Converted[ArrayLike | Sequence[str] | None, Indices | None]
     Names = Converted[Iterable[str | int] | None, list[str]]
+    Identifiers = Converted[Iterable[object], Sequence[str]]
 else:
     Array, OptionalArray, Names, BoolArray = Floats, Floats | None, list[str], Bools
-    IndexArray, NamedIndices = Indices, Indices | None
+    IndexArray, NamedIndices, Identifiers = Indices, Indices | None, Sequence[str]
