@@ -251,7 +251,7 @@ def _markers(block: BlockBuilder, markers: list[Element], system: str | None, de
             continue
         xyz, sd = reference
         if not _enabled(marker):
-            block.check(key, xyz, np.where(sd > 0, sd, np.nan), marker, crs=system)
+            block.control(key, xyz, np.where(sd > 0, sd, np.nan), marker, crs=system, check=True)
         elif not (sd > 0).all():
             raise marker.error(phrase("format.sd", name=name, option=option_sd("control")))
         else:

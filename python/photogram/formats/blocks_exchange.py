@@ -206,8 +206,7 @@ def _control(found: _Reader, element: Element) -> None:
         raise element.error(phrase("format.sd", name=name, option=option_sd("control")))
     found.names.add(name)
     found.block.point(key, element, name=name)
-    add = found.block.check if check else found.block.control
-    add(key, position, sd, element, crs=element.word("SRSId"))
+    found.block.control(key, position, sd, element, crs=element.word("SRSId"), check=check)
     _measurements(found, element)
 
 

@@ -208,26 +208,24 @@ class BlockBuilder:
         self._starts[key] = _Located(place or self.place, xyz, np.zeros(3), crs)
 
     def control(
-        self, key: Hashable, xyz: Floats, sd: ArrayLike, place: Failing | None = None, *, crs: str = ""
-    ) -> None:
-        """Add control: coordinates are NaN if unknown, standard deviations infinite if free."""
-        place = place or self.place
-        if key in self._control or key in self._checks:
-            raise place.error(phrase("format.repeated", what="control point", name=str(key)))
-        self._control[key] = _Located(place, xyz, np.where(np.isnan(xyz), np.inf, sd), crs)
-
-    def check(
         self,
         key: Hashable,
         xyz: Floats,
-        sd: ArrayLike = np.nan,
+        sd: ArrayLike,
         place: Failing | None = None,
         *,
         crs: str = "",
+        check: bool = False,
     ) -> None:
-        """Add a check point; standard deviations are NaN if unknown."""
-        self.control(key, xyz, np.broadcast_to(sd, 3), place, crs=crs)
-        self._checks[key] = self._control.pop(key)
+        """Add control or a check point: unknown coordinates are NaN.
+
+        Standard deviations are infinite if free, those of check points NaN if unknown.
+        """
+        place = place or self.place
+        if key in self._control or key in self._checks:
+            raise place.error(phrase("format.repeated", what="control point", name=str(key)))
+        points = self._checks if check else self._control
+        points[key] = _Located(place, xyz, np.where(np.isnan(xyz), np.inf, sd), crs)
 
     def gnss(
         self, photo: Hashable, xyz: Floats, sd: ArrayLike, place: Failing | None = None, *, crs: str = ""

@@ -100,7 +100,7 @@ class ReducedBuilder(BlockBuilder):
             self.control(name, np.where(used, xyz, np.nan), np.where(used, control, np.inf), place)
         else:
             sd = self.sd.get("check", control)
-            self.check(name, xyz, np.where(np.isfinite(sd), sd, np.nan), place)
+            self.control(name, xyz, np.where(np.isfinite(sd), sd, np.nan), place, check=True)
 
     def reduced_project(self, unit: str) -> Project:
         """Return the project; `unit` is the unit of the image file, for remarks."""

@@ -202,10 +202,8 @@ def take_points(
         content.lacks.append(Phrase("read.held", fields))
     for row, number in enumerate(numbers):
         if wanted(number):
-            if check:
-                content.check(number, positions[row], deviations[row], table.at(row))
-            else:
-                content.control(number, positions[row], np.nan_to_num(deviations[row]), table.at(row))
+            own = deviations[row] if check else np.nan_to_num(deviations[row])
+            content.control(number, positions[row], own, table.at(row), check=check)
 
 
 def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floats:
@@ -362,7 +360,7 @@ def _control(cards: Iterable[Card], content: DbatBuilder, options: ReadOptions) 
         number, position = _number(card, 0), card.numbers(1, "X Y Z")
         sd: Floats = card.numbers(4, "sx sy sz") if given is None else np.broadcast_to(given, 3)
         if (sd < 0).all():
-            content.check(number, position, place=card.place)
+            content.control(number, position, np.nan, card.place, check=True)
             negative += 1
         else:
             content.control(number, position, np.where(sd < 0, np.inf, sd), card.place)
