@@ -222,16 +222,11 @@ def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> boo
     return not alone & set(sensors)
 
 
-def write(project: Project) -> Mapping[str, bytes]:
-    """Return the binary files of a project."""
+def write(kind: str, project: Project) -> Mapping[str, bytes]:
+    """Return the text or binary files of a project."""
     written = _written(project)
-    return {**binary_files(written.model), **names_file(written.points)}
-
-
-def write_as_text(project: Project) -> Mapping[str, bytes]:
-    """Return the text files of a project."""
-    written = _written(project)
-    return {**text_files(written.model), **names_file(written.points)}
+    files = text_files if kind == "text" else binary_files
+    return {**files(written.model), **names_file(written.points)}
 
 
 @dataclass(frozen=True)

@@ -157,13 +157,6 @@ class Images:
     used: Bools | None = None
 
 
-def read_images(tables: Tables, photos: Photos) -> Images:
-    """Read the table of images; raises the errors of :func:`read`."""
-    table = tables.read("images")
-    assert table is not None
-    return images_of(tables, table, photos)
-
-
 def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
     """Return the image observations of the table of images, or of a batch."""
     if "camera" in table and "photos" in tables.settings.tables:

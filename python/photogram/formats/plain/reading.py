@@ -22,8 +22,8 @@ from photogram.formats.plain.photos import (
     Images,
     Photos,
     image_coordinates,
+    images_of,
     mounted_halves,
-    read_images,
     read_photos,
     with_seams,
 )
@@ -90,7 +90,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     geographic = transform.frame.kind == "geographic"
     spheroid = Spheroid(*transform.frame.ellipsoid) if geographic else None
     photos = placed(photos, timed, spheroid)
-    images = read_images(tables, photos)
+    images = images_of(tables, tables.rows("images"), photos)
     block = BlockBuilder(settings.path, "plain project")
     places, control_rows, known = _add_points(block, tables, transform, images, given)
     scanned = read_scanned(tables, images, known, photos, cameras, covariances)

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.errors import InputError, message_of
 from photogram.formats.plain.schema import ENDS, TABLES
-from photogram.formats.plain.tables import Tables, columns_of_records, indices_of
+from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.toml import TomlFile
 from photogram.messages import counted, unknown_name
@@ -60,13 +60,6 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
         # Each value was checked with its line: the combination is only rejected without lengths.
         raise TomlFile(path).error("standards", message_of(error), "statement") from None
     return found
-
-
-def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the columns of the table of lengths."""
-    return columns_of_records(
-        {name: each.get(name) for name in TABLES["lengths"].columns} for each in lengths
-    )
 
 
 def with_cover(

@@ -16,9 +16,9 @@ from photogram.formats.plain.cameras import Exposure, exposure_cells, knots_tabl
 from photogram.formats.plain.films import WrittenFilms
 from photogram.formats.plain.observations import observation_tables
 from photogram.formats.plain.rigs import Rigs, line_times_table, moving_columns
-from photogram.formats.plain.schema import AXES, OPK, deviation_columns
+from photogram.formats.plain.schema import AXES, OPK, TABLES, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings, asked_files, key_tables
-from photogram.formats.plain.statement_tables import COVERS, lengths_table
+from photogram.formats.plain.statement_tables import COVERS
 from photogram.formats.plain.tables import (
     columns_of,
     columns_of_records,
@@ -88,7 +88,10 @@ def write(project: Project) -> Mapping[str, bytes]:
         **covariance_tables(block, cameras, rigs.title, films.covariances()),
         "boards": boards_table(project.boards, block, project.details.get(REGULARISED)),
         "knots": knots_table(cameras),
-        "lengths": lengths_table(project.statement.get("lengths", ())),
+        "lengths": columns_of_records(
+            {name: each.get(name) for name in TABLES["lengths"].columns}
+            for each in project.statement.get("lengths", ())
+        ),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}
     settings = _settings(project, image_y, films).encode()
