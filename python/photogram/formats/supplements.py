@@ -52,7 +52,10 @@ def supplemented(project: Project, options: ReadOptions) -> Project:
     if options.keep_repeated:
         project = with_repeated(project)
     if options.images is not None:
-        project = with_images(project, options.images, options.pixel_origin)
+        messages = list(project.messages)
+        table = pixel_table(options.images, messages)
+        project = _with_table(project, options.images, table, options.pixel_origin)
+        project = project.replace(messages=tuple(messages))
     if options.names is not None:
         project = with_names(project, options.names)
     if options.control is not None:
@@ -206,13 +209,6 @@ def held_points(project: Project, wanted: Sequence[str]) -> Project:
             raise InputError(phrase("plain.hold-unknown", point=name))
         places[row, columns], sd[row, columns] = known[row, columns], 0.0
     return project.replace(block=block.replace(point_positions=places, point_sd=sd))
-
-
-def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
-    """Return a project with more image observations, in pixels."""
-    messages: list[Message] = []
-    found = _with_table(project, path, pixel_table(path, messages), pixel_origin)
-    return found.replace(messages=(*found.messages, *messages))
 
 
 def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: str | None) -> Project:
