@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from photogram import adjust
+from photogram import Distance, adjust
 from photogram.network import Attitude, rotation_matrix
 from test_hypotheses import GOLDEN, block_of
 
@@ -20,7 +20,7 @@ CATALOGUE = frozenset(
         *("lever-arm", "boresight", "camera-f", "camera-point", "camera-term", "readout-time", "scale"),
         *("bending", "observation", "gnss-next", "gnss-previous", "camera-affinity", "camera-f-strip"),
         *("camera-f-half", "camera-exchanged", "control-bending", "readout-time-columns", "photo"),
-        "gnss-half",
+        *("gnss-half", "object-point", "distance-scale"),
     }
 )
 """Codes of all hypotheses that the golden network with observed attitudes permits."""
@@ -43,6 +43,9 @@ def surveyed(rng, photos, points):
     control = np.where(np.isfinite(block.point_positions), places, np.nan)
     attitudes = rotation_matrix(found.photo_attitudes)
     length = float(np.linalg.norm(np.diff(places[pair], axis=0)))
+    # A second distance from the same target.
+    ends = [pair[0], GOLDEN["control_points"][0]]
+    second = [ends] if np.isin([*pair, *ends], of_points[chosen]).all() else []
 
     def noise(of, kind):
         return rng.normal(size=np.shape(of)) * sd[kind]
@@ -61,6 +64,14 @@ def surveyed(rng, photos, points):
                 *(
                     Attitude(name, matrix.T @ turn, ATTITUDE_SD)
                     for name, matrix, turn in zip(block.photo_ids, attitudes, turns, strict=True)
+                ),
+                *(
+                    Distance(
+                        *(block.point_ids[end] for end in own),
+                        np.linalg.norm(places[own[0]] - places[own[1]]) + noise(0.0, "distance"),
+                        sd["distance"],
+                    )
+                    for own in second
                 ),
             ],
         )
