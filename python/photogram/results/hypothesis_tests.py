@@ -156,7 +156,7 @@ def shifted_photos(suspects: NamedSuspects, tests: Tests) -> list[int]:
         relative = np.bincount(photos, residuals, minlength=count) ** 2 / numbers
         squares += MEDIAN * relative / max(float(np.median(relative)), np.finfo(float).tiny)
     largest = np.argsort(-squares, kind="stable")[:MOST_PHOTOS]
-    return np.sort(largest[squares[largest] > NOTABLE + 4 * math.log(count)]).tolist()
+    return sorted(int(photo) for photo in largest if squares[photo] > NOTABLE + 4 * math.log(count))
 
 
 def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:
