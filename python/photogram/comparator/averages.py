@@ -1,4 +1,16 @@
-"""Average residuals (subroutine AVGRES), and the grid standard deviation from them (equation 64)."""
+"""Average residuals (subroutine AVGRES), and the grid standard deviation from them (equation 64).
+
+Its unbiased form needs the residual effects of errors: traces of products with the reduction R, in linear
+memory. With polynomials, the stages of the report are rigid and linear parameters, polynomials, and rigid parameters
+again. This gives
+
+    R = (I - P) (I - B B^T) (I - P - L L^T) = I - P - U W^T.
+
+P projects on rotation and translations of every case (three columns on the rows of one case each). L contains
+the linear parameters without their projection by P, B the polynomials (both orthonormal). Further, U = [L, (I
+- P) B], W = [L, (I - P - L L^T) B] and P U = P W = 0. Sums of squares require only small products of U, W and
+the errors of the grid.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Difference of two calibrations as arrays, and its test against the uncertainties."""
+"""Difference of two calibrations as arrays, and its test against the uncertainties.
+
+With the rays r_a of camera a at pixels q and the motion T of the axes,  d(q) = f_b(T d r_a(q)) - q.
+"""
 
 from __future__ import annotations
 
