@@ -1,8 +1,8 @@
 """Average residuals (subroutine AVGRES), and the grid standard deviation from them (equation 64).
 
 Its unbiased form needs the residual effects of errors: traces of products with the reduction R, in linear
-memory. With polynomials, the stages of the report are rigid and linear parameters, polynomials, and rigid parameters
-again. This gives
+memory. With polynomials, the stages of the report are rigid and linear parameters, polynomials, and rigid
+parameters again. This gives
 
     R = (I - P) (I - B B^T) (I - P - L L^T) = I - P - U W^T.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.giant.common import Common
-from photogram.giant.contents import Contents
 from photogram.giant.frames import ATTITUDE_SD, Frame
 from photogram.giant.ground import GroundPoint
 from photogram.giant.images import IMAGE_SD, ImageFrame
@@ -24,6 +23,9 @@ from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.structuring import FEWEST_TIES, structure, ties
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram.giant import Project
 
 EARTH_RADIUS = 6.371e6  # Metres
 FALSE_ORIGIN = 1e5  # Map projections have a false origin farther away; local systems seldom do
@@ -90,7 +92,7 @@ def _map_projection(block: Block) -> list[Message]:
 LONGEST_METRES = 1e7  # Largest semi-major axis in metres; in feet all are larger
 
 
-def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, list[Message]]:
+def assemble(project: Project, limits: Limits | None = None) -> tuple[Block, list[Message]]:
     """Return the block of a project, and remarks on omitted and doubtful data.
 
     Photos are in the order of FRAMES, points in the order of their first image.
@@ -153,7 +155,7 @@ def job_refraction(common: Common, **changes: Any) -> Refraction | None:
     return Refraction(**own) if own["water"] is not None else Refraction(own["air"])
 
 
-def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:
+def _photos(project: Project, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:
     """Pair FRAMES with IMAGES; other images are skipped silently."""
     listed = {frame.name for frame in project.frames}
     measured: dict[str, ImageFrame] = {}
@@ -182,7 +184,7 @@ def _lost_header(images: list[ImageFrame], name: str) -> Phrase | str:
     return ""
 
 
-def _principal_distances(project: Contents, images: list[ImageFrame]) -> Floats:
+def _principal_distances(project: Project, images: list[ImageFrame]) -> Floats:
     cameras = {camera.name: camera.principal_distance for camera in project.cameras}
     for each in images:
         if not each.principal_distance and each.camera not in cameras:
@@ -211,7 +213,7 @@ def _first_images(
 
 
 def _control(
-    project: Contents, index: dict[str, int], messages: list[Message]
+    project: Project, index: dict[str, int], messages: list[Message]
 ) -> tuple[Floats, Floats, Floats | None]:
     """Return positions and standard deviations of all points, from GROUND if present.
 

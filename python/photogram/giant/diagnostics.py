@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.giant.contents import Contents
 from photogram.giant.limits import Limits
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
+
+if TYPE_CHECKING:
+    from photogram.giant import Project
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class ErrorWarning:
     general: bool = False
 
 
-def error_warnings(project: Contents, block: Block, limits: Limits | None = None) -> list[ErrorWarning]:
+def error_warnings(project: Project, block: Block, limits: Limits | None = None) -> list[ErrorWarning]:
     """Return the warnings of section III of the guide, in its order.
 
     A control point on one photograph that loses its control is listed there only, not with the pass points.
@@ -67,7 +70,7 @@ def error_warnings(project: Contents, block: Block, limits: Limits | None = None
     return [warning for warning in warnings if warning.names]
 
 
-def _on_more_photos(project: Contents, block: Block, limit: int) -> list[str]:
+def _on_more_photos(project: Project, block: Block, limit: int) -> list[str]:
     """Return the points with more than `limit` images, before the limit was applied."""
     photos = set(block.photo_ids)
     rays: Counter[str] = Counter()
@@ -77,7 +80,7 @@ def _on_more_photos(project: Contents, block: Block, limit: int) -> list[str]:
     return [name for name in block.point_ids if rays[name] > limit]
 
 
-def _repeated(project: Contents) -> list[str]:
+def _repeated(project: Project) -> list[str]:
     """Return the points with several records in GROUND."""
     records: Counter[str] = Counter()
     for point in project.ground:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.common import Common
-from photogram.giant.contents import Contents
 from photogram.giant.fields import printed_order
 from photogram.giant.files import written
 from photogram.giant.frames import Camera, Frame, frame_records
@@ -22,6 +22,9 @@ from photogram.messages import Message
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.giant import Project
 
 Triple = tuple[float, float, float]
 
@@ -146,7 +149,7 @@ def _triple(values: Floats) -> Triple:
     return first, second, third
 
 
-def adjusted_frames(project: Contents, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
+def adjusted_frames(project: Project, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
     """Return stations for units 8 and 20: adjusted values (P, 3), input sd."""
     turned = _turns(attitudes)
     rows = {name: row for row, name in enumerate(block.photo_ids)}
@@ -161,7 +164,7 @@ def adjusted_frames(project: Contents, block: Block, positions: Floats, attitude
 
 
 def adjusted_ground(
-    project: Contents, block: Block, positions: Floats, *, as_published: bool = False
+    project: Project, block: Block, positions: Floats, *, as_published: bool = False
 ) -> list[GroundPoint]:
     """Return the points for unit 9: all on two or more photographs.
 
@@ -187,7 +190,7 @@ def adjusted_ground(
 
 
 def adjusted_records(
-    project: Contents,
+    project: Project,
     block: Block,
     *,
     photo_positions: Floats,

@@ -15,7 +15,7 @@ from photogram.messages import Message
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram.giant.contents import Contents
+    from photogram.giant import Project
     from photogram.giant.frames import Frame
     from photogram.giant.ground import GroundPoint
     from photogram.network.structuring import Structure
@@ -87,7 +87,7 @@ class Limits:
         return cls(**values)
 
 
-def check_files(project: Contents, limits: Limits) -> None:
+def check_files(project: Project, limits: Limits) -> None:
     """Reject more stations, control or cameras than the limits allow."""
     control = sum(1 + point.repeats for point in project.ground)
     _check("CAMERA STATIONS", project.frames, len(project.frames), limits.stations)

@@ -1,6 +1,7 @@
 """Matching of star images to catalogue stars from an approximate attitude and camera, with odds.
 
 Odds are probabilities of chance matches (cf. D. Lang et al., Astron. J. 139, 2010).
+
 For a wrong hypothesis of the attitude, the number of stars in the tolerance area of an image is Poisson. Its
 mean is mu = density x area, so an image matches with p = 1 - exp(-mu). h of n images define the hypothesis
 and match by construction. The probability that at least k images match one to one is P(Bin(n - h, p) >= k -

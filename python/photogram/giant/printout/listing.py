@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools
-from photogram.giant.contents import Contents
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.fields import printed_order
 from photogram.giant.limits import Limits
@@ -24,6 +24,9 @@ from photogram.giant.printout.results import (
 from photogram.network.block import Block
 from photogram.results.result import Result
 
+if TYPE_CHECKING:
+    from photogram.giant import Project
+
 NOTICES = {
     "converged": "",
     "not converged": "SOLUTION HAS NOT CONVERGED",
@@ -32,7 +35,7 @@ NOTICES = {
 
 
 def listing(
-    project: Contents,
+    project: Project,
     block: Block,
     result: Result,
     *,
@@ -84,7 +87,7 @@ def listing(
     return printout(block.title, pages)
 
 
-def _input_pages(project: Contents, block: Block, space: Space) -> Iterator[Page]:
+def _input_pages(project: Project, block: Block, space: Space) -> Iterator[Page]:
     common = project.common
     if common.list_input_stations or common.list_input_images:
         images = {frame.name: frame for frame in reversed(project.images)}
@@ -110,7 +113,7 @@ def _input_pages(project: Contents, block: Block, space: Space) -> Iterator[Page
 
 
 def _result_pages(
-    project: Contents, block: Block, result: Result, space: Space, as_published: bool
+    project: Project, block: Block, result: Result, space: Space, as_published: bool
 ) -> Iterator[Page]:
     common = project.common
     freedom = result.degrees_of_freedom
@@ -150,7 +153,7 @@ def _residuals(block: Block, result: Result) -> Iterator[PointResiduals]:
         yield PointResiduals(block.point_ids[point], frames, result.residuals[rows])
 
 
-def _points(project: Contents, block: Block, result: Result, space: Space, propagated: bool) -> list[Page]:
+def _points(project: Project, block: Block, result: Result, space: Space, propagated: bool) -> list[Page]:
     rows = np.flatnonzero(result.used_points).tolist()
     if project.common.sort_points:
         rows.sort(key=lambda row: printed_order(block.point_ids[row]))
@@ -163,7 +166,7 @@ def _points(project: Contents, block: Block, result: Result, space: Space, propa
 
 
 def _corrections(
-    project: Contents, block: Block, result: Result, space: Space, as_published: bool
+    project: Project, block: Block, result: Result, space: Space, as_published: bool
 ) -> list[Page]:
     index = {block.point_ids[row]: row for row in np.flatnonzero(result.used_points).tolist()}
     names = list(dict.fromkeys(point.name for point in project.ground if point.name in index))
