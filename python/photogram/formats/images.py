@@ -73,7 +73,7 @@ def pixel_rows(project: Project) -> Iterator[tuple[int, int, float, float]]:
 def named_pixels(project: Project) -> Iterator[tuple[str, str, float, float]]:
     """Yield names of photo and point, column and row of image observations as :func:`to_corner`."""
     photos, points = project.block.photo_ids, project.block.point_ids
-    return ((photos[photo], points[point], *xy) for photo, point, *xy in pixel_rows(project))
+    return ((photos[photo], points[point], x, y) for photo, point, x, y in pixel_rows(project))
 
 
 def known_size(camera: Camera, size: Size | None) -> Size:
