@@ -19,7 +19,6 @@ from photogram.formats.dbat.tables import (
     take_poses,
     titled,
     untitled,
-    whole_numbers,
 )
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
@@ -307,14 +306,14 @@ def read_measurements(path: Path, options: ReadOptions) -> DbatBuilder:
         raise InputError(phrase("format.camera-column", n=len(content.cameras)), file=path)
     table = titled(path)
     table.require("im")
-    for photo in sorted(set(whole_numbers(table, "im"))):
+    for photo in sorted(set(table.wholes("im").tolist())):
         content.numbered_photo(photo, str(photo), camera, content.place)
     take_images(table, content)
     beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
     if path.name.endswith(MEASURED) and beside.is_file():
         table = titled(beside)
         table.require("id", "x", "y", "z")
-        starts = zip(whole_numbers(table, "id"), table.given(("x", "y", "z")), strict=True)
+        starts = zip(table.wholes("id").tolist(), table.given(("x", "y", "z")), strict=True)
         for row, (number, xyz) in enumerate(starts):
             content.start(number, xyz, table.at(row))
     return content

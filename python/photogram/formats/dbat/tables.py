@@ -25,7 +25,6 @@ from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import NAMELESS, read_columns, read_rows
 from photogram.io.files import read_beginning, read_lines
-from photogram.io.numbers import whole_number
 from photogram.io.places import Failing, Place, at_place, image_size, one_word, positive
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -147,17 +146,6 @@ def untitled(path: Path, columns: Sequence[str]) -> ColumnTable:
     return read_rows(path, _spelled([column.strip().lower() for column in columns]), numbers=_NUMBERS)
 
 
-def whole_numbers(table: ColumnTable, column: str) -> list[int]:
-    """Return a column of integers."""
-    found, known = [], dict[str, int]()
-    for row, text in enumerate(table.texts(column)):
-        if text not in known:
-            with at_place(table.at(row), column):
-                known[text] = whole_number(text, highest=2**53)
-        found.append(known[text])
-    return found
-
-
 def take_photos(table: ColumnTable, content: DbatBuilder) -> None:
     """Add photos: numbers, paths and cameras; without camera column the only camera."""
     table.require("id", "path")
@@ -165,7 +153,7 @@ def take_photos(table: ColumnTable, content: DbatBuilder) -> None:
     if "cam" not in table and len(known) > 1:
         raise table.head.error(phrase("format.camera-column", n=len(known)))
     cameras = table.texts("cam", known[0] if len(known) == 1 else "")
-    rows = zip(whole_numbers(table, "id"), table.texts("path"), cameras, strict=True)
+    rows = zip(table.wholes("id").tolist(), table.texts("path"), cameras, strict=True)
     for row, (number, path, camera) in enumerate(rows):
         content.numbered_photo(number, path, camera, table.at(row))
 
@@ -176,7 +164,7 @@ def take_poses(table: ColumnTable, content: DbatBuilder, unit: str = "degrees") 
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
     angles = table.given(("omega", "phi", "kappa")) * _RADIANS[unit]
     matrices = Attitudes.of("omega_phi_kappa", angles).matrices
-    poses = zip(whole_numbers(table, "id"), table.given(("x", "y", "z")), matrices, strict=True)
+    poses = zip(table.wholes("id").tolist(), table.given(("x", "y", "z")), matrices, strict=True)
     for row, (number, centre, matrix) in enumerate(poses):
         if number not in content.photo_rows:
             raise table.error(row, phrase("format.undefined", what="photo", name=str(number)))
@@ -193,7 +181,7 @@ def take_points(
 ) -> None:
     """Add control or check points; `sd` replaces their standard deviations."""
     table.require("id", "x", "y", "z")
-    numbers, positions = whole_numbers(table, "id"), table.given(("x", "y", "z"))
+    numbers, positions = table.wholes("id").tolist(), table.given(("x", "y", "z"))
     deviations = _deviations(table, ("sx", "sy", "sz"), "sxyz")
     if sd is not None:
         deviations = np.broadcast_to(sd, deviations.shape)
@@ -227,7 +215,7 @@ def take_images(table: ColumnTable, content: DbatBuilder, sd: float = math.nan) 
     own = np.where(np.isnan(own), sd, own)
     for row in np.argwhere(own == 0)[:, 0].tolist():
         positive(table.at(row), "the standard deviation", 0)
-    photos, points = whole_numbers(table, "im"), whole_numbers(table, "id")
+    photos, points = table.wholes("im").tolist(), table.wholes("id").tolist()
     rows = zip(photos, points, table.given(("x", "y")).tolist(), own, strict=True)
     for row, (photo, point, (x, y), deviations) in enumerate(rows):
         content.image(photo, point, x, y, table.at(row), sd=deviations)
