@@ -21,15 +21,14 @@ from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.network.films import Scan
 from photogram.network.geometry import (
+    Cartesian,
     Spheroid,
-    geocentric_to_geographic,
-    geographic_to_geocentric,
     lengths_of_units,
     local_frames,
 )
 from photogram.network.motion import on_shared, scanners
 from photogram.network.observations import Control, Position
-from photogram.network.rays import meet_rays
+from photogram.network.rays import LocalAxes, meet_rays
 from photogram.network.subset import kept_images
 from photogram.words import Phrase, phrase
 
@@ -297,15 +296,12 @@ def in_topocentric(project: Project) -> Project:
     refuse_trajectories(block, "a topocentric frame")
     refuse_passages(block, "a topocentric frame")
     origin, spheroid = _origin(block), block.spheroid
-    axes = local_frames(origin)[0]
-    middle = geographic_to_geocentric(origin, spheroid)[0]
-
-    def carried(positions: Floats) -> Floats:
-        return np.asarray((geographic_to_geocentric(positions, spheroid) - middle) @ axes.T)
+    local = LocalAxes(block, Cartesian(spheroid).positions(origin)[0], local_frames(origin)[0])
+    carried = local.positions
 
     def turned(positions: Floats, attitudes: Floats) -> Floats:
-        local = axes @ local_frames(positions).transpose(0, 2, 1)
-        matrices = local @ attitude_matrices(block.replace(photo_attitudes=attitudes))
+        turns = local.frame @ local_frames(positions).transpose(0, 2, 1)
+        matrices = turns @ attitude_matrices(block.replace(photo_attitudes=attitudes))
         return known_angles(angles_form(block.photo_to_ground), matrices)
 
     photos = block.photo_positions
@@ -330,18 +326,14 @@ def in_topocentric(project: Project) -> Project:
     whole = block.point_positions[some]
     partly = np.flatnonzero(~given[some].all(axis=1))
     if len(partly):
-        meet = intersected(rectangular, some[partly]) @ axes + middle
-        near = geocentric_to_geographic(np.where(np.isfinite(meet), meet, middle), spheroid)
+        meet = intersected(rectangular, some[partly])
+        near = local.from_local(np.where(np.isfinite(meet), meet, 0.0))
         whole[partly] = np.where(given[some[partly]], whole[partly], near)
     positions, sd = made.point_positions.copy(), made.point_sd.copy()
     positions[some] = np.where(given[some], carried(whole), np.nan)
     sd[some] = block.point_sd[some] * lengths_of_units(whole, spheroid)
-    starts = np.array(project.starts)
-    there = np.isfinite(starts).all(axis=1)
-    starts[there] = carried(starts[there])
-    starts[~there] = np.nan
     block_made = rectangular.block.replace(point_positions=positions, point_sd=sd)
-    return rectangular.replace(block=block_made, starts=starts)
+    return rectangular.replace(block=block_made, starts=carried(project.starts))
 
 
 def topocentric_remarks(project: Project) -> list[Phrase | str]:
