@@ -280,13 +280,15 @@ class Hypotheses:
     def _is_significant(self, row: int) -> bool:
         """Whether the test of a set rejects, and its error has a plausible size or explains nearly all.
 
-        Errors without a plausible size are the terms of distortion, which have a level together.
+        Errors without a plausible size (terms of distortion, targets) have a level together, as photos have.
         """
         plausible, level = self.sets[row]["plausible"], DETECTION[0]
         sizes = np.abs(self.estimate[row, : len(plausible)]) / plausible
         least = ABSURD_PART if (sizes > ABSURD).any() else 0.0
         if not plausible:
             level, least = level / sum(not each["plausible"] for each in self.sets), UNKNOWN_PART
+        if self.code[row] == "photo":
+            level /= len(self.suspects.given.photo_ids)
         return bool(self.probability[row] < level and self.statistic[row] >= least * self.excess)
 
     def odds(self, rivals: float = -math.inf) -> float:
