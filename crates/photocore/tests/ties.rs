@@ -336,8 +336,9 @@ fn excluded_observations_may_not_be_finite() {
         let found = adjust(&problem, &Options { method, loss, ..options() }, &threads, &mut go).unwrap();
         let (values, held) = (found.unknowns.clone(), found.datum.clone());
         let leverages = Leverages::at(&problem, values, held, &threads, &mut go).unwrap();
-        let of_point =
-            leverages.of_locals(&problem, &problem.observation_sd, &[1], |_| vec![], &threads).unwrap();
+        let of_point = leverages
+            .of_locals(&problem, (&problem.observation_sd, None), &[1], (|_| vec![], None), &threads)
+            .unwrap();
         (found, leverages.sum_of_squares(&problem), of_point[0].equations.clone())
     };
     for (method, loss) in [
@@ -419,7 +420,7 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
     let linearized = Linearized::form(&problem, None, values, held, &threads, &mut go_on).unwrap();
     let solved = linearized.solve_for(&problem, &rows.concat(), &threads, &mut go_on).unwrap();
     let sd = &problem.observation_sd;
-    let found = leverages.of_locals(&problem, sd, &[local, 0], |_| vec![], &threads).unwrap();
+    let found = leverages.of_locals(&problem, (sd, None), &[local, 0], (|_| vec![], None), &threads).unwrap();
     let blocks: Vec<Vec<f64>> = found.into_iter().map(|own| own.equations).collect();
     assert_eq!(blocks.len(), 2);
     for (k, value) in blocks[0].iter().enumerate() {

@@ -16,12 +16,11 @@ use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
 use super::walk::Buffers;
 use crate::normals::{
-    Cofactors, FactorOptions, Function, InvertOptions, Layout, LayoutError, LocalCofactors, Prior,
+    Cofactors, FactorOptions, Function, InvertOptions, Layout, LayoutError, Prior, RowCofactors,
     SelectedInverse,
 };
 use crate::{Threads, parallel};
 use faer::Mat;
-use nalgebra::DMatrix;
 
 /// Problem at adjusted values, with all cofactors inside the pattern of its normal equations.
 #[derive(Debug)]
@@ -36,30 +35,6 @@ pub struct Leverages {
     pub cofactors: Cofactors,
     selected: SelectedInverse,
     linearized: Option<Linearized>,
-}
-
-/// Cofactors of some equations a, included or excluded.
-#[derive(Debug, Clone)]
-pub struct RowCofactors {
-    /// Leverage matrix a Q a^T, row by row.
-    pub equations: Vec<f64>,
-    /// Q a^T for each block of the equations, one vector over its unknowns per equation; None for the local block.
-    pub blocks: Vec<(Option<usize>, Vec<f64>)>,
-}
-
-impl RowCofactors {
-    /// Selects some equations of a local block.
-    pub fn of_local(all: &LocalCofactors, rows: Range<usize>) -> Self {
-        let count = all.rows();
-        let some = |values: &[f64]| {
-            let width = values.len() / count;
-            values[rows.start * width..rows.end * width].to_vec()
-        };
-        let equations = rows.clone().flat_map(|i| all.equations[i * count..][rows.clone()].iter().copied());
-        let others = all.others.iter().map(|(block, values)| (Some(*block), some(values)));
-        let blocks = std::iter::once((None, some(&all.local))).chain(others).collect();
-        Self { equations: equations.collect(), blocks }
-    }
 }
 
 impl Leverages {
@@ -127,51 +102,49 @@ impl Leverages {
         problem.counts(&self.held).degrees_of_freedom() - out as i64
     }
 
-    /// Returns the cofactors of all equations of some local blocks, for given standard deviations. `terms` returns the prior equations of
-    /// the weighted unknowns of a block.
+    /// Returns the cofactors of all equations of some local blocks, from the selected inverse: a solution with the factor for each equation
+    /// would cost several times as much.
+    ///
+    /// * `observation_sd`: standard deviations of the observations;
+    /// * `included`: standard deviations of the unknowns, if excluded blocks are treated as included ones;
+    /// * `terms`: prior equations of the weighted unknowns of a block, in unit weight;
+    /// * `limit`: if given, cofactors between groups of fixed local blocks are added, which are outside the pattern of the normal equations.
+    ///   They remain NaN if all possible correlations are below this limit.
     ///
     /// # Errors
-    /// The problem has another layout.
+    /// The problem has another layout; an interruption or lack of memory.
     pub fn of_locals(
         &self,
         problem: &AnyProblem<'_>,
-        observation_sd: &[f64],
+        (observation_sd, included): (&[f64], Option<&[f64]>),
         locals: &[usize],
-        terms: impl Fn(usize) -> Vec<Function> + Sync,
+        (terms, limit): (impl Fn(usize) -> Vec<Function> + Sync, Option<f64>),
         threads: &Threads,
-    ) -> Result<Vec<LocalCofactors>, AdjustError> {
-        let (formed, prior) = (self.equations(problem, threads), self.prior(problem));
-        let same = std::ptr::eq(observation_sd, &problem.observation_sd[..]);
-        let other = (!same).then(|| self.equations(problem, threads).with_deviations(observation_sd));
+    ) -> Result<Vec<RowCofactors>, AdjustError> {
+        let mut asked = self.equations(problem, threads).with_deviations(observation_sd);
+        let mut prior = self.prior(problem);
+        if let Some(sd) = included {
+            let unknowns = || locals.iter().flat_map(|&local| problem.layout().local_range(local));
+            for unknown in unknowns() {
+                let own = sd[unknown];
+                prior.weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
+            }
+            asked = asked.with_unknowns(unknowns(), sd);
+        }
+        let same = included.is_some() || std::ptr::eq(observation_sd, &problem.observation_sd[..]);
+        let others = (!same).then(|| self.equations(problem, threads));
         let of = |&local: &usize| {
-            let (of_groups, of_ties) = rows_of_local(&formed, local);
-            let mut rows =
-                other.as_ref().map_or_else(|| of_groups.clone(), |asked| rows_of_local(asked, local).0);
-            rows.extend(terms(local));
-            let formed = [of_groups, of_ties].concat();
+            let (of_groups, of_ties) = rows_of_local(&asked, local);
+            let rows = [of_groups.clone(), terms(local)].concat();
+            let formed = others.as_ref().map_or((of_groups, of_ties), |formed| rows_of_local(formed, local));
+            let formed = [formed.0, formed.1].concat();
             problem.system.local_cofactors(&self.selected, (&formed, &prior), &rows, local)
         };
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
-        Ok(found.into_iter().collect::<Result<_, _>>()?)
-    }
-
-    /// Returns the cofactors as [`Self::of_locals`], including cofactors between groups of fixed local blocks, which are outside the
-    /// pattern of the normal equations.
-    ///
-    /// * `limit`: cofactors of groups with all possible correlations below this limit are NaN.
-    ///
-    /// # Errors
-    /// Interruption or lack of memory.
-    pub fn of_locals_together(
-        &self,
-        problem: &AnyProblem<'_>,
-        observation_sd: &[f64],
-        locals: &[usize],
-        (terms, limit): (impl Fn(usize) -> Vec<Function> + Sync, f64),
-        threads: &Threads,
-    ) -> Result<Vec<LocalCofactors>, AdjustError> {
-        let mut found = self.of_locals(problem, observation_sd, locals, terms, threads)?;
-        self.put_together(problem, observation_sd, (locals, limit), &mut found, threads)?;
+        let mut found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
+        if let Some(limit) = limit {
+            self.put_together(problem, observation_sd, (locals, limit), &mut found, threads)?;
+        }
         Ok(found)
     }
 
@@ -181,7 +154,7 @@ impl Leverages {
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         (locals, limit): (&[usize], f64),
-        found: &mut [LocalCofactors],
+        found: &mut [RowCofactors],
         threads: &Threads,
     ) -> Result<(), AdjustError> {
         let layout = problem.layout();
@@ -215,54 +188,6 @@ impl Leverages {
         Ok(())
     }
 
-    /// Returns the residual cofactor matrix P that all equations of excluded local blocks would have if they were included.
-    ///
-    /// With predicted cofactors C = I + b Q b^T and the coefficients a of the local block, P = C^-1 - C^-1 a^T (a C^-1 a^T)^-1 a C^-1. P l
-    /// are residuals of unit weight and P their cofactors, as R for included observations. It is computed as (I + a' Q a'^T - H)^-1 - H. H
-    /// is the leverage matrix of the local block alone, Q the cofactor matrix of the others.
-    ///
-    /// * `observation_sd`, `sd`: standard deviations if included;
-    /// * `terms`: prior equations of the weighted unknowns of each block, in unit weight.
-    ///
-    /// Empty if the local block would be undetermined.
-    ///
-    /// # Errors
-    /// Interruption or lack of memory.
-    pub fn of_gone(
-        &self,
-        problem: &AnyProblem<'_>,
-        (observation_sd, sd): (&[f64], &[f64]),
-        locals: &[usize],
-        terms: impl Fn(usize) -> Vec<Function> + Sync,
-        threads: &Threads,
-    ) -> Result<Vec<Vec<f64>>, AdjustError> {
-        let layout = problem.layout();
-        let unknowns = || locals.iter().flat_map(|&local| layout.local_range(local));
-        let asked = self.equations(problem, threads).with_deviations(observation_sd);
-        let (asked, mut prior) = (asked.with_unknowns(unknowns(), sd), self.prior(problem));
-        for unknown in unknowns() {
-            let own = sd[unknown];
-            prior.weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
-        }
-        let of = |&local: &usize| {
-            let (of_groups, of_ties) = rows_of_local(&asked, local);
-            let rows = [of_groups.clone(), terms(local)].concat();
-            let formed = [of_groups, of_ties].concat();
-            problem.system.local_cofactors(&self.selected, (&formed, &prior), &rows, local)
-        };
-        let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
-        let mut found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
-        self.put_together(problem, observation_sd, (locals, 0.0), &mut found, threads)?;
-        let shown = |own: &LocalCofactors| {
-            let rows = own.rows();
-            let alone = DMatrix::from_row_slice(rows, rows, &own.by_local);
-            let all = DMatrix::from_row_slice(rows, rows, &own.equations);
-            let factor = (DMatrix::identity(rows, rows) + all - &alone).cholesky();
-            factor.map_or(vec![], |factor| (factor.inverse() - alone).as_slice().to_vec())
-        };
-        Ok(threads.install(|| parallel::map(found.len(), 1, |k| shown(&found[k]))))
-    }
-
     /// Returns the equations of some ties as functions of the unknowns, for given standard deviations.
     pub fn rows_of_ties(
         &self,
@@ -284,7 +209,8 @@ impl Leverages {
         ties.iter().map(&mut of_tie).collect()
     }
 
-    /// Returns the cofactors of functions of one local block, or of retained blocks.
+    /// Returns the cofactors of functions of one local block, or of retained blocks, which need no equations: the selected inverse contains
+    /// them.
     ///
     /// # Errors
     /// Pairs of retained blocks outside the pattern of the normal equations.
@@ -322,6 +248,7 @@ impl Leverages {
             )
         };
         Ok(RowCofactors {
+            by_local: vec![],
             blocks: blocks.into_iter().map(&mut of_block).collect(),
             equations: (0..rows.len().pow(2)).map(|k| leverages[(k / rows.len(), k % rows.len())]).collect(),
         })
@@ -348,7 +275,7 @@ fn rows_of_local(equations: &ObservationEquations<'_>, local: usize) -> (Vec<Fun
 }
 
 /// Returns the rows of groups of a fixed local block whose residuals may have correlations above a limit.
-fn correlated_rows(own: &LocalCofactors, layout: &Layout, local: usize, limit: f64) -> Vec<usize> {
+fn correlated_rows(own: &RowCofactors, layout: &Layout, local: usize, limit: f64) -> Vec<usize> {
     let (rows, all, groups) = (layout.rows(), own.rows(), layout.groups_of(local).len());
     let odds = |group: usize| {
         let block = (0..rows * rows).map(|k| (group * rows + k / rows) * all + group * rows + k % rows);

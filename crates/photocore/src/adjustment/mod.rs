@@ -99,7 +99,7 @@ pub use distributions::{
     student_limit,
 };
 pub use group_test::{Few, GroupTest, VISIBLE, correlation_above, leverage_odds, may_correlate, whitening};
-pub use leverages::{Leverages, RowCofactors};
+pub use leverages::Leverages;
 pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;
 pub use motions::Classes;

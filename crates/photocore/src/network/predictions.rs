@@ -8,8 +8,8 @@ use super::error::NetworkError;
 use super::group_tests::{in_units, misclosure, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::adjustment::{Leverages, RowCofactors, Terms};
-use crate::normals::{Function, LocalCofactors, dot};
+use crate::adjustment::{Leverages, Terms};
+use crate::normals::{Function, RowCofactors, dot};
 use crate::{Threads, parallel};
 
 /// Minimum number of points per thread.
@@ -94,8 +94,9 @@ impl Trial {
         }
         places.sort_unstable();
         places.dedup();
-        let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], threads);
-        let of_points: HashMap<usize, LocalCofactors> =
+        let of_points =
+            found.of_locals(problem, (observation_sd, None), &places, (|_| vec![], None), threads);
+        let of_points: HashMap<usize, RowCofactors> =
             places.into_iter().zip(of_points.map_err(failed)?).collect();
         let mut of_ties = found.rows_of_ties(problem, observation_sd, &ties, threads).into_iter();
         let mut of = |&index: &usize| {
@@ -104,7 +105,7 @@ impl Trial {
             let rows = match suspect.home {
                 Home::Group { group, point } => {
                     let first = size * (group - layout.groups_of(point).start);
-                    return Ok(RowCofactors::of_local(&of_points[&point], first..first + size));
+                    return Ok(of_points[&point].selected(first..first + size));
                 }
                 Home::Tie(_) => of_ties.next().unwrap_or_default(),
                 Home::Point(_) | Home::Block(_) => self.term_rows(suspect, terms)?,
@@ -146,27 +147,8 @@ impl Trial {
         limit: f64,
         threads: &Threads,
     ) -> Result<Vec<OnPoint>, NetworkError> {
-        let (found, problem) = (self.found()?, &self.assembled.problem);
-        let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
-        let terms = self.terms(sd, &found.values);
-        let further = |place: usize| self.further(place, &terms);
-        let places: Vec<Option<usize>> = points.iter().map(|&point| self.local(point)).collect();
-        let locals: Vec<usize> = places.iter().flatten().copied().collect();
-        let cofactors = found.of_locals_together(problem, observation_sd, &locals, (further, limit), threads);
-        let mut cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?.into_iter();
-        let all: Vec<Option<(usize, LocalCofactors)>> =
-            places.into_iter().map(|place| Some((place?, cofactors.next()?))).collect();
-        let of = |k: usize| {
-            all[k].as_ref().map_or_else(OnPoint::default, |(place, own)| {
-                let (rows, residual) = self.rows_at(*place, observation_sd, found, &terms);
-                let (count, leverages) = (rows.len(), sub(&own.equations, own.rows(), &rows));
-                let identity = |k: usize| f64::from(u8::from(k / count == k % count));
-                let cofactors =
-                    leverages.iter().enumerate().map(|(k, leverage)| identity(k) - leverage).collect();
-                OnPoint { suspects: self.on_place(*place).to_vec(), residual, cofactors }
-            })
-        };
-        Ok(threads.install(|| parallel::map(all.len(), AT_LEAST, of)))
+        let problem = &self.assembled.problem;
+        self.on_points_with((&problem.observation_sd, &problem.sd), points, (limit, false), threads)
     }
 
     /// Returns R of excluded points, as if they were active: each one alone, given photos determined by the others. It is empty also for
@@ -175,24 +157,43 @@ impl Trial {
     /// # Errors
     /// Predictions before any adjustment.
     pub fn on_gone_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
+        self.on_points_with((&self.observation_sd, &self.sd), points, (0.0, true), threads)
+    }
+
+    fn on_points_with(
+        &self,
+        (observation_sd, sd): (&[f64], &[f64]),
+        points: &[usize],
+        (limit, gone): (f64, bool),
+        threads: &Threads,
+    ) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
-        let given = (&self.observation_sd[..], &self.sd[..]);
-        let terms = self.terms(&self.sd, &found.values);
+        let terms = self.terms(sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
-        let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_gone(problem, given, &places, further, threads);
-        let cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?;
-        let mut found_at = places.iter().zip(cofactors);
-        let of = |&point: &usize| {
-            let known = self.local(point).and_then(|_| found_at.next()).filter(|(_, own)| !own.is_empty());
-            known.map_or_else(OnPoint::default, |(&place, own)| {
-                let (rows, observed) = self.rows_at(place, &self.observation_sd, found, &terms);
+        let places: Vec<Option<usize>> = points.iter().map(|&point| self.local(point)).collect();
+        let locals: Vec<usize> = places.iter().flatten().copied().collect();
+        let asked = (observation_sd, gone.then_some(sd));
+        let cofactors = found.of_locals(problem, asked, &locals, (further, Some(limit)), threads);
+        let mut cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?.into_iter();
+        let all: Vec<Option<(usize, RowCofactors)>> =
+            places.into_iter().map(|place| Some((place?, cofactors.next()?))).collect();
+        let of = |k: usize| -> Option<OnPoint> {
+            let (place, own) = all[k].as_ref()?;
+            let (rows, observed) = self.rows_at(*place, observation_sd, found, &terms);
+            let count = rows.len();
+            let (residual, cofactors) = if gone {
+                let own = Some(own.residuals_if_included()).filter(|own| !own.is_empty())?;
                 let cofactors = sub(&own, own.len().isqrt(), &rows);
-                let residual = cofactors.chunks_exact(rows.len()).map(|row| dot(row, &observed)).collect();
-                OnPoint { suspects: self.on_place(place).to_vec(), residual, cofactors }
-            })
+                (cofactors.chunks_exact(count).map(|row| dot(row, &observed)).collect(), cofactors)
+            } else {
+                let leverages = sub(&own.equations, own.rows(), &rows);
+                let identity = |k: usize| f64::from(u8::from(k / count == k % count));
+                let left = leverages.iter().enumerate().map(|(k, leverage)| identity(k) - leverage);
+                (observed, left.collect())
+            };
+            Some(OnPoint { suspects: self.on_place(*place).to_vec(), residual, cofactors })
         };
-        Ok(points.iter().map(of).collect())
+        Ok(threads.install(|| parallel::map(all.len(), AT_LEAST, |k| of(k).unwrap_or_default())))
     }
 
     /// Returns the test groups of a local point.

@@ -1,9 +1,11 @@
 //! Joint cofactors of the equations of one local block, from the selected inverse.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
+use nalgebra::DMatrix;
 
 use super::equations::Prior;
 use super::functions::Function;
@@ -62,29 +64,59 @@ impl Own {
     }
 }
 
-/// Cofactors of equations a of one local block, included or excluded, with the inverse normal matrix Q.
-#[derive(Debug, Clone)]
-pub struct LocalCofactors {
+/// Cofactors of some equations a, included or excluded, with the inverse normal matrix Q.
+#[derive(Debug, Clone, Default)]
+pub struct RowCofactors {
     /// Leverages a Q a^T of all pairs of equations, square, row by row; NaN between groups of a fixed local block.
     pub equations: Vec<f64>,
-    /// The same with only the unknowns of the local block free.
+    /// The same with only the unknowns of the local block free; empty for equations without a local block.
     pub by_local: Vec<f64>,
-    /// Q a^T for the unknowns of the local block, one vector per equation.
-    pub local: Vec<f64>,
-    /// Q a^T for each retained block in the groups of the local block.
-    pub others: Vec<(usize, Vec<f64>)>,
+    /// Q a^T for each block of the equations, one vector over its unknowns per equation; None for the local block.
+    pub blocks: Vec<(Option<usize>, Vec<f64>)>,
 }
 
-impl LocalCofactors {
+impl RowCofactors {
     /// Number of equations.
     pub fn rows(&self) -> usize {
         self.equations.len().isqrt()
     }
 
-    fn unknown(dim: usize, rows: usize, blocks: &BTreeMap<usize, usize>) -> Self {
-        let others = blocks.keys().map(|&block| (block, vec![f64::NAN; rows])).collect();
+    /// Selects some equations.
+    #[must_use]
+    pub fn selected(&self, rows: Range<usize>) -> Self {
+        let count = self.rows();
+        let some = |values: &[f64]| {
+            let width = values.len() / count;
+            values[rows.start * width..rows.end * width].to_vec()
+        };
+        let square =
+            |all: &[f64]| rows.clone().flat_map(|i| all[i * count..][rows.clone()].to_vec()).collect();
+        Self {
+            equations: square(&self.equations),
+            by_local: square(&self.by_local),
+            blocks: self.blocks.iter().map(|(block, values)| (*block, some(values))).collect(),
+        }
+    }
+
+    /// Returns the residual cofactor matrix P that all equations of an excluded local block would have if they were included. The
+    /// cofactors must be those of included equations. Empty if the local block would be undetermined.
+    ///
+    /// With predicted cofactors C = I + b Q b^T and the coefficients a of the local block, P = C^-1 - C^-1 a^T (a C^-1 a^T)^-1 a C^-1. P l
+    /// are residuals of unit weight and P their cofactors, as R for included observations. It is computed as (I + a' Q a'^T - H)^-1 - H. H
+    /// is the leverage matrix of the local block alone, Q the cofactor matrix of the others.
+    pub fn residuals_if_included(&self) -> Vec<f64> {
+        let rows = self.rows();
+        let [alone, all] =
+            [&self.by_local, &self.equations].map(|values| DMatrix::from_row_slice(rows, rows, values));
+        let factor = (DMatrix::identity(rows, rows) + all - &alone).cholesky();
+        factor.map_or(vec![], |factor| (factor.inverse() - alone).as_slice().to_vec())
+    }
+
+    fn unknown(dim: usize, rows: usize, blocks: &Blocks) -> Self {
+        let others = blocks.keys().map(|&block| (Some(block), vec![f64::NAN; rows]));
+        let blocks = std::iter::once((None, vec![f64::NAN; rows * dim])).chain(others).collect();
         let square = vec![f64::NAN; rows * rows];
-        Self { equations: square.clone(), by_local: square, local: vec![f64::NAN; rows * dim], others }
+        Self { equations: square.clone(), by_local: square, blocks }
     }
 }
 
@@ -107,7 +139,7 @@ impl System {
         (formed, prior): (&[Function], &Prior),
         asked: &[Function],
         local: usize,
-    ) -> Result<LocalCofactors, LayoutError> {
+    ) -> Result<RowCofactors, LayoutError> {
         prior.check(&self.layout)?;
         if self.layout.stands_apart(local) {
             return self.cofactors_apart(selected, asked, local);
@@ -119,7 +151,7 @@ impl System {
         let mut normal = formed.local.transpose() * &formed.local;
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
         let Ok(factor) = normal.llt(Side::Lower) else {
-            return Ok(LocalCofactors::unknown(dim, rows, &blocks));
+            return Ok(RowCofactors::unknown(dim, rows, &blocks));
         };
         let coupling = factor.solve(formed.local.transpose() * &formed.others);
         let by_local = factor.solve(a.transpose());
@@ -130,13 +162,13 @@ impl System {
         let own = by_local - coupling * &others;
         let of_block = |(&block, &first): (&usize, &usize)| {
             let width = self.layout.retained_dim(block);
-            (block, (0..rows * width).map(|k| others[(first + k % width, k / width)]).collect())
+            (Some(block), (0..rows * width).map(|k| others[(first + k % width, k / width)]).collect())
         };
-        Ok(LocalCofactors {
+        let of_local = (None, (0..rows * dim).map(|k| own[(k % dim, k / dim)]).collect());
+        Ok(RowCofactors {
             equations: (0..rows * rows).map(|k| found[(k / rows, k % rows)]).collect(),
             by_local: (0..rows * rows).map(|k| alone[(k / rows, k % rows)]).collect(),
-            local: (0..rows * dim).map(|k| own[(k % dim, k / dim)]).collect(),
-            others: blocks.iter().map(of_block).collect(),
+            blocks: std::iter::once(of_local).chain(blocks.iter().map(of_block)).collect(),
         })
     }
 
@@ -146,7 +178,7 @@ impl System {
         selected: &SelectedInverse,
         asked: &[Function],
         local: usize,
-    ) -> Result<LocalCofactors, LayoutError> {
+    ) -> Result<RowCofactors, LayoutError> {
         let (rows, dim, count) = (self.layout.rows(), self.layout.local_dim(), asked.len());
         let of_groups = rows * self.layout.groups_of(local).len();
         let known = |k: usize| if k / count < of_groups && k % count < of_groups { f64::NAN } else { 0.0 };
@@ -167,7 +199,9 @@ impl System {
                 own.iter_mut().enumerate().for_each(|(k, to)| *to = along[(start + k % width, k / width)]);
             }
         }
-        let [by_local, local] = [count * count, count * dim].map(|length| vec![0.0; length]);
-        Ok(LocalCofactors { equations, by_local, local, others: others.into_iter().collect() })
+        let of_local = (None, vec![0.0; count * dim]);
+        let others = others.into_iter().map(|(block, values)| (Some(block), values));
+        let blocks = std::iter::once(of_local).chain(others).collect();
+        Ok(RowCofactors { equations, by_local: vec![0.0; count * count], blocks })
     }
 }

@@ -82,7 +82,7 @@ pub use columns::{Chord, ReducedRights};
 pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
 pub use dense::take_product_buffers;
-pub use equation_block::LocalCofactors;
+pub use equation_block::RowCofactors;
 pub(crate) use equations::TieBuffer;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
 pub use factor::{Factor, FactorOptions};
