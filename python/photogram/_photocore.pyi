@@ -1077,7 +1077,6 @@ class Node:
         damping: float,
         curved: bool,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> FormedNode:
         """Form the normal equations at a state, and eliminate own points and blocks.
 
@@ -1139,7 +1138,6 @@ class FormedNode:
         outer: _Floats,
         *,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
         """Return the step (N,) of all unknowns from the step of the outer ones (S,)."""
 
@@ -1153,7 +1151,6 @@ class FormedNode:
         left: Sequence[_Floats],
         *,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[_Floats, float] | None:
         """Reduce the right-hand side at a state: a second step with the same factor.
 
@@ -1171,21 +1168,11 @@ class FormedNode:
         memory.
         """
 
-    def solve_chord(
-        self,
-        outer: _Floats,
-        *,
-        threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
-    ) -> _Floats:
-        """Return the chord (N,) from the chord of the outer unknowns (S,), after its reduction."""
-
     def reduce(
         self,
         rights: _Floats,
         *,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[_Floats, _Floats]:
         """Reduce right-hand sides: y = L^-1 r of the unknowns eliminated here.
 
@@ -1207,9 +1194,8 @@ class FormedNode:
         outer: _Floats,
         *,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
-        """Return solutions (d N,) of reduced right-hand sides from the outer ones (d, S); once."""
+        """Return solutions (d N,) of reduced right-hand sides, or the chord (N,), from the outer ones (d, S); once."""
 
     def invert(
         self,
@@ -1218,7 +1204,6 @@ class FormedNode:
         *,
         threads: int,
         datum: tuple[_Floats, _Floats, _Floats, _Floats, float, list[int]] | None = None,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[BlockSolution, list[_Floats]]:
         """Return the solution with cofactors, and the cofactors for the children.
 

@@ -210,7 +210,7 @@ def solved_chord(
             return Lost(number)
         if not factor.has_chord:  # it was formed again meanwhile
             reduced_chord(job, number, at, after, below)
-        chord = factor.solve_chord(_plain(outer), threads=job.threads)
+        chord = factor.complete(_plain(outer), threads=job.threads)
         return _advanced(job, number, after, chord, further)
 
 

@@ -10,7 +10,7 @@
 //!
 //! | part | files and folders |
 //! | --- | --- |
-//! | nodes | `node_chord`, `node_datum`, `node` |
+//! | nodes | `node_datum`, `node` |
 //! | tests of observations | `snooping`, `hypotheses`, `responses`, `predictions`, `group_tests` |
 //! | adjustment | `adjust` |
 //! | results | `groups`, `covariance`, `solution`, `visibility`, `weak_points`, `adjusted` |
@@ -85,7 +85,6 @@ pub mod mounts;
 mod naming;
 mod neighbourhood;
 mod node;
-mod node_chord;
 mod node_datum;
 pub mod observations;
 mod parts;

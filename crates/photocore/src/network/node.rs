@@ -31,10 +31,17 @@ pub struct Node {
 #[derive(Debug)]
 pub struct FormedNode {
     pub(super) part: Linearized,
-    /// Reduced right-hand sides for a datum of the larger network, until they are solved.
-    pub(super) reduced: Option<ReducedRights>,
-    /// Reduced right-hand side of a chord step, until it is solved.
-    pub(super) chord: Option<ReducedRights<1>>,
+    /// Reduced right-hand sides, until they are solved.
+    pub(super) reduced: Option<ReducedNode>,
+}
+
+/// Reduced right-hand sides of a node.
+#[derive(Debug)]
+pub(super) enum ReducedNode {
+    /// For a datum of the larger network.
+    Datum(ReducedRights),
+    /// Of a chord step.
+    Chord(ReducedRights<1>),
 }
 
 /// Predicted cost of a node, computed from its sparsity pattern.
@@ -291,7 +298,7 @@ impl Node {
         let loss = self.options.adjustment.loss;
         let options = PartOptions { held: self.held.clone(), damping, loss, curved };
         let part = Linearized::of_part(problem, state.to_vec(), contributions, options, threads, watch);
-        Ok(FormedNode { part: part.map_err(|error| self.named(error))?, reduced: None, chord: None })
+        Ok(FormedNode { part: part.map_err(|error| self.named(error))?, reduced: None })
     }
 
     /// Returns the undetermined parameters of this node as an error; None if all are determined.
@@ -378,18 +385,62 @@ impl Node {
         if fit { Ok(()) } else { Err(NetworkError::State) }
     }
 
-    /// Solves for reduced right-hand sides, with given solutions of the outer parameters.
-    pub(super) fn solved<const C: usize>(
+    /// Returns true if the last steps may converge slowly, so that a chord step pays.
+    pub fn ends_slowly(&self) -> bool {
+        self.assembled.problem.model.ends_slowly()
+    }
+
+    /// Reduces the right-hand side of a chord step, a second step with the existing factors ([`Linearized::reduce_chord`]), at a state with the contributions of the child nodes. Returns the contribution to outer parameters, and
+    /// the decrease of the sum of squares by this node; None if the factor lacks the required cache.
+    ///
+    /// # Errors
+    /// Wrong numbers of parameters, an interruption, insufficient memory.
+    pub fn reduce_chord(
         &self,
-        formed: &FormedNode,
-        reduced: Option<ReducedRights<C>>,
+        formed: &mut FormedNode,
+        state: &[f64],
+        left: &[&[f64]],
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Option<(Vec<f64>, f64)>, NetworkError> {
+        self.check(&[state])?;
+        let fit = left.iter().zip(self.below()).all(|(left, places)| left.len() == places.len());
+        if !fit || left.len() != self.below().len() {
+            return Err(NetworkError::State);
+        }
+        let mut rights = vec![0.0; self.size()];
+        for (left, places) in left.iter().zip(self.below()) {
+            places.iter().zip(*left).for_each(|(&place, value)| rights[place] += value);
+        }
+        let problem = &self.assembled.problem;
+        let found = formed.part.reduce_chord(problem, state, rights, threads, watch);
+        let reduced = found.map_err(|error| self.named(error))?;
+        let found = reduced.as_ref().map(|reduced| (reduced.left(), reduced.products[0]));
+        formed.reduced = reduced.map(ReducedNode::Chord);
+        Ok(found)
+    }
+
+    /// Solves the reduced right-hand sides, or the reduced chord step, for all parameters, given the solutions of the outer ones; only once.
+    ///
+    /// # Errors
+    /// A wrong number of parameters, a missing reduction, an interruption, insufficient memory.
+    pub fn solve_reduced(
+        &self,
+        formed: &mut FormedNode,
         outer: &[f64],
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
-        let reduced = reduced.filter(|reduced| reduced.left().len() == outer.len());
-        let reduced = reduced.ok_or(NetworkError::State)?;
-        let found = formed.part.solve_reduced_rights(&self.assembled.problem, reduced, outer, threads, watch);
+        let (part, problem) = (&formed.part, &self.assembled.problem);
+        let found = match formed.reduced.take() {
+            Some(ReducedNode::Chord(reduced)) if reduced.left().len() == outer.len() => {
+                part.solve_reduced_rights(problem, reduced, outer, threads, watch)
+            }
+            Some(ReducedNode::Datum(reduced)) if reduced.left().len() == outer.len() => {
+                part.solve_reduced_rights(problem, reduced, outer, threads, watch)
+            }
+            _ => return Err(NetworkError::State),
+        };
         found.map_err(|error| self.named(error))
     }
 
@@ -408,6 +459,11 @@ impl Node {
 }
 
 impl FormedNode {
+    /// Returns true if a reduced chord step is still to be solved.
+    pub fn has_chord(&self) -> bool {
+        matches!(self.reduced, Some(ReducedNode::Chord(_)))
+    }
+
     /// Returns the contribution to the outer parameters; empty at the second call.
     pub fn take_contribution(&mut self) -> Contribution<'static> {
         self.part.take_contribution()

@@ -6,7 +6,7 @@
 use super::error::NetworkError;
 use super::input::{InnerConstraints, Network, Options};
 use super::model::Owner;
-use super::node::{FormedNode, Node};
+use super::node::{FormedNode, Node, ReducedNode};
 use super::problem::Assembled;
 use crate::Threads;
 use crate::adjustment::{Adjusted, DatumColumns, Watch, moved_with_columns};
@@ -119,22 +119,9 @@ impl Node {
         }
         let problem = &self.assembled().problem;
         let reduced = formed.part.reduce_rights(problem, rights, threads, watch);
-        let reduced = formed.reduced.insert(reduced.map_err(|error| self.named(error))?);
-        Ok((reduced.left(), reduced.products.clone()))
-    }
-
-    /// Solves the reduced right-hand sides for all parameters, given W of the outer ones; only once.
-    ///
-    /// # Errors
-    /// A wrong number of parameters, a missing reduction, an interruption, insufficient memory.
-    pub fn solve_reduced_rights(
-        &self,
-        formed: &mut FormedNode,
-        outer: &[f64],
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<Vec<f64>, NetworkError> {
-        let reduced = formed.reduced.take();
-        self.solved(formed, reduced, outer, threads, watch)
+        let reduced = reduced.map_err(|error| self.named(error))?;
+        let found = (reduced.left(), reduced.products.clone());
+        formed.reduced = Some(ReducedNode::Datum(reduced));
+        Ok(found)
     }
 }

@@ -19,8 +19,8 @@ use super::covariances::refused;
 use super::solution::BlockSolution;
 use super::tables::Told;
 use super::{FailureRow, failure};
-use crate::arrays::{Array, InputError, Vector, numbers};
 use crate::options::unknown;
+use crate::arrays::{Array, InputError, Vector, numbers};
 use crate::work::{Workers, watched};
 
 /// Matrix, right-hand side and diagonal of the Schur complement of a node.
@@ -175,7 +175,7 @@ impl Node {
         Ok((sums.camera, sums.ground, sums.plates, sums.observations, minimised))
     }
 
-    #[pyo3(signature = (state, contributions, *, damping, curved, threads, progress = None))]
+    #[pyo3(signature = (state, contributions, *, damping, curved, threads))]
     fn form(
         &self,
         py: Python<'_>,
@@ -184,7 +184,6 @@ impl Node {
         damping: f64,
         curved: bool,
         threads: usize,
-        progress: Option<Py<PyAny>>,
     ) -> PyResult<FormedNode> {
         let state = numbers("state", &state)?;
         let mut given = Vec::with_capacity(contributions.len());
@@ -195,7 +194,7 @@ impl Node {
                 diagonal: Cow::Borrowed(slice("the diagonal of a contribution", diagonal)?),
             });
         }
-        let formed = watched(py, self.workers(threads), progress, |pool, watch| {
+        let formed = watched(py, self.workers(threads), None, |pool, watch| {
             let mut formed = self.node.form(&state, &given, (damping, curved), pool, watch)?;
             let contribution = formed.take_contribution();
             Ok((formed, contribution))
@@ -278,11 +277,11 @@ impl FormedNode {
     fn asked<T: Send>(
         &self,
         py: Python<'_>,
-        (threads, progress): (usize, Option<Py<PyAny>>),
+        threads: usize,
         ask: impl FnOnce(&mut Formed, &Threads, Watch<'_>) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, progress, |pool, watch| match &mut *lock(&self.formed) {
+        let found = watched(py, workers, None, |pool, watch| match &mut *lock(&self.formed) {
             Some(formed) => ask(formed, pool, watch).map(Some),
             None => Ok(None),
         })?;
@@ -315,18 +314,11 @@ impl FormedNode {
         self.undetermined.clone()
     }
 
-    #[pyo3(signature = (outer, *, threads, progress = None))]
-    fn solve<'py>(
-        &self,
-        py: Python<'py>,
-        outer: Array<'py>,
-        threads: usize,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Vector<'py>> {
+    #[pyo3(signature = (outer, *, threads))]
+    fn solve<'py>(&self, py: Python<'py>, outer: Array<'py>, threads: usize) -> PyResult<Vector<'py>> {
         let outer = numbers("outer", &outer)?;
-        let step = self.asked(py, (threads, progress), |formed, pool, watch| {
-            self.node.solve(formed, &outer, pool, watch)
-        })?;
+        let step =
+            self.asked(py, threads, |formed, pool, watch| self.node.solve(formed, &outer, pool, watch))?;
         Ok(PyArray1::from_vec(py, step))
     }
 
@@ -335,70 +327,45 @@ impl FormedNode {
         lock(&self.formed).as_ref().is_some_and(Formed::has_chord)
     }
 
-    #[pyo3(signature = (state, left, *, threads, progress = None))]
+    #[pyo3(signature = (state, left, *, threads))]
     fn reduce_chord<'py>(
         &self,
         py: Python<'py>,
         state: Array<'py>,
         left: Vec<Array<'py>>,
         threads: usize,
-        progress: Option<Py<PyAny>>,
     ) -> PyResult<Option<(Vector<'py>, f64)>> {
         let state = numbers("state", &state)?;
         let left =
             left.iter().map(|left| slice("what a child has left", left)).collect::<PyResult<Vec<_>>>()?;
-        let found = self.asked(py, (threads, progress), |formed, pool, watch| {
+        let found = self.asked(py, threads, |formed, pool, watch| {
             self.node.reduce_chord(formed, &state, &left, pool, watch)
         })?;
         Ok(found.map(|(left, decrease)| (PyArray1::from_vec(py, left), decrease)))
     }
 
-    #[pyo3(signature = (outer, *, threads, progress = None))]
-    fn solve_chord<'py>(
-        &self,
-        py: Python<'py>,
-        outer: Array<'py>,
-        threads: usize,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Vector<'py>> {
-        let outer = numbers("outer", &outer)?;
-        let chord = self.asked(py, (threads, progress), |formed, pool, watch| {
-            self.node.solve_chord(formed, &outer, pool, watch)
-        })?;
-        Ok(PyArray1::from_vec(py, chord))
-    }
-
-    #[pyo3(signature = (rights, *, threads, progress = None))]
+    #[pyo3(signature = (rights, *, threads))]
     fn reduce<'py>(
         &self,
         py: Python<'py>,
         rights: Array<'py>,
         threads: usize,
-        progress: Option<Py<PyAny>>,
     ) -> PyResult<(Vector<'py>, Vector<'py>)> {
         let rights = slice("rights", &rights)?.to_vec();
-        let (left, products) = self.asked(py, (threads, progress), |formed, pool, watch| {
-            self.node.reduce_rights(formed, rights, pool, watch)
-        })?;
+        let (left, products) = self
+            .asked(py, threads, |formed, pool, watch| self.node.reduce_rights(formed, rights, pool, watch))?;
         Ok((PyArray1::from_vec(py, left), PyArray1::from_vec(py, products)))
     }
 
-    #[pyo3(signature = (outer, *, threads, progress = None))]
-    fn complete<'py>(
-        &self,
-        py: Python<'py>,
-        outer: Array<'py>,
-        threads: usize,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Vector<'py>> {
+    #[pyo3(signature = (outer, *, threads))]
+    fn complete<'py>(&self, py: Python<'py>, outer: Array<'py>, threads: usize) -> PyResult<Vector<'py>> {
         let outer = slice("outer", &outer)?;
-        let found = self.asked(py, (threads, progress), |formed, pool, watch| {
-            self.node.solve_reduced_rights(formed, outer, pool, watch)
-        })?;
+        let found = self
+            .asked(py, threads, |formed, pool, watch| self.node.solve_reduced(formed, outer, pool, watch))?;
         Ok(PyArray1::from_vec(py, found))
     }
 
-    #[pyo3(signature = (outer, state, *, threads, datum = None, progress = None))]
+    #[pyo3(signature = (outer, state, *, threads, datum = None))]
     fn invert<'py>(
         &self,
         py: Python<'py>,
@@ -406,7 +373,6 @@ impl FormedNode {
         state: Array<'py>,
         threads: usize,
         datum: Option<TransformationRow<'py>>,
-        progress: Option<Py<PyAny>>,
     ) -> PyResult<(Py<BlockSolution>, Vec<Vector<'py>>)> {
         let (given, state) = (slice("outer", &outer)?, numbers("state", &state)?);
         let datum = match &datum {
@@ -422,7 +388,7 @@ impl FormedNode {
         };
         let formed = lock(&self.formed).take().ok_or_else(|| used_up("the factor"))?;
         let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, progress, |pool, watch| {
+        let found = watched(py, workers, None, |pool, watch| {
             let found = self.node.invert(formed, given, &state, datum, pool, watch);
             found.map(|(solution, below)| (Told::without_records(solution, self.records, pool), below))
         })?;
