@@ -177,7 +177,7 @@ impl Network {
             let blocks = model.blocks_of(&touches);
             let root = match blocks.len() {
                 0 => Err(Fault::NothingUnknown),
-                _ => observation.precision().root(observation.rows()),
+                _ => observation.root(),
             };
             let kind = observation.kind();
             Ok(TiedObservation {
@@ -189,10 +189,12 @@ impl Network {
             })
         };
         let tied = |place: usize| tied(&observations[place]);
-        let tied: Result<Vec<TiedObservation>, NetworkError> =
-            parallel::map(observations.len(), TOGETHER, tied).into_iter().collect();
-        let mut tied = tied?;
-        tied.sort_by_cached_key(TiedObservation::local);
+        let tied = parallel::map_in_place(observations.len(), TOGETHER, &tied);
+        let mut tied = tied.into_iter().collect::<Result<Vec<TiedObservation>, NetworkError>>()?;
+        // Observations in the order of the points, which is usual, are not moved.
+        if !tied.is_sorted_by_key(TiedObservation::local) {
+            tied.sort_by_cached_key(TiedObservation::local);
+        }
         Ok(tied)
     }
 }

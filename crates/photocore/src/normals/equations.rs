@@ -48,7 +48,7 @@ impl TieBuffer {
     pub fn rows(&mut self, layout: &Layout, tie: usize) -> TieRows<'_> {
         let rows = layout.ties()[tie].rows;
         self.constant.resize(rows, 0.0);
-        self.coefficients.resize(rows * layout.tie_columns(tie).count(), 0.0);
+        self.coefficients.resize(rows * layout.tie_width(tie), 0.0);
         TieRows { constant: &mut self.constant, coefficients: &mut self.coefficients }
     }
 }

@@ -12,6 +12,7 @@ mod tied;
 use nalgebra::DMatrix;
 
 use self::model::{deviation, in_own_axes, length, nine, own_axes, rotates, rows_of, three};
+use self::precision::Root;
 use super::commons::{Common, CommonKind};
 
 pub use adjusted::{AdjustedObservation, KindSums};
@@ -62,6 +63,13 @@ macro_rules! kinds {
             pub fn precision(&self) -> Precision {
                 match self {
                     $($(Self::$name(own) => own.$precision.clone().into(),)*)*
+                }
+            }
+
+            /// Returns L of the covariance matrix S = L L^T of the components.
+            pub(super) fn root(&self) -> Result<DMatrix<f64>, Fault> {
+                match self {
+                    $($(Self::$name(own) => own.$precision.root(own.rows()),)*)*
                 }
             }
         }
@@ -166,7 +174,7 @@ impl Observation {
         each_observation!(self, own => own.check())?;
         match self.rows() {
             0 => Err(Fault::Nothing),
-            rows => self.precision().root(rows).map(|_| ()),
+            _ => self.root().map(|_| ()),
         }
     }
 }

@@ -26,10 +26,25 @@ impl From<f64> for Precision {
     }
 }
 
-impl Precision {
+/// Precision with a root.
+pub(super) trait Root {
     /// Returns L of the covariance matrix S = L L^T of `components` components: L^-1 whitens them.
-    pub(in super::super) fn root(&self, components: usize) -> Result<DMatrix<f64>, Fault> {
-        let deviates = |sd: f64| sd > SMALLEST && sd < SMALLEST.recip();
+    fn root(&self, components: usize) -> Result<DMatrix<f64>, Fault>;
+}
+
+/// Returns true if a standard deviation has a finite weight.
+fn deviates(sd: f64) -> bool {
+    sd > SMALLEST && sd < SMALLEST.recip()
+}
+
+impl Root for f64 {
+    fn root(&self, _components: usize) -> Result<DMatrix<f64>, Fault> {
+        if deviates(*self) { Ok(DMatrix::repeat(1, 1, *self)) } else { Err(Fault::Deviation) }
+    }
+}
+
+impl Root for Precision {
+    fn root(&self, components: usize) -> Result<DMatrix<f64>, Fault> {
         let given = match self {
             Self::Deviations(sd) => sd.len(),
             Self::Covariance(matrix) if matrix.ncols() == components => matrix.nrows(),
@@ -48,27 +63,14 @@ impl Precision {
                 let symmetric = |i: usize, j: usize| (s[(i, j)] - s[(j, i)]).abs() <= SYMMETRIC * scale(i, j);
                 let sound = (0..components)
                     .all(|i| deviates(s[(i, i)].sqrt()) && (0..components).all(|j| symmetric(i, j)));
-                sound.then(|| lower_root(s)).flatten().ok_or(Fault::Covariance)
+                sound
+                    .then(|| s.clone().cholesky())
+                    .flatten()
+                    .map(|factor| factor.l())
+                    .ok_or(Fault::Covariance)
             }
         }
     }
-}
-
-/// Returns L of a symmetric matrix L L^T (Cholesky); None if it is not positive definite.
-fn lower_root(s: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let count = s.nrows();
-    let mut root = DMatrix::zeros(count, count);
-    for j in 0..count {
-        for i in j..count {
-            let left = (0..j).fold(s[(i, j)], |left, k| left - root[(i, k)] * root[(j, k)]);
-            root[(i, j)] = if i > j { left / root[(j, j)] } else { left.sqrt() };
-        }
-        let pivot = root[(j, j)];
-        if pivot.is_nan() || pivot <= 0.0 {
-            return None;
-        }
-    }
-    Some(root)
 }
 
 /// Error of an invalid observation.

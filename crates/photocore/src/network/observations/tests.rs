@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use super::precision::Root;
 use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::tied::TiedModel;
 use super::{

@@ -275,6 +275,13 @@ impl Layout {
         local.map_or(0..0, |local| self.local_range(local as usize)).chain(self.unknowns_of(retained))
     }
 
+    /// Returns the number of columns of a tie.
+    pub(super) fn tie_width(&self, tie: usize) -> usize {
+        let Tie { local, retained, .. } = &self.ties[tie];
+        let of_local = local.map_or(0, |_| self.local_dim);
+        of_local + retained.iter().map(|&block| self.retained_dim(block as usize)).sum::<usize>()
+    }
+
     /// Returns the ties of a local block.
     pub fn ties_of(&self, local: usize) -> &[u32] {
         match self.local_tie_ptr.get(local..local + 2) {
