@@ -5,6 +5,5 @@ pub mod features;
 pub mod first_values;
 pub mod relative_orientation;
 pub mod resection;
-mod sampling;
 pub mod similarity;
 pub mod stellar;

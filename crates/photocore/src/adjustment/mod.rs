@@ -78,7 +78,6 @@ mod observation_rows;
 mod options;
 mod part;
 mod problem;
-mod published;
 mod result;
 mod run;
 mod score_parts;

@@ -8,7 +8,7 @@ use super::datum::{Adjusted, Basis, Datum, moved};
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
 use super::loss::Reweighting;
-use super::options::{Event, Iteration, Method, Options, Phase, Status, leaves_cofactors};
+use super::options::{Event, Iteration, Method, Options, Phase, Published, Status, leaves_cofactors};
 use super::problem::{AnyProblem, Evaluated, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use super::secants::Secants;
@@ -391,6 +391,45 @@ fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
     match flow {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(Stopped::Interrupted.into()),
+    }
+}
+
+impl<'a> Run<'a, '_> {
+    /// Iterates with full steps, without control of the sum of squares.
+    pub(super) fn full_steps(&mut self, start: Iterate<'a>, rule: Published) -> Result<End<'a>, AdjustError> {
+        let mut state = start;
+        let mut previous: Option<f64> = None;
+        for number in 1..=self.options.max_iterations {
+            let Some(step) = self.step(&state)? else {
+                return Ok(End::at(Status::Diverged, state.recycle()));
+            };
+            let largest_change = state.linearized.change();
+            let mut iteration = Iteration { number, sum_of_squares: f64::NAN, largest_change, damping: 0.0 };
+            if let Published::Length { first, count, limit } = rule {
+                let length = step[first..first + count].iter().map(|dx| dx * dx).sum::<f64>().sqrt();
+                if length < limit || number == self.options.max_iterations {
+                    let status = if length < limit { Status::Converged } else { Status::NotConverged };
+                    return Ok(End::after(status, state, step, iteration));
+                }
+            }
+            let next = self.form(self.problem.advanced(state.values(), &step), 0.0)?;
+            let sum = next.linearized.sum_of_squares;
+            if !sum.is_finite() {
+                return Ok(End::with(Status::Diverged, state));
+            }
+            iteration.sum_of_squares = sum;
+            self.accept(iteration, state.values(), next.values())?;
+            state.recycle();
+            state = next;
+            if let Published::Percent(percent) = rule {
+                match previous.map(|before| (sum - before) / before * 100.0) {
+                    Some(change) if change.abs() < percent => return self.stay(state, Status::Converged),
+                    Some(change) if change >= percent => return self.stay(state, Status::Diverged),
+                    _ => previous = Some(sum),
+                }
+            }
+        }
+        self.stay(state, Status::NotConverged)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Rotation vectors: the direction is the axis, the length is the angle in radians.
 
-use super::axes::{Matrix3, Vector3};
+use super::rotation::{Matrix3, Vector3};
 
 /// Square of the angle below which series replace closed forms. (a - sin a) / a^3 and 1/a^2 - cot(a/2) / (2a) lose digits there; for sin a
 /// / a and (1 - cos a) / a^2 the series are faster than a sine.

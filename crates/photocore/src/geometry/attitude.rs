@@ -7,7 +7,7 @@
 use std::f64::consts::PI;
 
 use super::angle_axis::{angle_axis_rotation, right_jacobian_inverse, rotation_angle_axis};
-use super::axes::{Matrix3, Vector3};
+use super::rotation::{Matrix3, Vector3};
 use super::rotation::{nearest_turns, rotation, rotation_angles};
 
 /// Direction of the rotation matrix M of omega, phi, kappa.

@@ -3,7 +3,7 @@
 //! Geographic positions are (longitude east positive, latitude, height): radians, radians, the linear unit of
 //! the semi-axes.
 
-use super::axes::{Matrix3, Vector3};
+use super::rotation::{Matrix3, Vector3};
 
 /// Invalid argument of a geometric object.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

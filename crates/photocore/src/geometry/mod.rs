@@ -3,7 +3,8 @@
 //! * [`mod@pose`]: position and attitude of a photo; [`attitude`]: parametrizations of attitudes;
 //! * [`camera`]: camera models, one file per model;
 //! * [`orientation`]: a pose with its six unknowns; [`projection`]: the chain point, pose, camera;
-//! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix; [`angle_axis`]: rotation vectors;
+//! * [`mod@rotation`]: vectors and matrices, three linear equations, omega, phi, kappa and the rotation matrix; [`angle_axis`]: rotation
+//!   vectors;
 //! * [`space`]: coordinates of the object space; [`ellipsoid`]: longitude, latitude, height, and the local vertical frame;
 //! * [`mod@film`]: deformation and scanning of film; [`mod@correction`]: readings of comparators and scanners;
 //! * [`lens`]: radial and decentering distortion, forward and inverse;
@@ -11,8 +12,7 @@
 //! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates, attitudes of stellar cameras;
 //! * [`refraction`]: displacement of points by air and water; [`atmosphere`]: the standard atmosphere;
 //! * [`mod@nearest`]: nearest neighbours in a plane;
-//! * [`mod@trajectory`]: poses as functions of time;
-//! * [`axes`]: vectors and matrices, and the solution of three linear equations.
+//! * [`mod@trajectory`]: poses as functions of time.
 //!
 //! Vectors and matrices in cartesian axes are `nalgebra` types. Three numbers of different units or meanings (coordinates of the object
 //! space, angles, standard deviations) are arrays. Angles are in radians, lengths in the unit of the object space, image coordinates in the
@@ -33,7 +33,6 @@
 pub mod angle_axis;
 pub mod atmosphere;
 pub mod attitude;
-pub mod axes;
 pub mod camera;
 pub mod correction;
 pub mod ellipsoid;
@@ -52,9 +51,6 @@ pub mod trajectory;
 
 pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
 pub use attitude::{AttitudeNumbers, RotationSense};
-#[doc(hidden)]
-pub use axes::principal_axes;
-pub use axes::{Matrix3, Vector3};
 pub use camera::{Bal, Brown, Camera, CameraModel, Image, Perspective, Unit};
 pub use ellipsoid::{Ellipsoid, GeometryError, local_vertical};
 pub use lens::{Displacement, Distortion, Undistorted};
@@ -64,6 +60,8 @@ pub use plate_lens::{PlateLens, Plated};
 pub use pose::{POSE, Pose, Steps};
 pub use projection::{Projection, Ray, View};
 pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
-pub use rotation::{nearest_turns, rotation, rotation_angles, rotation_with_partials};
+#[doc(hidden)]
+pub use rotation::principal_axes;
+pub use rotation::{Matrix3, Vector3, nearest_turns, rotation, rotation_angles, rotation_with_partials};
 pub use sky::{Air, Standard, Station, pointing, pointing_angles, pointing_with_partials};
 pub use space::{Lift, ObjectSpace, Point};

@@ -4,9 +4,9 @@ use nalgebra::Matrix6;
 
 use super::angle_axis::{angle_axis_with_jacobian, rotation_angle_axis};
 use super::attitude::{AttitudeNumbers, RotationSense};
-use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
 use super::pose::{POSE, Pose, column};
+use super::rotation::{Matrix3, Vector3};
 use super::space::{Lift, ObjectSpace, Point};
 
 /// Parametrization of the six unknowns of a pose.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Matrix6xX, Vector6};
 use smallvec::SmallVec;
 
 use super::angle_axis::angle_axis_rotation;
-use super::axes::{Matrix3, Vector3};
+use super::rotation::{Matrix3, Vector3};
 
 /// Number of unknowns of a pose: three of the position, three of the attitude.
 pub const POSE: usize = 6;

@@ -5,10 +5,10 @@
 //! in geographic space. There, omega, phi, kappa refer to the local vertical frame at the station.
 
 use super::attitude::RotationSense;
-use super::axes::Vector3;
 use super::camera::{CameraModel, Image, Perspective};
 use super::orientation::Orientation;
 use super::pose::POSE;
+use super::rotation::Vector3;
 use super::space::{Lift, ObjectSpace, Point};
 
 /// Orientation and camera of a photo.

@@ -5,9 +5,9 @@
 //! ray through water lifts the point along its own vertical. `docs/refraction.md` derives both.
 
 use super::atmosphere::{Air, SCALE_HEIGHT};
-use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::{GeometryError, local_vertical};
 use super::orientation::Orientation;
+use super::rotation::{Matrix3, Vector3};
 use super::space::{Lift, ObjectSpace, Point};
 
 /// Refractivity n - 1 of air at sea level (Saastamoinen 1974).

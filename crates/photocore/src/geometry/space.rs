@@ -1,7 +1,7 @@
 //! Object space: coordinates of points and photos, and their cartesian positions.
 
-use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::Ellipsoid;
+use super::rotation::{Matrix3, Vector3};
 
 /// Coordinate system in which positions of photos and points are given and adjusted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

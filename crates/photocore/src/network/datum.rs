@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use super::error::NetworkError;
 use super::input::{InnerConstraints, Network};
-use super::parts::{MOST_PARTS, MOTIONS};
+use super::model::{MOST_PARTS, MOTIONS};
 use super::problem::Assembled;
 use super::rigid_motions::SCALE;
 use crate::Threads;
@@ -39,10 +39,13 @@ impl Assembled {
         let first: HashMap<usize, usize> =
             of.map(|(index, &point)| (point, model.of_point(index).start)).collect();
         let points = inner.points.iter().filter_map(|point| first.get(point).copied());
-        let photos = inner.photos.iter().filter(|&&photo| photo < model.cameras.len());
-        // The position of a photo on a frame is the position of the frame.
-        let frames: BTreeSet<usize> = photos.map(|&photo| model.carrier(photo)).collect();
-        let photos = frames.into_iter().map(|photo| model.of_block(photo).start);
+        // The pose of a photo on a frame is the pose of the frame.
+        let starts = |photos: &[usize]| {
+            let photos = photos.iter().filter(|&&photo| photo < model.cameras.len());
+            let frames: BTreeSet<usize> = photos.map(|&photo| model.carrier(photo)).collect();
+            frames.into_iter().map(|photo| model.of_block(photo).start)
+        };
+        let photos = starts(&inner.photos);
         let lengths = |first: usize| {
             let at = std::array::from_fn(|k| self.problem.initial[first + k]);
             let partials = Point::new(model.space, at).partials();
@@ -51,10 +54,8 @@ impl Assembled {
         let mut carriers: Vec<(usize, f64)> = points.chain(photos).flat_map(lengths).collect();
         if !inner.attitudes.is_empty() {
             let radius = inner.radius.unwrap_or_else(|| self.radius());
-            let turning = inner.attitudes.iter().filter(|&&photo| photo < model.cameras.len());
-            let frames: BTreeSet<usize> = turning.map(|&photo| model.carrier(photo)).collect();
-            let turns = frames.into_iter().map(|photo| model.of_block(photo).start + 3);
-            carriers.extend(turns.flat_map(|first| [0, 1, 2].map(|k| (first + k, radius))));
+            let turns = starts(&inner.attitudes);
+            carriers.extend(turns.flat_map(|first| [3, 4, 5].map(|k| (first + k, radius))));
         }
         let left = self.left(&carriers, !inner.scale);
         (Datum { carriers, left, relative: false }, reference)

@@ -1,9 +1,8 @@
 //! Implementation of the adjustment's model by the bundle, at given parameter values.
 
 use super::in_lanes::{FEWEST, Sight, write_in_lanes};
-use super::model::Bundle;
+use super::model::{Bundle, MOTIONS};
 use super::mounts::Composed;
-use super::parts::MOTIONS;
 use super::stations::{Station, Stations, write};
 use crate::adjustment::{Evaluated, Model, Motions, Term};
 use crate::geometry::angle_axis::rotation_angle_axis;

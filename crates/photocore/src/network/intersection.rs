@@ -4,7 +4,7 @@ use super::model::Bundle;
 use super::mounts::Composed;
 use super::stations::{Mounted, Station, Stations};
 use crate::adjustment::median;
-use crate::geometry::axes::solve;
+use crate::geometry::rotation::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
 use crate::parallel;
 

@@ -22,7 +22,6 @@
 //! | selection of the input | `check`, `selection`, `neighbourhood` |
 //! | input and errors | `error`, `surroundings`, `camera_priors`, `input` |
 //! | types of observations and parameters | `passages`, `observations`, `mounts`, `film`, `commons` |
-//! | numbers | `parts` |
 //!
 //! Two photos over four control points:
 //!
@@ -87,7 +86,6 @@ mod neighbourhood;
 mod node;
 mod node_datum;
 pub mod observations;
-mod parts;
 pub mod passages;
 mod passing;
 mod precision;

@@ -14,7 +14,6 @@ use super::neighbourhood::ByPoint;
 use super::observations::{
     CommonSite, LOCAL, Linear, PhotoSite, PointSite, TiedModel, TiedObservation, Touches,
 };
-use super::parts::Components;
 use super::passages::Passages;
 use super::stations::{Refracted, Station, Stations};
 use crate::geometry::{
@@ -70,6 +69,29 @@ pub struct Bundle {
     /// Connected components, computed at first use from all fields above.
     pub parts: OnceLock<Components>,
 }
+
+/// Photos connected by points and observations; a shared camera does not connect them.
+#[derive(Debug)]
+pub(super) struct Component {
+    pub photos: Vec<usize>,
+    /// Photo of the preferred datum: chosen by the user or by fixed positions, else the one with most images.
+    pub central: usize,
+}
+
+/// Components of a network that contain images, the largest first, and the component of each photo, point and shared parameter.
+#[derive(Debug)]
+pub(super) struct Components {
+    pub all: Vec<Component>,
+    pub of_photo: Vec<Option<usize>>,
+    pub of_point: Vec<Option<usize>>,
+    pub of_common: Vec<Option<usize>>,
+}
+
+/// Number of datum parameters: translations, rotations about Cartesian axes, and scale.
+pub(super) const MOTIONS: usize = 7;
+
+/// Maximum number of components with a datum: a network with more of them is assumed to be a mistake.
+pub(super) const MOST_PARTS: usize = 8;
 
 /// Datum information that is available before any computation.
 #[derive(Debug)]

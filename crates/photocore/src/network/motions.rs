@@ -7,10 +7,9 @@
 use std::collections::BTreeMap;
 
 use super::commons::{CommonState, PlacedCommon, SimilarityMotion};
-use super::model::Bundle;
+use super::model::{Bundle, Components};
 use super::mounts::{AT_PHOTO, Trajectory};
 use super::observations::Observation;
-use super::parts::Components;
 use super::stations::Stations;
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::trajectory::{Active, Flight};

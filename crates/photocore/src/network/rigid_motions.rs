@@ -3,8 +3,7 @@
 use nalgebra::{Matrix4, Vector6};
 
 use super::commons::SimilarityMotion;
-use super::model::Bundle;
-use super::parts::{Component, Components, Joined, MOST_PARTS, MOTIONS};
+use super::model::{Bundle, Component, Components, MOST_PARTS, MOTIONS};
 use super::stations::{Station, Stations};
 use crate::adjustment::Motions;
 use crate::adjustment::median;
@@ -286,6 +285,28 @@ impl Bundle {
                     pose[3..].copy_from_slice((-(to_photo * centre)).as_slice());
                 }
             }
+        }
+    }
+}
+
+/// Disjoint sets of nodes (union-find).
+struct Joined(Vec<usize>);
+
+impl Joined {
+    fn root(&mut self, mut node: usize) -> usize {
+        while self.0[node] != node {
+            self.0[node] = self.0[self.0[node]];
+            node = self.0[node];
+        }
+        node
+    }
+
+    fn join(&mut self, nodes: impl IntoIterator<Item = usize>) {
+        let mut nodes = nodes.into_iter();
+        let Some(first) = nodes.next() else { return };
+        for node in nodes {
+            let [a, b] = [first, node].map(|node| self.root(node));
+            self.0[a.max(b)] = a.min(b);
         }
     }
 }

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use super::model::{FITS, Model};
 use super::{FirstValuesError, Search, Source};
+use crate::relative_orientation::Samples;
 use crate::relative_orientation::{Candidate, relative_orientation};
-use crate::sampling::Samples;
 use crate::similarity::{Similarity, Station, closed_form};
 use photocore::geometry::{Matrix3, Pose, Vector3};
 use photocore::internal::median;

@@ -2,8 +2,8 @@
 
 use super::model::Model;
 use super::{FirstValuesError, RESECTED, Search, Source};
+use crate::relative_orientation::Samples;
 use crate::resection::three_points;
-use crate::sampling::Samples;
 use photocore::geometry::{Pose, Ray, Vector3};
 use photocore::internal::median;
 

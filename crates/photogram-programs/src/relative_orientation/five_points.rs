@@ -12,7 +12,7 @@
 
 use nalgebra::{SMatrix, SVector, Schur};
 
-use super::oriented::Oriented;
+use super::Oriented;
 use photocore::geometry::{Matrix3, Vector3};
 use photocore::internal::principal_axes;
 

@@ -19,12 +19,9 @@
 //! ```
 
 mod five_points;
-mod oriented;
 
 pub use five_points::{five_points, over_plane};
-pub use oriented::Oriented;
 
-use super::sampling::Samples;
 use photocore::geometry::{Matrix3, Vector3};
 
 /// Number of samples: if a third of the pairs is wrong, one sample in eight is free of errors.
@@ -98,4 +95,92 @@ fn in_front(e: &Matrix3, pairs: &[[Vector3; 2]]) -> Option<Oriented> {
         pairs.iter().filter(|pair| oriented.distances(pair).iter().all(|&distance| distance > 0.0)).count()
     };
     all.max_by_key(count)
+}
+
+/// Fraction of the pairs that must fit: if a quarter of the observations is wrong, nearly half of the pairs are wrong.
+const JUDGED: f64 = 0.4;
+/// Largest difference of the direction cosines of equal poses.
+const SAME: f64 = 0.02;
+
+/// Pose of the second photo in the axes of the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Oriented {
+    /// Unit vector from the first projection centre to the second.
+    pub base: Vector3,
+    /// A, second photo to first.
+    pub attitude: Matrix3,
+}
+
+impl Oriented {
+    /// Returns the distances along two rays to their closest approach, in units of the base.
+    pub fn distances(&self, [first, second]: &[Vector3; 2]) -> [f64; 2] {
+        let turned = self.attitude * second;
+        let normal = first.cross(&turned);
+        let square = normal.norm_squared();
+        [self.base.cross(&turned).dot(&normal) / square, self.base.cross(first).dot(&normal) / square]
+    }
+
+    /// Returns the angle by which two rays fail to intersect, radians; 1 if they intersect behind a photo.
+    pub fn misfit(&self, pair: &[Vector3; 2]) -> f64 {
+        let [first, second] = pair;
+        let turned = self.attitude * second;
+        let (in_first, in_second) = (self.base.cross(&turned), first.cross(&self.base));
+        let size = (in_first.norm_squared() + in_second.norm_squared()).sqrt();
+        if size == 0.0 || self.distances(pair).iter().any(|&distance| distance < 0.0) {
+            return 1.0;
+        }
+        first.dot(&in_first).abs() / size
+    }
+
+    /// Returns the intersection angle of two rays, radians.
+    pub fn angle(&self, [first, second]: &[Vector3; 2]) -> f64 {
+        first.angle(&(self.attitude * second))
+    }
+
+    /// Returns the largest misfit of the fraction of the pairs that must fit.
+    pub(super) fn score(&self, pairs: &[[Vector3; 2]]) -> f64 {
+        let mut misfits: Vec<f64> = pairs.iter().map(|pair| self.misfit(pair)).collect();
+        let judge = (JUDGED * misfits.len() as f64) as usize;
+        *misfits.select_nth_unstable_by(judge, f64::total_cmp).1
+    }
+
+    /// Returns whether two poses are equal.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (self.attitude - other.attitude).amax() < SAME && (self.base - other.base).amax() < 5.0 * SAME
+    }
+}
+
+/// Generator of indices below a count: xorshift (Marsaglia 2003) with a fixed seed.
+#[derive(Debug)]
+pub(crate) struct Samples {
+    count: usize,
+    state: u64,
+}
+
+impl Samples {
+    /// Creates a generator of indices below `count`.
+    pub fn new(count: usize) -> Self {
+        Self { count, state: 0x9E37_79B9_7F4A_7C15 }
+    }
+
+    /// Returns N different indices; `count` must be at least N.
+    pub fn draw<const N: usize>(&mut self) -> [usize; N] {
+        let mut drawn = [usize::MAX; N];
+        for k in 0..N.min(self.count) {
+            drawn[k] = loop {
+                let next = self.next();
+                if !drawn[..k].contains(&next) {
+                    break next;
+                }
+            };
+        }
+        drawn
+    }
+
+    fn next(&mut self) -> usize {
+        self.state ^= self.state << 13;
+        self.state ^= self.state >> 7;
+        self.state ^= self.state << 17;
+        ((self.state >> 11) % self.count.max(1) as u64) as usize
+    }
 }

@@ -1,7 +1,7 @@
 //! Configurations that do not determine a pose.
 
 use photocore::geometry::Vector3;
-use photocore::geometry::axes::unit;
+use photocore::geometry::rotation::unit;
 
 /// Distance of all points from a line, relative to their extent, below which they are collinear.
 const COLLINEAR: f64 = 1e-7;

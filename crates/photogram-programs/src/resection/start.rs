@@ -3,7 +3,7 @@
 use super::degenerate::collinear;
 use super::three_points::{Placement, three_points};
 use super::{ControlPoint, Known, Pose, Resection, ResectionError};
-use photocore::geometry::axes::unit;
+use photocore::geometry::rotation::unit;
 use photocore::geometry::{
     CameraModel, Matrix3, ObjectSpace, Perspective, RotationSense, Vector3, local_vertical, nearest_turns,
     rotation_angles,

@@ -5,7 +5,7 @@
 //! equations are homogeneous: the cones l^T D1 l = 0 and l^T D2 l = 0. A cone D1 + g D2 with zero determinant is a pair of planes. On each
 //! plane one distance is a linear function of the other two, and a quadratic equation remains.
 
-use photocore::geometry::axes::{solve, unit};
+use photocore::geometry::rotation::{solve, unit};
 use photocore::geometry::{Matrix3, Vector3};
 
 /// Pose in cartesian object space: u = G (P - C).

@@ -13,7 +13,7 @@ use super::model::SCALE;
 use super::start::Chosen;
 use super::transform::{Matrix7, Similarity, propagate};
 use super::{SimilarityError, Station, determinacy};
-use photocore::geometry::axes::solve;
+use photocore::geometry::rotation::solve;
 use photocore::geometry::{Matrix3, Vector3};
 
 /// Redundancy number below which a test value is rounding noise.

@@ -14,7 +14,7 @@ use nalgebra::Matrix4;
 use super::transform::Similarity;
 use super::{SimilarityError, Station};
 use photocore::geometry::angle_axis::quaternion_rotation;
-use photocore::geometry::axes::solve;
+use photocore::geometry::rotation::solve;
 use photocore::geometry::{Matrix3, Vector3, rotation};
 
 /// Maximum number of steps of one descent, and the rotation step (rad) that ends it.

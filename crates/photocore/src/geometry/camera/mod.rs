@@ -10,7 +10,7 @@ mod radial_tangential;
 
 use std::sync::Arc;
 
-use super::axes::Vector3;
+use super::rotation::Vector3;
 
 pub use brown::{BrownCorrection, BrownTerms};
 pub use inverse::{Matrix2, RadialLimit};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::inverse::RadialLimit;
-use crate::geometry::axes::Vector3;
+use crate::geometry::rotation::Vector3;
 
 /// Mapping of u, a point in the photo's axes (the camera looks along -z), to image coordinates.
 ///
