@@ -93,11 +93,6 @@ pub fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Ma
     PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
 }
 
-/// Converts square matrices to an (n, N, N) array.
-pub fn squares<const N: usize>(py: Python<'_>, matrices: Vec<[[f64; N]; N]>) -> PyResult<Blocks<'_>> {
-    blocks(py, matrices)
-}
-
 /// Converts matrices to an (n, M, N) array.
 pub fn blocks<const M: usize, const N: usize>(
     py: Python<'_>,

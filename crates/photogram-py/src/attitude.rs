@@ -6,7 +6,7 @@ use photocore::geometry::attitude::{quaternion_by_step, vision_axes, vision_quat
 use photocore::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3};
 use pyo3::prelude::*;
 
-use crate::arrays::{Array, InputError, Matrix, from_rows, matrices, row_major, rows, squares, table};
+use crate::arrays::{Array, InputError, Matrix, blocks, from_rows, matrices, row_major, rows, table};
 
 /// Two arrays with one row or matrix per attitude.
 type RotationRow<'py, A, B> = PyResult<(Bound<'py, A>, Bound<'py, B>)>;
@@ -84,7 +84,7 @@ pub fn attitudes_from_numbers<'py>(
         }
     }
     let shape = [attitudes.len(), 3, numbers.shape()[1]];
-    Ok((squares(py, attitudes)?, PyArray1::from_vec(py, rates).reshape(shape)?))
+    Ok((blocks(py, attitudes)?, PyArray1::from_vec(py, rates).reshape(shape)?))
 }
 
 #[pyfunction]

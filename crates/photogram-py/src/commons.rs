@@ -6,7 +6,7 @@ use photocore::network::mounts::OnFrame;
 use photocore::network::{AdjustedCommon, Common, CommonKind, Mount};
 use pyo3::prelude::*;
 
-use crate::options::unknown;
+use crate::adjustment::unknown;
 
 /// Returns the types of shared parameters, each with the names and physical quantities of its components.
 pub fn kinds() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {

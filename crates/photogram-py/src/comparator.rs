@@ -9,7 +9,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
-use crate::arrays::{Array, Indices, check_lengths, indices, rows, squares, table};
+use crate::arrays::{Array, Indices, blocks, check_lengths, indices, rows, table};
 use crate::work::{Workers, watched};
 
 create_exception!(
@@ -120,9 +120,9 @@ fn told(py: Python<'_>, found: Solution) -> PyResult<ComparatorSolution> {
             .reshape([unknowns, unknowns])?
             .unbind(),
         case_placements: table(py, found.cases.iter().map(row).collect())?.unbind(),
-        case_cofactors: squares(py, found.case_cofactors)?.unbind(),
+        case_cofactors: blocks(py, found.case_cofactors)?.unbind(),
         grid_xy: table(py, found.points)?.unbind(),
-        grid_cofactors: squares(py, found.point_cofactors)?.unbind(),
+        grid_cofactors: blocks(py, found.point_cofactors)?.unbind(),
         grid_redundancy: table(py, found.point_redundancy)?.unbind(),
         residuals: table(py, found.residuals)?.unbind(),
         redundancy: table(py, found.redundancy)?.unbind(),

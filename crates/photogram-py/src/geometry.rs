@@ -1,20 +1,24 @@
-//! Geometry functions over the rows of arrays; the documentation is in `_photocore.pyi`.
+//! Geometry functions over the rows of arrays, features and nearest points; the documentation is in `_photocore.pyi`.
 
 use crate::arrays::{
-    Array, Blocks, Matrix, check_lengths, from_rows, matrices, numbers, row_major, rows, squares, table,
+    Array, Blocks, InputError, Matrix, Vector, blocks, check_lengths, from_rows, matrices, numbers,
+    row_major, rows, table,
 };
+use nalgebra::DMatrix;
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
-    self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Point, Refraction, RotationSense, View,
-    Water, WaterModel,
+    self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Point, Refraction, RotationSense, Vector3,
+    View, Water, WaterModel, nearest,
 };
+use photogram_programs::features::{Form, Measured, distance, measure};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 #[pyfunction]
 pub fn rotation_matrix<'py>(py: Python<'py>, angles: Array<'py>) -> PyResult<Blocks<'py>> {
     let angles = rows("angles", &angles)?;
-    squares(
+    blocks(
         py,
         py.detach(|| angles.into_iter().map(|angles| row_major(&geometry::rotation(angles))).collect()),
     )
@@ -31,7 +35,7 @@ pub fn rotation_angles<'py>(py: Python<'py>, matrices: Array<'py>) -> PyResult<M
 pub fn vector_rotations<'py>(py: Python<'py>, vectors: Array<'py>) -> PyResult<Blocks<'py>> {
     let vectors = rows("vectors", &vectors)?;
     let matrix = |vector: [f64; 3]| row_major(&geometry::angle_axis_rotation(&vector.into()));
-    squares(py, py.detach(|| vectors.into_iter().map(matrix).collect()))
+    blocks(py, py.detach(|| vectors.into_iter().map(matrix).collect()))
 }
 
 #[pyfunction]
@@ -184,4 +188,59 @@ pub fn object_space(spheroid: Option<(f64, f64)>) -> PyResult<ObjectSpace> {
 /// Returns the direction of the rotation matrix.
 pub fn rotation_sense(photo_to_ground: bool) -> RotationSense {
     if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto }
+}
+
+#[pyfunction]
+#[pyo3(signature = (points, others, limit, but = None))]
+pub fn nearest_points<'py>(
+    py: Python<'py>,
+    points: Array<'py>,
+    others: Array<'py>,
+    limit: f64,
+    but: Option<Vec<i64>>,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let (points, others) = (rows("points", &points)?, rows("others", &others)?);
+    if let Some(but) = &but {
+        check_lengths(("points", points.len()), &[("but", but.len())])?;
+    }
+    let but: Option<Vec<_>> = but.map(|but| but.into_iter().map(|k| usize::try_from(k).ok()).collect());
+    let found = py.detach(|| nearest(&points, &others, limit, but.as_deref()));
+    Ok(PyArray1::from_vec(py, found.into_iter().map(|k| k.map_or(-1, |k| k as i64)).collect()))
+}
+
+/// Names and whether they are lengths, values, covariance, deviations, test.
+type FeatureRow<'py> =
+    (Vec<(&'static str, bool)>, Vector<'py>, Matrix<'py>, Matrix<'py>, Option<(f64, usize)>);
+
+#[pyfunction]
+pub fn measured_feature<'py>(
+    py: Python<'py>,
+    kind: &str,
+    points: Array<'py>,
+    covariance: Array<'py>,
+) -> PyResult<FeatureRow<'py>> {
+    let points: Vec<Vector3> = rows("points", &points)?.into_iter().map(<Vector3>::from).collect();
+    let covariance = match covariance.shape() {
+        // The matrix is symmetric, so that row and column order are equivalent.
+        &[n, m] => DMatrix::from_iterator(n, m, covariance.as_array().iter().copied()),
+        _ => return Err(PyValueError::new_err("the covariance is no matrix")),
+    };
+    let found = py.detach(|| match (kind, points.as_slice()) {
+        ("distance", &[from, to]) => Some(distance(&[from, to], &covariance)),
+        _ => Form::named(kind).map(|form| measure(form, &points, &covariance)),
+    });
+    match found {
+        None => Err(PyValueError::new_err(format!("there is no {kind} of {} points", points.len()))),
+        Some(found) => row(py, found.map_err(|error| InputError::new_err(error.to_string()))?),
+    }
+}
+
+fn row(py: Python<'_>, found: Measured) -> PyResult<FeatureRow<'_>> {
+    let Measured { quantities, covariance, deviations, test } = found;
+    let names = quantities.iter().map(|each| (each.name, each.is_length)).collect();
+    let values = PyArray1::from_vec(py, quantities.iter().map(|each| each.value).collect());
+    let (n, m) = covariance.shape();
+    let covariance = PyArray1::from_slice(py, covariance.as_slice()).reshape([n, m])?;
+    let deviations = deviations.iter().map(|each| [each.value, each.sd, each.axial, each.axial_sd]).collect();
+    Ok((names, values, covariance, table(py, deviations)?, test.map(|test| (test.statistic, test.freedom))))
 }

@@ -1,5 +1,6 @@
 //! Extension module `photogram._photocore`: converts arrays, releases the GIL, and contains no further logic.
 
+mod adjustment;
 mod arrays;
 mod attitude;
 mod camera;
@@ -7,17 +8,12 @@ mod commons;
 mod comparator;
 mod control_networks;
 mod distributions;
-mod features;
-mod films;
 mod geometry;
-mod matching;
 mod memory;
 mod network;
 mod observations;
-mod options;
 mod resection;
 mod similarity;
-mod solution;
 mod stellar;
 mod text;
 mod trajectories;
@@ -32,11 +28,13 @@ mod _photocore {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::adjustment::{is_chord, judge_full_step, step_rules};
+    #[pymodule_export]
     use crate::attitude::{attitudes_from_numbers, nadir_boresight, numbers_of_attitudes};
     #[pymodule_export]
     use crate::camera::{
         camera_correct, camera_images, camera_models, camera_partials, camera_patches, camera_rays,
-        radial_domain,
+        film_places, film_readings, radial_domain,
     };
     #[pymodule_export]
     use crate::comparator::{ComparatorError, ComparatorSolution, adjust_comparator};
@@ -52,16 +50,10 @@ mod _photocore {
         student, student_limit,
     };
     #[pymodule_export]
-    use crate::features::measured_feature;
-    #[pymodule_export]
-    use crate::films::{film_places, film_readings};
-    #[pymodule_export]
     use crate::geometry::{
-        geocentric_to_geographic, geographic_to_geocentric, project, refraction_shift, rotation_angles,
-        rotation_matrix, rotation_vectors, vector_rotations,
+        geocentric_to_geographic, geographic_to_geocentric, measured_feature, nearest_points, project,
+        refraction_shift, rotation_angles, rotation_matrix, rotation_vectors, vector_rotations,
     };
-    #[pymodule_export]
-    use crate::matching::{nearest_points, star_similarities};
     #[pymodule_export]
     use crate::memory::give_back;
     #[pymodule_export]
@@ -83,11 +75,7 @@ mod _photocore {
     #[pymodule_export]
     use crate::network::state::BlockState;
     #[pymodule_export]
-    use crate::network::steps::{is_chord, judge_full_step, step_rules};
-    #[pymodule_export]
-    use crate::network::suspects::NetworkSuspects;
-    #[pymodule_export]
-    use crate::network::trial::NetworkTrial;
+    use crate::network::trial::{NetworkSuspects, NetworkTrial};
     #[pymodule_export]
     use crate::network::{BlockError, CollectionError};
     #[pymodule_export]
@@ -99,7 +87,7 @@ mod _photocore {
     #[pymodule_export]
     use crate::stellar::{
         StellarError, StellarProblem, plate_directions, plate_images, pointing_matrix, pointing_of_matrix,
-        refraction, standard_coordinates, star_places,
+        refraction, standard_coordinates, star_places, star_similarities,
     };
     #[pymodule_export]
     use crate::text::{TableReader, csv_rows, read_numbers};

@@ -10,9 +10,9 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Array, blocks, check_lengths, numbers, rows, squares, table};
+use crate::adjustment::{IterationRow, iteration_row, status_name};
+use crate::arrays::{Array, blocks, check_lengths, numbers, rows, table};
 use crate::geometry::{object_space, rotation_sense};
-use crate::solution::{IterationRow, iteration_row, status_name};
 use crate::work::{Workers, watched};
 
 create_exception!(_photocore, ResectionError, PyException, "The photo cannot be resected: (kind, message).");
@@ -149,7 +149,7 @@ fn told(py: Python<'_>, found: &Solution) -> PyResult<ResectionSolution> {
         cofactors: table(py, found.cofactors.to_vec())?.unbind(),
         pose_redundancy: PyArray1::from_slice(py, &found.redundancy).unbind(),
         point_positions: of_points(|point| point.coordinates)?,
-        point_cofactors: squares(py, found.points.iter().map(|point| point.cofactors).collect())?.unbind(),
+        point_cofactors: blocks(py, found.points.iter().map(|point| point.cofactors).collect())?.unbind(),
         point_redundancy: of_points(|point| point.redundancy)?,
         residuals: of_images(|image| image.residual)?,
         redundancy: of_images(|image| image.redundancy)?,

@@ -10,10 +10,10 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
+use crate::adjustment::{IterationRow, iteration_row, status_name};
 use crate::arrays::{
-    Array, Blocks, Matrix, Vector, check_lengths, from_rows, row_major, rows, squares, table,
+    Array, Blocks, Matrix, Vector, blocks, check_lengths, from_rows, row_major, rows, table,
 };
-use crate::solution::{IterationRow, iteration_row, status_name};
 use crate::work::{Workers, watched};
 
 create_exception!(
@@ -178,7 +178,7 @@ fn told(py: Python<'_>, found: Solution) -> PyResult<SimilaritySolution> {
         misclosures: of_stations(|station| station.misclosure.into())?,
         model_residuals: of_stations(|station| station.model_residual.into())?,
         adjusted_control: of_stations(|station| station.control.into())?,
-        control_cofactors: squares(py, cofactors.collect())?.unbind(),
+        control_cofactors: blocks(py, cofactors.collect())?.unbind(),
         redundancy: of_stations(|station| station.redundancy)?,
         standardized: of_stations(|station| station.standardized)?,
         weakness: found.weakness.map(|(cause, stations)| (cause.name(), stations)),
@@ -209,7 +209,7 @@ pub fn transform_points<'py>(
         };
         points.iter().zip(&points_sd).map(transform).unzip()
     });
-    Ok((table(py, positions)?, squares(py, covariances)?))
+    Ok((table(py, positions)?, blocks(py, covariances)?))
 }
 
 #[pyfunction]

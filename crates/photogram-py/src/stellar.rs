@@ -1,24 +1,25 @@
 //! Stellar camera calibration; the documentation is in `_photocore.pyi`.
 
+use nalgebra::Complex;
 use numpy::{PyArray1, PyArrayMethods};
 use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
 use photocore::geometry::{Air, Camera as Lens, Station, pointing, pointing_angles};
 use photogram_programs::stellar::{
-    Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, INTERIOR, Image, Kind, Observations,
-    Options, Rows, Star, StellarError as Failure, Tested, Tolerances, Weights,
+    Agreement, Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, INTERIOR, Image, Kind,
+    Observations, Options, Rows, Similarity, Star, StellarError as Failure, Tested, Tolerances, Weights,
+    best_voted, hypotheses,
 };
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::adjustment::{iteration_row, status_name, unknown};
 use crate::arrays::{
-    Array, Indices, Matrix, Vector, check_lengths, from_rows, indices, matrices, numbers, row_major, rows,
-    squares, table,
+    Array, Indices, Matrix, Vector, blocks, check_lengths, from_rows, group_rows, indices, matrices, numbers,
+    row_major, rows, table,
 };
-use crate::options::unknown;
-use crate::solution::{iteration_row, status_name};
 use crate::work::{Workers, watched};
 
 create_exception!(
@@ -393,8 +394,8 @@ impl StellarProblem {
 fn observations<'py>(py: Python<'py>, found: Observations) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("places", table(py, found.places)?)?;
-    dict.set_item("place_cofactors", squares(py, found.place_cofactors)?)?;
-    dict.set_item("place_inverses", squares(py, found.place_inverses)?)?;
+    dict.set_item("place_cofactors", blocks(py, found.place_cofactors)?)?;
+    dict.set_item("place_inverses", blocks(py, found.place_inverses)?)?;
     dict.set_item("residuals", table(py, found.residuals)?)?;
     dict.set_item("axis_residual", found.axis_residual)?;
     dict.set_item("sums_of_squares", found.sums_of_squares)?;
@@ -408,7 +409,7 @@ fn equations<'py>(py: Python<'py>, all: &[Rows]) -> PyResult<Bound<'py, PyDict>>
     let count = all.len();
     let dict = PyDict::new(py);
     dict.set_item("constant", table(py, all.iter().map(|rows| rows.constant).collect())?)?;
-    dict.set_item("star", squares(py, all.iter().map(|rows| rows.star).collect())?)?;
+    dict.set_item("star", blocks(py, all.iter().map(|rows| rows.star).collect())?)?;
     let pointing = all.iter().flat_map(|rows| rows.pointing).collect::<Vec<_>>().into_flattened();
     dict.set_item("pointing", PyArray1::from_vec(py, pointing).reshape([count, 2, 3])?)?;
     let common = all.iter().flat_map(|rows| rows.common).collect::<Vec<_>>().into_flattened();
@@ -436,4 +437,36 @@ fn failure(error: &Failure) -> PyErr {
         Failure::Index(_) | Failure::Lens | Failure::Layout(_) | Failure::Stopped(_) => ("input", vec![]),
     };
     StellarError::new_err((kind, error.to_string(), indices))
+}
+
+#[pyfunction]
+#[pyo3(signature = (images, stars, candidates, *, makers, tolerance, stretch, least, axis, limit, wanted))]
+pub fn star_similarities<'py>(
+    py: Python<'py>,
+    images: Array<'py>,
+    stars: Array<'py>,
+    candidates: Indices<'py>,
+    makers: usize,
+    tolerance: f64,
+    stretch: f64,
+    least: f64,
+    axis: Option<([f64; 2], f64)>,
+    limit: f64,
+    wanted: usize,
+) -> PyResult<(usize, Matrix<'py>)> {
+    let plane = |rows: Vec<[f64; 2]>| rows.into_iter().map(|[x, y]| Complex::new(x, y)).collect::<Vec<_>>();
+    let (images, stars) = (plane(rows("images", &images)?), plane(rows("stars", &stars)?));
+    let pairs: Vec<(usize, usize)> =
+        group_rows("candidates", &candidates)?.into_iter().map(|[image, star]| (image, star)).collect();
+    if pairs.iter().any(|&(image, star)| image >= makers.min(images.len()) || star >= stars.len()) {
+        return Err(PyValueError::new_err("a candidate is no image and star"));
+    }
+    let axis = axis.map(|([x, y], radius)| (Complex::new(x, y), radius));
+    let rule = Agreement { tolerance, stretch, least, axis };
+    let (count, best) = py.detach(|| {
+        let all = hypotheses(&images[..makers.min(images.len())], &stars, &pairs, &rule);
+        (all.len(), best_voted(&all, &images, &stars, makers, limit, wanted))
+    });
+    let row = |each: &Similarity| [each.factor.re, each.factor.im, each.shift.re, each.shift.im];
+    Ok((count, table(py, best.iter().map(row).collect())?))
 }

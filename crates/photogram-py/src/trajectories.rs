@@ -8,8 +8,8 @@ use photocore::network::Trajectory;
 use photocore::network::mounts::OnTrajectory;
 use pyo3::prelude::*;
 
+use crate::adjustment::unknown;
 use crate::arrays::{Array, InputError, Matrix, rows, table};
-use crate::options::unknown;
 
 /// Name, degree, and the numbers of a basis: reference and scale of a polynomial, knots of a spline.
 type BasisRow = (String, usize, Vec<f64>);

@@ -11,8 +11,8 @@ use photocore::adjustment::{Event, Phase, Watch};
 use pyo3::prelude::*;
 use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
+use crate::adjustment::iteration_row;
 use crate::memory;
-use crate::solution::iteration_row;
 
 /// Interval between two checks of signals and progress.
 const PATIENCE: Duration = Duration::from_millis(50);

@@ -8,13 +8,13 @@ use pyo3::prelude::*;
 
 use super::block_network::BlockNetwork;
 use super::{images, points};
+use crate::adjustment::{named_loss, named_ordering, unknown};
 use crate::arrays::{Array, Indices, check_lengths, indices, numbers, rows};
 use crate::camera::knotted;
 use crate::commons::{CommonRow, MountRow, common, mount};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
 use crate::memory::LOADED;
 use crate::observations::{Group, observations};
-use crate::options::{named_loss, named_ordering, unknown};
 use crate::trajectories::{TimedRow, TrajectoryRow, on_trajectory, trajectory};
 
 /// Model, parameters and standard deviations of a camera, covariance matrix of the weighted ones row by row, knots.

@@ -14,8 +14,8 @@ use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
 use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
+use crate::adjustment::unknown;
 use crate::arrays::{Array, Indices, Vector, indices, numbers};
-use crate::options::unknown;
 use crate::work::{Workers, watched};
 
 /// Block with the options of its adjustment.

@@ -13,9 +13,9 @@ use super::state::BlockState;
 use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
 use super::{CollectionError, failure, images, points, said};
+use crate::adjustment::{named_loss, named_ordering, unknown};
 use crate::arrays::{Array, Indices, Matrix, check_lengths, rows, slices, table};
 use crate::memory::LOADED;
-use crate::options::{named_loss, named_ordering, unknown};
 use crate::work::{Workers, watched};
 
 /// Collection with the options of its adjustment.

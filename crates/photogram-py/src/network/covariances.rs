@@ -6,10 +6,10 @@ use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, 
 use pyo3::prelude::*;
 
 use super::state::BlockState;
-use super::suspects::NetworkSuspects;
+use super::trial::NetworkSuspects;
 use super::{BlockError, failure};
+use crate::adjustment::unknown;
 use crate::arrays::{Array, Blocks, Indices, Matrix, Vector, group_rows, matrix};
-use crate::options::unknown;
 use crate::work::{Workers, watched};
 
 /// Covariances of an adjusted block, from one factor.

@@ -9,8 +9,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{
-    Array, Blocks, Indices, InputError, Matrix, check_lengths, from_rows, indices, matrices, numbers,
-    row_major, rows, squares, table,
+    Array, Blocks, Indices, InputError, Matrix, blocks, check_lengths, from_rows, indices, matrices, numbers,
+    row_major, rows, table,
 };
 use crate::work::{Workers, watched};
 
@@ -128,7 +128,7 @@ fn row(py: Python<'_>, found: Found) -> PyResult<FoundRow<'_>> {
     };
     Ok((
         table(py, positions)?,
-        squares(py, attitudes)?,
+        blocks(py, attitudes)?,
         sources,
         table(py, found.points.iter().map(point).collect())?,
         PyArray1::from_vec(py, found.set_aside),

@@ -9,8 +9,6 @@ pub mod node;
 pub mod snooping;
 pub mod solution;
 pub mod state;
-pub mod steps;
-pub mod suspects;
 mod tables;
 pub mod trial;
 

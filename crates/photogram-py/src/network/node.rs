@@ -19,7 +19,7 @@ use super::covariances::refused;
 use super::solution::BlockSolution;
 use super::tables::Told;
 use super::{FailureRow, failure};
-use crate::options::unknown;
+use crate::adjustment::unknown;
 use crate::arrays::{Array, InputError, Vector, numbers};
 use crate::work::{Workers, watched};
 

@@ -12,8 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::trial::NetworkTrial;
-use crate::options::unknown;
-use crate::solution::status_name;
+use crate::adjustment::{status_name, unknown};
 use crate::work::watched;
 
 /// Data snooping of a network; see the stub.

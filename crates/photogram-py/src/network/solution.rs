@@ -11,10 +11,10 @@ use pyo3::types::PyDict;
 use super::state::BlockState;
 use super::tables::Told;
 use super::{FailureRow, failure};
-use crate::arrays::{Blocks, Matrix, squares, table};
+use crate::adjustment::{IterationRow, iteration_row, operations, predictions, seconds, status_name};
+use crate::arrays::{Blocks, Matrix, blocks, table};
 use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
 use crate::observations::{Adjusted, adjusted};
-use crate::solution::{IterationRow, iteration_row, operations, predictions, seconds, status_name};
 
 /// Returns the cofactors of the unknowns of each photo, (n, N, N); zero for fixed unknowns.
 fn photo_cofactors<'py>(py: Python<'py>, photos: &[AdjustedPhoto], unknowns: usize) -> PyResult<Blocks<'py>> {
@@ -128,7 +128,7 @@ impl NetworkSolution {
             photo_cofactors: photo_cofactors(py, &told.solution.photos, unknowns)?.unbind(),
             photo_redundancy: photo_redundancy(py, &told.solution.photos, unknowns)?.unbind(),
             point_positions: table(py, take(&mut told.point_positions))?.unbind(),
-            point_cofactors: squares(py, take(&mut told.point_cofactors))?.unbind(),
+            point_cofactors: blocks(py, take(&mut told.point_cofactors))?.unbind(),
             point_redundancy: table(py, take(&mut told.point_redundancy))?.unbind(),
             point_rays: PyArray1::from_vec(py, take(&mut told.point_rays)).unbind(),
             residuals: table(py, take(&mut told.residuals))?.unbind(),

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 use photocore::network::{Converged, InnerConstraints, Joint, NetworkDatum, State};
 use pyo3::prelude::*;
 
+use crate::adjustment::{named_ordering, unknown};
 use crate::arrays::{Matrix, matrix};
-use crate::options::{named_ordering, unknown};
 
 /// Datum: name, points, photos, whether scale is constrained, photos with constrained attitudes, radius that converts them to lengths.
 pub type DatumRow = (String, Vec<usize>, Vec<usize>, bool, Vec<usize>, Option<f64>);
