@@ -34,7 +34,7 @@ EXTENSIONS = {
     "observation": (
         KINDS / "equal_height.rs",
         KINDS / "mod.rs",
-        "equal_height::EqualHeight;",
+        'equal_height { EqualHeight = "equal height", sd; }',
         r"EqualHeight|equal.height",
         [*CRATE, *BINDING],
     ),

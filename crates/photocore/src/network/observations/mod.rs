@@ -92,9 +92,7 @@ kinds! { $
         Distance = "distance", sd;
         Difference = "difference", precision;
     }
-    equal_height {
-        EqualHeight = "equal height", sd;
-    }
+    equal_height { EqualHeight = "equal height", sd; }
     on_figure {
         OnLevel = "on level", sd;
         OnPlane = "on plane", sd;
