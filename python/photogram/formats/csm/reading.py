@@ -383,8 +383,8 @@ def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple
         if not isinstance(holder, dict) or holder.get(name) is not None:
             continue
         known = f"{code}_{keyword}"
-        derive = _DERIVED.get(path, lambda _: None)
-        value = keywords[known].value if known in keywords else derive(tree)
+        derive = _DERIVED.get(path)
+        value = keywords[known].value if known in keywords else derive and derive(tree)
         if value is None:
             if name in holder or tree.value.get(group or name, 0) is None:
                 raise Tree(None, tree.file, f"/{path}").error(phrase("csm.null", meaning=meaning))
