@@ -1195,7 +1195,7 @@ class FormedNode:
         *,
         threads: int,
     ) -> _Floats:
-        """Return solutions (d N,) of reduced right-hand sides, or the chord (N,), from the outer ones (d, S); once."""
+        """Return solutions (d N,) of reduced rights, or the chord (N,), from the outer ones (d, S); once."""
 
     def invert(
         self,
