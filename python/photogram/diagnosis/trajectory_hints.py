@@ -24,7 +24,7 @@ from photogram.diagnosis.hypotheses import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
 from photogram.diagnosis.positions import arm_of
 from photogram.diagnosis.predictions import Predicted, predict
-from photogram.diagnosis.regression import UNKNOWN, eligible, given_points, relative
+from photogram.diagnosis.regression import MOST, UNKNOWN, eligible, given_points, relative
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -202,7 +202,6 @@ def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Blo
 
 
 LEAST = 4  # Predictable points that a photo needs
-MOST = 12  # Maximum number of examined photos
 POINTS = 300  # Points per photo
 SEEN = 0.8  # Least part of the points of a photo that its trajectory passes
 
