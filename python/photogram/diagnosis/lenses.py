@@ -84,12 +84,13 @@ def certificate_hints(result: Result) -> list[Message]:
     films, found = {int(of_photos[row]) for row, _ in result.films}, list[Message]()
     kind, suspects = KINDS.index("camera"), summary.suspects
     for tests in Tests(result).groups:
-        if tests.kind == type_name(kind) and tests.rows is not None:
-            for _, (place,) in tests.beyond(CHANCE / len(films)):
-                row = int(tests.rows[place])
-                group = np.flatnonzero((suspects.kinds == kind) & (suspects.subjects == row))[0]
-                message = _of_certificate(result, row, int(group)) if row in films else None
-                found += [Message(message)] * (message is not None)
+        if tests.kind != type_name(kind) or tests.rows is None:
+            continue
+        for _, (place,) in tests.beyond(CHANCE / len(films)):
+            row = int(tests.rows[place])
+            group = int(np.flatnonzero((suspects.kinds == kind) & (suspects.subjects == row))[0])
+            if row in films and (message := _of_certificate(result, row, group)) is not None:
+                found.append(Message(message))
     return found
 
 

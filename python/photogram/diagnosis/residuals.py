@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from photogram.diagnosis.findings import Section, finding, section_of, small_unit
@@ -11,20 +13,9 @@ from photogram.statistics.findings import Systematic
 from photogram.statistics.verdict import as_phrase
 
 
-def residuals(result: Result, patterns: list[Systematic]) -> Section:
+def residuals(result: Result, patterns: Sequence[Systematic]) -> Section:
     """Describe residuals, and report the patterns that the verdict finds over frames and on photos."""
     section = section_of("patterns")
-    _by_rays(result, section)
-    for each in patterns:
-        if each.significant and (each.large or each.subject):
-            photos, values = [str(each.subject)] * bool(each.subject), {"statistic": each.value}
-            kind = "photo-pattern" if photos else "systematic-pattern"
-            found = finding("look", as_phrase(each.sentence), photos, values=values, kind=kind)
-            section.findings.append(found)
-    return section
-
-
-def _by_rays(result: Result, section: Section) -> None:
     used = result.used_images
     unit, factor = small_unit(result.block.image_unit)
     rays, squares = result.point_rays[result.block.image_points], result.residuals**2
@@ -39,3 +30,10 @@ def _by_rays(result: Result, section: Section) -> None:
         column("redundancy", [result.redundancy[rows].mean() for rows in own], "Mean redundancy", decimals=3),
     ]
     section.parts.append(Table("", "Residuals by number of rays", columns))
+    for each in patterns:
+        if each.significant and (each.large or each.subject):
+            photos, values = [str(each.subject)] * bool(each.subject), {"statistic": each.value}
+            kind = "photo-pattern" if photos else "systematic-pattern"
+            found = finding("look", as_phrase(each.sentence), photos, values=values, kind=kind)
+            section.findings.append(found)
+    return section
