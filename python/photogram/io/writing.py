@@ -82,11 +82,13 @@ class _Target:
         return f"{self.path}.old"
 
     def open(self) -> io.BufferedRandom:
-        """Create the temporary file, with the permissions of the existing one."""
+        """Create the temporary file, with permissions and owner of the existing one."""
         mode = stat.S_IMODE(self.status.st_mode) & 0o777 if self.status else 0o666
         descriptor = os.open(self.path, NEW, mode)
         self.file = io.BufferedRandom(_File(descriptor, self.given, "w+b"))
         if self.status and sys.platform != "win32":
+            with suppress(OSError):  # Only a privileged process may set another owner.
+                os.fchown(descriptor, self.status.st_uid, self.status.st_gid)
             os.fchmod(descriptor, mode)
         return self.file
 
