@@ -75,7 +75,9 @@ mod _photocore {
     #[pymodule_export]
     use crate::network::state::BlockState;
     #[pymodule_export]
-    use crate::network::trial::{NetworkSuspects, NetworkTrial};
+    use crate::network::suspects::NetworkSuspects;
+    #[pymodule_export]
+    use crate::network::trial::NetworkTrial;
     #[pymodule_export]
     use crate::network::{BlockError, CollectionError};
     #[pymodule_export]

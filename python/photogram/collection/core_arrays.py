@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.remarks import too_coarse
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.memory import available_memory
 from photogram.network.core_arrays import CoreOptions

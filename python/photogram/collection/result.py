@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.collection.collection import POSE
 from photogram.collection.core_arrays import collection_network, collection_trial, named
+from photogram.collection.parameters import POSE
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.covariance import Adjusted, Failure, Things
 from photogram.results.network import AdjustedNetwork

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.collection.collection import Collection, parameters_of
-from photogram.collection.result import AdjustedCollection
 from photogram.io.parquet import Column
 from photogram.io.writing import Content
-from photogram.messages import Message
-from photogram.network.core_arrays import CoreOptions
 from photogram.network.frame import Frame
 from photogram.results.network_tables import TABLES
-from photogram.results.parts import Iteration
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -24,12 +17,13 @@ from photogram.results.result_files import (
     Part,
     image_parts,
     point_parts,
-    read_saved,
     sheet,
     written,
 )
-from photogram.statistics.findings import Removed
-from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram.collection import AdjustedCollection
+
 
 KIND = "collection"
 _AXES = ("x", "y", "z")
@@ -78,18 +72,3 @@ def collection_parts(names: tuple[str, ...], units: tuple[str, ...]) -> dict[str
 
 def _numbers(kind: str, rows: np.ndarray) -> Column:
     return Column(kind, rows.astype(np.int64), "", f"number of the {kind}, from 0")
-
-
-def read_collection_result(folder: Path, document: Mapping[str, Any]) -> AdjustedCollection:
-    """Read the result of a collection from a folder; InputError if files are invalid."""
-    saved = read_saved(folder, (CoreOptions, Iteration, Message, Phrase, Removed), document)
-    given = saved.members("collection", Collection)
-    images = saved.sheets["images"]
-    for kind in ("photo", "point"):
-        given[f"image_{kind}s"] = images.numbers(kind)
-    names, units = parameters_of(given["camera"])
-    own, arrays = saved.arrays(collection_parts(names, units), "collection")
-    collection = Collection(**given, **arrays)
-    return AdjustedCollection(
-        **saved.members("result", AdjustedCollection), **own, collection=collection, state=saved.state()
-    )

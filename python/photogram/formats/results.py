@@ -51,7 +51,7 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
         If pyarrow is not installed.
     """
     from photogram.collection.result_files import KIND as COLLECTION
-    from photogram.collection.result_files import read_collection_result
+    from photogram.collection.saved_result import read_collection_result
     from photogram.results.block_files import KIND as BLOCK
     from photogram.results.saved_block import read_block_result
 

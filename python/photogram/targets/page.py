@@ -25,7 +25,6 @@ from photogram.targets.drawing import (
 )
 from photogram.targets.grouping import Groups, residual_groups
 from photogram.targets.maps import UncertaintyMap, distance_text, map_name
-from photogram.targets.new_views import Suggestions
 from photogram.targets.tables import (
     STRETCHES,
     board_facts,
@@ -38,7 +37,7 @@ from photogram.targets.tables import (
 )
 
 if TYPE_CHECKING:
-    from photogram.targets import Calibrated, Worth
+    from photogram.targets import Calibrated, Suggestions, Worth
 
 
 @np.errstate(over="ignore", invalid="ignore")

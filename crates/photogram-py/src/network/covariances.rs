@@ -6,7 +6,7 @@ use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, 
 use pyo3::prelude::*;
 
 use super::state::BlockState;
-use super::trial::NetworkSuspects;
+use super::suspects::NetworkSuspects;
 use super::{BlockError, failure};
 use crate::adjustment::unknown;
 use crate::arrays::{Array, Blocks, Indices, Matrix, Vector, group_rows, matrix};

@@ -9,6 +9,7 @@ pub mod node;
 pub mod snooping;
 pub mod solution;
 pub mod state;
+pub mod suspects;
 mod tables;
 pub mod trial;
 

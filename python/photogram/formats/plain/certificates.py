@@ -11,8 +11,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError, message_of
-from photogram.film.certificate_check import age_remark, changed_remark, valid_certificate
 from photogram.film.distances import with_datum
+from photogram.film.validity import age_remark, changed_remark, valid_certificate
 from photogram.formats.plain.tables import Tables, columns_of
 from photogram.formats.plain.unknowns import Covariances
 from photogram.io.column_table import ColumnTable
