@@ -77,6 +77,15 @@ def test_a_principal_point_that_is_the_indicated_one_is_named(tmp_path: Path) ->
     assert (hint.code, hint.phrase.fields["camera"]) == ("film-lens.indicated", "rc10-2345")
 
 
+def test_all_parameters_of_a_camera_explain_at_least_as_much_as_each(tmp_path: Path) -> None:
+    # Their units differ (mm, 1/mm^2), and check points test them as well.
+    summary = placed(tmp_path, "autocollimation = [0.0, 0.0]").reliability_summary
+    assert summary is not None
+    own = summary.hypotheses.code == "camera"
+    statistics = dict(zip(summary.hypotheses.component[own], summary.hypotheses.statistic[own], strict=True))
+    assert statistics[-1] > max(value for component, value in statistics.items() if component >= 0)
+
+
 def test_a_principal_point_of_another_place_is_named(tmp_path: Path) -> None:
     [hint] = lens_hints(placed(tmp_path, "autocollimation = [0.03, 0.01]"))
     given = [hint.phrase.fields[name] for name in ("given_x", "given_y")]

@@ -29,6 +29,21 @@
 //! | factor and inverse | `normals` | `Factor`, `SelectedInverse`, `Cofactors` |
 //! | results | `adjustment` | `Adjustment`, `Leverages` |
 //! | results in the terms of the network | `network` | `Solution` |
+//!
+//! # Cofactors
+//!
+//! With the inverse normal matrix Q, the query for cofactors f^T Q g of any functions f and g of the unknowns is
+//! [`adjustment::Linearized::cofactors`]. Every other computation of cofactors has a reason:
+//!
+//! | quantity | function | reason |
+//! | --- | --- | --- |
+//! | blocks of Q in the pattern of the factor; a Q a^T of each observation | [`normals::System::invert`] | all of them in one traversal |
+//! | a Q a^T of pairs of equations, also of excluded ones | [`adjustment::Leverages::of_locals`], [`adjustment::Leverages::of_rows`] | from the selected inverse, without a solution |
+//! | Q h over all unknowns | [`adjustment::Linearized::solve_for`] | a vector, not a matrix of functions |
+//! | R z of errors z | [`adjustment::Linearized::project`] | R is not stored |
+//! | redundancy matrix of additional parameters | [`adjustment::Linearized::additional`] | right-hand sides of all observations, formed while points are eliminated |
+//! | Q in another datum | `adjustment::transformation` | changes any of these results without another factor |
+//! | Q of the outer blocks of a part | [`normals::InvertOptions`] | the parent system, which may be elsewhere, computes it |
 
 pub mod adjustment;
 pub mod geometry;

@@ -47,10 +47,10 @@ def with_checks(found: Facts, row: int, own: MutableMapping[str, Any], checks: i
     redundancy, score = g.T @ weighted, weighted.T @ differences
     if not hidden:
         # Directions without redundancy have no cofactors.
-        own_part = np.linalg.pinv(np.reshape(own["cofactors"], (k, k)), hermitian=True, rcond=SINGULAR)
+        own_part = _inverse(np.reshape(own["cofactors"], (k, k)))
         redundancy += own_part
         score += own_part @ own["estimate"]
-    cofactors = np.linalg.pinv(redundancy, hermitian=True, rcond=SINGULAR)
+    cofactors = _inverse(redundancy)
     estimate = cofactors @ score
     _take_over(found, row, float(score @ estimate), estimate, len(flat))
     if row < len(found["sets"]):
@@ -61,6 +61,14 @@ def with_checks(found: Facts, row: int, own: MutableMapping[str, Any], checks: i
             error = value / own_redundancy
             _take_over(found, row + part, float(value * error), np.array([error]), len(flat))
     return False
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Return the pseudo-inverse of a symmetric matrix whose rows may have different units."""
+    diagonal = matrix.diagonal()
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    both = np.outer(scale, scale)
+    return np.asarray(both * np.linalg.pinv(both * matrix, hermitian=True, rcond=SINGULAR))
 
 
 def _take_over(found: Facts, row: int, statistic: float, estimate: Floats, count: int) -> None:
