@@ -62,8 +62,10 @@ DATUM = frozenset(
 )
 """Errors that only change the datum: assumptions, unless independent observations test them.
 
-Then sizes that these do not detect are graded, whatever their plausible size, unless check points exist:
-their differences show the error of the datum."""
+Then sizes that these do not detect are graded, whatever their plausible size. Check points show the error of
+the datum; with them only errors of the scale are graded, because rigid motions do not deform the network."""
+
+SCALES = frozenset({"control-scale", "distance-scale", "scale"})
 
 UNGRADED = frozenset(
     {
@@ -142,7 +144,7 @@ class Hypotheses:
         code, effect = self.code[row], self.effects[row]
         if effect.checked or code in UNGRADED:
             return False
-        if code in DATUM and (self.compared or np.isnan(self.mdb[row, 0])):
+        if code in DATUM and (np.isnan(self.mdb[row, 0]) or (self.compared and code not in SCALES)):
             return False
         if code in SHARES and self.mdb[row, 0] < 1.0:
             return False
