@@ -241,7 +241,7 @@ def test_cameras_that_cannot_be(given, match):
         ({"cameras": ()}, "error.requires"),
         ({"cameras": (), "photo_cameras": None}, "principal_distances"),
         ({"principal_distances": np.full(12, -24.0)}, "error.exclusive"),
-        ({"cameras": "lens"}, "error.kind"),
+        ({"cameras": "lens"}, "error.list"),
         ({"cameras": 5}, "error.list"),
         ({"photo_cameras": [0] * 11}, "error.count"),
         ({"photo_cameras": [1] * 12}, "error.absent"),

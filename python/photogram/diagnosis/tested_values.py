@@ -49,7 +49,7 @@ def sizes_of_tests(result: Result) -> dict[str, Floats]:
         "image": (result.redundancy, result.standardized),
         "control": (result.point_redundancy, result.point_standardized),
         "station": (result.photo_redundancy, result.photo_standardized),
-        **{name: (each.redundancy, each.standardized) for name, each in result.kinds.items()},
+        **{f"observed {name}": (own.redundancy, own.standardized) for name, own in result.kinds.items()},
     }
     least = {"image": TESTABLE}
     return {

@@ -290,7 +290,8 @@ class Hypotheses:
         if not plausible:
             level, least = level / sum(not each["plausible"] for each in self.sets), UNKNOWN_PART
         if self.code[row] == "photo":
-            level /= len(self.suspects.given.photo_ids)
+            # Its pose nearly absorbs the shift: a large one explains gross errors of several images, too.
+            level, least = level / len(self.suspects.given.photo_ids), ABSURD_PART
         return bool(self.probability[row] < level and self.statistic[row] >= least * self.excess)
 
     def odds(self, rivals: float = -math.inf) -> float:

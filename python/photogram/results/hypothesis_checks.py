@@ -30,16 +30,20 @@ def single_checks(joint: Joint) -> tuple[Floats, Floats]:
     return np.array(found), np.array([len(own) for own in points], dtype=float)
 
 
-def with_checks(found: Facts, row: int, own: MutableMapping[str, Any], checks: int, joint: Joint) -> bool:
+def with_checks(
+    found: Facts, row: int, own: MutableMapping[str, Any], sizes: Floats, checks: int, joint: Joint
+) -> bool:
     """Test a set or a group with check points as further observations; return whether only these test it.
 
     Differences D of check points with the covariance C are independent of the residuals. If the parameters
     change them by G, D adds G' C^-1 D to the score s and G' C^-1 G to the redundancy R. The components of a
-    group, in the next rows, have T = s_k^2 / R_kk.
+    group, in the next rows, have T = s_k^2 / R_kk. `sizes` (k) of parameters in different units decide which
+    directions nothing determines.
     """
     flat, differences, inverse = joint
     hidden = bool(found["rank"][row] == 0)
     k = len(own["estimate"])
+    units = np.outer(sizes, sizes) if len(sizes) == k else np.ones((k, k))
     g = np.reshape(own["at_checks"], (-1, 3, k))[:checks].reshape(-1, k)[flat]
     if not np.isfinite(g).all() or not g.any():
         return False
@@ -47,10 +51,10 @@ def with_checks(found: Facts, row: int, own: MutableMapping[str, Any], checks: i
     redundancy, score = g.T @ weighted, weighted.T @ differences
     if not hidden:
         # Directions without redundancy have no cofactors.
-        own_part = _inverse(np.reshape(own["cofactors"], (k, k)))
+        own_part = _inverse(np.reshape(own["cofactors"], (k, k)), 1 / units)
         redundancy += own_part
         score += own_part @ own["estimate"]
-    cofactors = _inverse(redundancy)
+    cofactors = _inverse(redundancy, units)
     estimate = cofactors @ score
     _take_over(found, row, float(score @ estimate), estimate, len(flat))
     if row < len(found["sets"]):
@@ -63,12 +67,9 @@ def with_checks(found: Facts, row: int, own: MutableMapping[str, Any], checks: i
     return False
 
 
-def _inverse(matrix: Floats) -> Floats:
-    """Return the pseudo-inverse of a symmetric matrix whose rows may have different units."""
-    diagonal = matrix.diagonal()
-    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-    both = np.outer(scale, scale)
-    return np.asarray(both * np.linalg.pinv(both * matrix, hermitian=True, rcond=SINGULAR))
+def _inverse(matrix: Floats, units: Floats) -> Floats:
+    """Return the pseudo-inverse of a symmetric matrix, computed with elements times `units`."""
+    return np.asarray(units * np.linalg.pinv(units * matrix, hermitian=True, rcond=SINGULAR))
 
 
 def _take_over(found: Facts, row: int, statistic: float, estimate: Floats, count: int) -> None:

@@ -73,7 +73,9 @@ def hypotheses(
         effects[row] = Effect(changes[checks:], *sizes)
     if known and joint is not None:
         for row, own in [*enumerate(found["sets"]), *found["groups"].items()]:
-            if row in effects and with_checks(found, row, own, checks, joint):
+            of_set = row < len(found["sets"])
+            sizes = own["plausible"] if of_set else trial.deviations[suspects.rows(int(groups[row]))]
+            if row in effects and with_checks(found, row, own, sizes, checks, joint):
                 relative.add(row)
     for own in found["sets"]:
         if own["sd_between_photos"] is not None:
