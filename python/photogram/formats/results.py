@@ -22,7 +22,7 @@ from photogram.network.film_reduction import is_scanned
 from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.result import Result
 from photogram.results.result_files import SUMMARY, read_summary
-from photogram.results.tables import TABLES
+from photogram.results.tables import TABLE_FILES, TABLES
 from photogram.show.quantity import frame, unit_comments
 from photogram.words import Phrase, phrase
 
@@ -102,19 +102,7 @@ def read_project(path: Path, options: ReadOptions) -> Project:
     )
 
 
-_TABLES = {
-    "photos": "photo",
-    "points": "point",
-    "images": "image",
-    "control": "control",
-    "check_points": "check",
-    "stations": "station",
-    "observations": "observation",
-    "cameras": "camera",
-    "unknowns": "unknown",
-    "features": "feature",
-    "feature_deviations": "deviation",
-}
+_TABLES = {"photos": "photo", "points": "point", "images": "image", **TABLE_FILES}
 """File and kind of each table."""
 
 

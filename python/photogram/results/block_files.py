@@ -38,7 +38,7 @@ from photogram.results.result_files import (
     sheet,
     written,
 )
-from photogram.results.tables import TABLES
+from photogram.results.tables import TABLE_FILES, TABLES
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase
 
@@ -47,16 +47,6 @@ if TYPE_CHECKING:
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
-_TABLES = {
-    "control": "control",
-    "check_points": "check",
-    "stations": "station",
-    "observations": "observation",
-    "cameras": "camera",
-    "unknowns": "unknown",
-    "features": "feature",
-    "feature_deviations": "deviation",
-}
 
 
 def block_files(result: Result) -> dict[str, Content]:
@@ -77,7 +67,7 @@ def block_files(result: Result) -> dict[str, Content]:
     }
     if block.photo_cameras is not None:
         leading["photos"].append(_named("camera", block.camera_names, block.photo_cameras))
-    tables = {name: sheet(TABLES[kind](result)) for name, kind in _TABLES.items()}
+    tables = {name: sheet(TABLES[kind](result)) for name, kind in TABLE_FILES.items()}
     summary = {
         "title": block.title,
         "linear_unit": block.linear_unit,

@@ -16,9 +16,7 @@ FEWEST = 4  # Equal image observations of two photos
 SHARE = 0.5  # Share of equal observations of a photo
 FEWEST_OF_POINT = 2  # Equal image observations of two points
 EQUAL = 0.25  # Largest differences of copies, in standard deviations of image observations
-ROUNDED = (
-    0.1  # Digits of a value, in its standard deviation, whose equality in a second measurement is chance
-)
+ROUNDED = 0.1  # Last digit of equal values, in standard deviations, below which they are no chance
 
 
 def duplicates(block: Block, factor: float = 1.0) -> list[Phrase]:

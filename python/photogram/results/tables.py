@@ -400,6 +400,19 @@ TABLES: dict[str, Callable[[Any], list[Quantity]]] = {
 }
 
 
+TABLE_FILES = {
+    "control": "control",
+    "check_points": "check",
+    "stations": "station",
+    "observations": "observation",
+    "cameras": "camera",
+    "unknowns": "unknown",
+    "features": "feature",
+    "feature_deviations": "deviation",
+}
+"""Files with the kinds of their tables, without those of photos, points and images."""
+
+
 def table_frame(result: Any, what: str) -> pd.DataFrame:
     import pandas as pd  # slow
 

@@ -239,8 +239,8 @@ impl<'a> Extended<'a> {
     }
 
     /// Unknowns of an equation that are not fixed, with their coefficients.
-    pub fn free(&self, row: &Row<'_>) -> Vec<(usize, f64)> {
-        row.taken().filter(|own| !self.fixed[own.0]).collect()
+    pub fn free(&self, row: &Row<'_>) -> impl Iterator<Item = (usize, f64)> {
+        row.taken().filter(|own| !self.fixed[own.0])
     }
 
     /// The inverse of the normal matrix of a local block; zero if it has none.
@@ -543,7 +543,7 @@ pub(super) const PARTS: usize = 64;
 fn retained(extended: &Extended<'_>, count: usize) -> Sums {
     let layout = extended.equations.problem().layout();
     let (mut sums, mut work) = (Sums::new(count), Work::new(layout, count));
-    let (mut partials, mut shared) = (vec![], Shared::default());
+    let (mut partials, mut shared, mut others) = (vec![], Shared::default(), vec![]);
     extended.each_retained(|of, sd, row| {
         partials.clear();
         extended.parameters.partials(&Equation { of, sd, row }, &mut shared, &mut partials);
@@ -556,7 +556,9 @@ fn retained(extended: &Extended<'_>, count: usize) -> Sums {
         work.left.resize(work.columns.len(), 0.0);
         let left = &mut work.left;
         Work::each_active(&work.active, &partials, |column, partial| left[column] += partial);
-        sums.reduce(&extended.free(row), &mut work);
+        others.clear();
+        others.extend(extended.free(row));
+        sums.reduce(&others, &mut work);
     });
     sums
 }

@@ -135,9 +135,13 @@ impl Leverages {
         let others = (!same).then(|| self.equations(problem, threads));
         let of = |&local: &usize| {
             let (of_groups, of_ties) = rows_of_local(&asked, local);
-            let rows = [of_groups.clone(), terms(local)].concat();
-            let formed = others.as_ref().map_or((of_groups, of_ties), |formed| rows_of_local(formed, local));
-            let formed = [formed.0, formed.1].concat();
+            let mut rows = of_groups.clone();
+            rows.extend(terms(local));
+            let (mut formed, ties) = match &others {
+                Some(included) => rows_of_local(included, local),
+                None => (of_groups, of_ties),
+            };
+            formed.extend(ties);
             problem.system.local_cofactors(&self.selected, (&formed, &prior), &rows, local)
         };
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));

@@ -105,7 +105,8 @@ impl Linearized {
         extended.each_retained(|of, sd, row| {
             partials.clear();
             parameters.partials(&Equation { of, sd, row }, &mut shared, &mut partials);
-            sums.add(group_of(of), row.constant, &left(&extended.free(row), &partials));
+            let others: Vec<(usize, f64)> = extended.free(row).collect();
+            sums.add(group_of(of), row.constant, &left(&others, &partials));
         });
         sums
     }
