@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -248,25 +249,32 @@ def _agreement(result: Result, found: CheckPoints) -> Agreement:
     survey = np.zeros((len(found.rows), 3, 3))
     survey[:, range(3), range(3)] = found.given_sd**2
     scale, freedom = result.covariance_scale, result.freedom_of_scale
-    asked = partial(agreement, scale=scale, second=freedom, level=SUSPECT)
-    alone = asked(
-        found.differences,
-        result.point_cofactors[found.rows],
-        survey,
-        name=partial(_named, found.names),
-        apart=partial(_apart, found.differences, point_axes(result.block)),
-    )
-    if not result.WHOLE:
-        return alone
     some = together(len(found.rows))
-    joint = result.state.joint(found.rows[some].tolist())
-    if joint is None:
-        try:
+
+    def tested(cofactors: Floats, some: slice = slice(None)) -> Agreement:
+        names, differences = found.names[some], found.differences[some]
+        return agreement(
+            differences,
+            cofactors,
+            survey[some],
+            scale=scale,
+            second=freedom,
+            level=SUSPECT,
+            name=partial(_named, names),
+            apart=partial(_apart, differences, point_axes(result.block)),
+        )
+
+    joint = result.state.joint(found.rows[some].tolist()) if result.WHOLE else None
+    if joint is None and result.WHOLE:
+        # Not enough memory, or singular by rounding: single tests remain.
+        with suppress(AdjustmentError):
             joint = result.covariance(("point", found.names[some])) / result.covariance_scale
-        except AdjustmentError:  # not enough memory, or singular by rounding: single tests remain
-            return alone
-    every = asked(found.differences[some], joint, survey[some])
-    return replace(alone, together=every.together, joint=every.joint if len(survey) <= MOST else None)
+    if joint is None:
+        return tested(result.point_cofactors[found.rows])
+    every = tested(joint, some)
+    if len(survey) <= MOST:
+        return every
+    return replace(tested(result.point_cofactors[found.rows]), together=every.together)
 
 
 def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:

@@ -69,6 +69,8 @@ def with_checks(
 
 def _inverse(matrix: Floats, units: Floats) -> Floats:
     """Return the pseudo-inverse of a symmetric matrix, computed with elements times `units`."""
+    if matrix.size == 1:  # Most sets have one parameter
+        return np.divide(1.0, matrix, out=np.zeros((1, 1)), where=matrix != 0)
     return np.asarray(units * np.linalg.pinv(units * matrix, hermitian=True, rcond=SINGULAR))
 
 

@@ -82,7 +82,10 @@ def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
     scale = scale_of(covariance)
     scaled, y = covariance / np.outer(scale, scale), d / scale
     # The last row of the factor of C bordered by d is L^-1 d; a second elimination is unnecessary.
-    bordered = np.block([[scaled, y[:, np.newaxis]], [y, np.array([[BORDER * (1.0 + y @ y)]])]])
+    bordered = np.empty((len(d) + 1, len(d) + 1))
+    bordered[:-1, :-1] = scaled
+    bordered[-1, :-1] = bordered[:-1, -1] = y
+    bordered[-1, -1] = BORDER * (1.0 + y @ y)
     root = root_of(bordered)
     if root is not None:
         return float(root[-1, :-1] @ root[-1, :-1]), float(len(d))

@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{ObservationEquations, Row};
 use super::group_test::Few;
@@ -16,7 +17,7 @@ use super::loss::Reweighting;
 use super::problem::AnyProblem;
 use super::terms::Terms;
 use super::walk::Buffers;
-use crate::normals::{Layout, dot};
+use crate::normals::Layout;
 use crate::{Threads, parallel};
 
 /// An observation equation of unit weight.
@@ -159,12 +160,12 @@ impl LocalRows {
         partials.extend(scratch.iter().filter(|partial| is_tie || partial.1 != 0.0));
         let start = own.len();
         own.resize(start + *width, 0.0);
-        for (unknown, value) in row.taken().filter(|own| !to.fixed[own.0]) {
+        row.taken().filter(|own| !to.fixed[own.0]).for_each(|(unknown, value)| {
             match unknown.checked_sub(first) {
                 Some(k) if k < *width => own[start + k] = value,
                 _ => others.push((unknown, value)),
             }
-        }
+        });
         constants.push(row.constant);
         ends.push((others.len(), partials.len()));
     }
@@ -287,140 +288,150 @@ fn invert(matrix: &mut [f64], count: usize) {
     }
 }
 
-/// The sums over some observations.
+/// The sums over some observations. Matrices are stored row by row; parameters are numbered as they appear, because those on which most
+/// equations depend then stand together.
 struct Sums {
-    score: DVector<f64>,
-    squares: DMatrix<f64>,
-    /// What local blocks take up of the squares.
-    taken: DMatrix<f64>,
+    /// Number of each parameter, and the parameters by their numbers.
+    numbers: Vec<u32>,
+    parameters: Vec<usize>,
     observations: Vec<usize>,
-    /// Unknowns that are not local, with their right-hand sides: an element per parameter.
-    unknowns: Vec<usize>,
+    /// Length of the rows: the number of parameters and zeros, a multiple of the lanes.
+    stride: usize,
+    score: Vec<f64>,
+    squares: Vec<f64>,
+    /// What local blocks take up of the squares.
+    taken: Vec<f64>,
+    /// Right-hand sides of unknowns that are not local: a row for each of these unknowns, which are numbered as they appear.
     rights: Vec<f64>,
-}
-
-/// Buffers of a thread for sums.
-struct Work {
+    places: Vec<u32>,
+    unknowns: Vec<usize>,
     /// First unknown that is not local.
     first: usize,
-    /// Place of each of these in the sums.
-    places: Vec<u32>,
-    /// Parameters that the equations of a local block depend on, and the place of each parameter among them.
-    columns: Vec<usize>,
-    active: Vec<Option<usize>>,
-    /// Right-hand sides of a local block by these parameters, its solutions, and partials of an equation.
-    right: Vec<f64>,
-    solved: Vec<f64>,
-    left: Vec<f64>,
 }
 
-/// A place that is not used.
+/// Buffers of a thread for the equations of one block: their partials, right-hand sides of its unknowns, and solutions, row by row.
+#[derive(Default)]
+struct Work {
+    partials: Vec<f64>,
+    right: Vec<f64>,
+    solved: Vec<f64>,
+}
+
+/// A number that is not given yet.
 const NONE: u32 = u32::MAX;
+/// Elements of the longest vector of a machine.
+const LANES: usize = 8;
 
-impl Work {
-    fn new(layout: &Layout, count: usize) -> Self {
-        let first = layout.all_locals().end;
-        Self {
-            first,
-            places: vec![NONE; layout.unknowns() - first],
-            columns: vec![],
-            active: vec![None; count],
-            right: vec![],
-            solved: vec![],
-            left: vec![],
-        }
+/// sum += factor times a vector of as many elements, a multiple of the lanes.
+#[inline(always)]
+fn add_multiple<S: Simd>(simd: S, sum: &mut [f64], factor: f64, own: &[f64]) {
+    let (sum, own, factor) = (S::as_mut_simd_f64s(sum).0, S::as_simd_f64s(own).0, simd.splat_f64s(factor));
+    sum.iter_mut().zip(own).for_each(|(sum, own)| *sum = simd.mul_add_f64s(*own, factor, *sum));
+}
+
+/// The number of an object, the next one if it has none yet.
+#[inline(always)]
+fn numbered(numbers: &mut [u32], all: &mut Vec<usize>, object: usize) -> usize {
+    if numbers[object] == NONE {
+        numbers[object] = all.len() as u32;
+        all.push(object);
     }
+    numbers[object] as usize
+}
 
-    /// Sets the parameters of the next equations.
-    fn select(&mut self, partials: &[(usize, f64)]) {
-        self.columns.drain(..).for_each(|column| self.active[column] = None);
-        for &(column, _) in partials {
-            if self.active[column].is_none() {
-                self.active[column] = Some(self.columns.len());
-                self.columns.push(column);
+/// Adds the equations of a block to sums; `inverse` is that of its normal matrix, `width` the length of the rows of `work`.
+struct Add<'a> {
+    sums: &'a mut Sums,
+    work: &'a mut Work,
+    rows: &'a LocalRows,
+    inverse: &'a [f64],
+    width: usize,
+}
+
+impl WithSimd for Add<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { sums, work: Work { partials, right, solved }, rows, inverse, width } = self;
+        let (stride, size) = (sums.stride, rows.width);
+        for (k, partials) in partials.chunks_exact(width).enumerate() {
+            add_multiple(simd, &mut sums.score[..width], rows.constants[k], partials);
+            for (row, &first) in partials.iter().enumerate().filter(|own| *own.1 != 0.0) {
+                add_multiple(simd, &mut sums.squares[row * stride..][..width], first, partials);
+            }
+            for (right, &own) in right.chunks_exact_mut(width).zip(&rows.own[k * size..]) {
+                add_multiple(simd, right, own, partials);
             }
         }
-    }
-
-    /// Calls `add` with the place of each parameter among the active ones, and its partial.
-    fn each_active(active: &[Option<usize>], partials: &[(usize, f64)], mut add: impl FnMut(usize, f64)) {
-        partials
-            .iter()
-            .for_each(|&(column, partial)| active[column].into_iter().for_each(|k| add(k, partial)));
+        for (solved, inverse) in solved.chunks_exact_mut(width).zip(inverse.chunks_exact(size.max(1))) {
+            right
+                .chunks_exact(width)
+                .zip(inverse)
+                .for_each(|(right, &own)| add_multiple(simd, solved, own, right));
+        }
+        for (right, solved) in right.chunks_exact(width).zip(solved.chunks_exact(width)) {
+            for (row, &right) in right.iter().enumerate().filter(|own| *own.1 != 0.0) {
+                add_multiple(simd, &mut sums.taken[row * stride..][..width], right, solved);
+            }
+        }
+        let mut start = 0;
+        for (k, left) in partials.chunks_exact_mut(width).enumerate() {
+            for (solved, &own) in solved.chunks_exact(width).zip(&rows.own[k * size..]) {
+                add_multiple(simd, left, -own, solved);
+            }
+            let end = rows.ends[k].0;
+            for &(unknown, coefficient) in &rows.others[start..end] {
+                let place = sums.places[unknown - sums.first] as usize;
+                add_multiple(simd, &mut sums.rights[place * stride..][..width], coefficient, left);
+            }
+            start = end;
+        }
     }
 }
 
 impl Sums {
-    fn new(count: usize) -> Self {
+    fn new(layout: &Layout, count: usize) -> Self {
+        let (first, stride) = (layout.all_locals().end, count.next_multiple_of(LANES));
         Self {
-            score: DVector::zeros(count),
-            squares: DMatrix::zeros(count, count),
-            taken: DMatrix::zeros(count, count),
+            numbers: vec![NONE; count],
+            parameters: vec![],
             observations: vec![0; count],
-            unknowns: vec![],
+            stride,
+            score: vec![0.0; stride],
+            squares: vec![0.0; stride * count],
+            taken: vec![0.0; stride * count],
             rights: vec![],
+            places: vec![NONE; layout.unknowns() - first],
+            unknowns: vec![],
+            first,
         }
     }
 
-    /// Adds an equation to scores and squares.
-    fn add(&mut self, constant: f64, partials: &[(usize, f64)]) {
-        for &(i, first) in partials {
-            self.observations[i] += 1;
-            self.score[i] += first * constant;
-            partials.iter().for_each(|&(j, second)| self.squares[(i, j)] += first * second);
+    /// Adds the equations of a block; `inverse` is that of its normal matrix.
+    fn add(&mut self, rows: &LocalRows, inverse: &[f64], work: &mut Work) {
+        let mut last = 0;
+        for &(parameter, _) in &rows.partials {
+            self.observations[parameter] += 1;
+            last = last.max(numbered(&mut self.numbers, &mut self.parameters, parameter));
         }
-    }
-
-    /// Adds an equation to the right-hand sides, with its partials `left` by the selected parameters.
-    fn reduce(&mut self, others: &[(usize, f64)], work: &mut Work) {
-        let count = self.observations.len();
-        for &(unknown, coefficient) in others {
-            let place = &mut work.places[unknown - work.first];
-            if *place == NONE {
-                *place = self.unknowns.len() as u32;
-                self.unknowns.push(unknown);
-                self.rights.resize(self.unknowns.len() * count, 0.0);
-            }
-            let right = &mut self.rights[*place as usize * count..][..count];
-            work.columns.iter().zip(&work.left).for_each(|(&k, partial)| right[k] += partial * coefficient);
+        for &(unknown, _) in &rows.others {
+            numbered(&mut self.places, &mut self.unknowns, unknown - self.first);
         }
-    }
-
-    /// Adds a local block.
-    fn add_local(&mut self, to: &Extended<'_>, local: usize, rows: &LocalRows, work: &mut Work) {
-        if rows.partials.is_empty() {
-            return;
+        self.rights.resize(self.unknowns.len() * self.stride, 0.0);
+        let width = (last + 1).next_multiple_of(LANES);
+        for (matrix, count) in [
+            (&mut work.partials, rows.of.len()),
+            (&mut work.right, rows.width),
+            (&mut work.solved, rows.width),
+        ] {
+            matrix.clear();
+            matrix.resize(count * width, 0.0);
         }
-        work.select(&rows.partials);
-        let (width, count) = (rows.width, work.columns.len());
-        work.right.clear();
-        work.right.resize(width * count, 0.0);
-        for (constant, own, _, partials) in rows.rows() {
-            self.add(constant, partials);
-            let right = &mut work.right;
-            Work::each_active(&work.active, partials, |column, partial| {
-                let right = &mut right[column * width..][..width];
-                right.iter_mut().zip(own).for_each(|(sum, value)| *sum += value * partial);
-            });
+        for ((.., partials), to) in rows.rows().zip(work.partials.chunks_exact_mut(width)) {
+            partials.iter().for_each(|own| to[self.numbers[own.0] as usize] += own.1);
         }
-        let inverse = to.inverse(local, rows);
-        work.solved.clear();
-        for right in work.right.chunks_exact(width) {
-            let rows = inverse.chunks_exact(width);
-            work.solved.extend(rows.map(|row| dot(row, right)));
-        }
-        for (i, right) in work.columns.iter().zip(work.right.chunks_exact(width)) {
-            for (j, solved) in work.columns.iter().zip(work.solved.chunks_exact(width)) {
-                self.taken[(*i, *j)] += dot(right, solved);
-            }
-        }
-        for (_, own, others, partials) in rows.rows() {
-            work.left.clear();
-            work.left.extend(work.solved.chunks_exact(width).map(|solved| -dot(own, solved)));
-            let left = &mut work.left;
-            Work::each_active(&work.active, partials, |column, partial| left[column] += partial);
-            self.reduce(others, work);
-        }
+        Arch::new().dispatch(Add { sums: self, work, rows, inverse, width });
     }
 }
 
@@ -444,11 +455,13 @@ impl Linearized {
         let (count, layout) = (parameters.count(), problem.layout());
         let extended = self.extended(problem, parameters, threads);
         let of_locals = |locals: &mut dyn Iterator<Item = usize>| {
-            let (mut sums, mut work) = (Sums::new(count), Work::new(layout, count));
+            let (mut sums, mut work) = (Sums::new(layout, count), Work::default());
             let (mut rows, mut buffers) = (LocalRows::default(), Buffers::default());
             for local in locals {
                 extended.write(&mut buffers, local, &mut rows);
-                sums.add_local(&extended, local, &rows, &mut work);
+                if !rows.partials.is_empty() {
+                    sums.add(&rows, &extended.inverse(local, &rows), &mut work);
+                }
             }
             sums
         };
@@ -463,16 +476,22 @@ impl Linearized {
         };
         parts.push(retained(&extended, count));
 
-        let (mut sums, first) = (Sums::new(count), layout.all_locals().end);
+        let (mut score, mut observations) = (DVector::zeros(count), vec![0; count]);
+        let [mut squares, mut taken] = [(); 2].map(|()| DMatrix::zeros(count, count));
         // A parameter per row: the elements of an unknown follow each other.
-        let mut rights = DMatrix::zeros(count, layout.unknowns() - first);
+        let mut rights = DMatrix::zeros(count, layout.unknowns() - layout.all_locals().end);
         for part in parts {
-            sums.score += part.score;
-            sums.squares += part.squares;
-            sums.taken += part.taken;
-            sums.observations.iter_mut().zip(part.observations).for_each(|(sum, own)| *sum += own);
-            for (unknown, own) in part.unknowns.iter().zip(part.rights.chunks_exact(count.max(1))) {
-                rights.column_mut(unknown - first).iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+            observations.iter_mut().zip(&part.observations).for_each(|(sum, own)| *sum += own);
+            for (i, &parameter) in part.parameters.iter().enumerate() {
+                score[parameter] += part.score[i];
+                for (j, &other) in part.parameters.iter().enumerate() {
+                    squares[(other, parameter)] += part.squares[i * part.stride + j];
+                    taken[(other, parameter)] += part.taken[i * part.stride + j];
+                }
+            }
+            for (&unknown, own) in part.unknowns.iter().zip(part.rights.chunks_exact(part.stride.max(1))) {
+                let mut sum = rights.column_mut(unknown);
+                part.parameters.iter().zip(own).for_each(|(&parameter, own)| sum[parameter] += own);
             }
         }
         let columns = rights.transpose();
@@ -482,9 +501,8 @@ impl Linearized {
         let solve = |rights: &[f64]| self.factor.solve_reduced(layout, rights);
         let solved = threads.install(|| parallel::map_each(some, &solve)).concat();
         let effects = DMatrix::from_vec(columns.nrows(), count, solved);
-        let taken = sums.taken + rights * &effects;
-        let redundancy = &sums.squares - (&taken + taken.transpose()) / 2.0;
-        let Sums { score, squares, observations, .. } = sums;
+        taken += rights * &effects;
+        let redundancy = &squares - (&taken + taken.transpose()) / 2.0;
         Additional { score, squares, redundancy, effects, observations }
     }
 
@@ -539,26 +557,17 @@ const SOLVED: usize = 32;
 /// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
 pub(super) const PARTS: usize = 64;
 
-/// The sums over ties of retained blocks and over unknowns that are not local.
+/// The sums over ties of retained blocks and over unknowns that are not local: each equation is a block without unknowns of its own.
 fn retained(extended: &Extended<'_>, count: usize) -> Sums {
     let layout = extended.equations.problem().layout();
-    let (mut sums, mut work) = (Sums::new(count), Work::new(layout, count));
-    let (mut partials, mut shared, mut others) = (vec![], Shared::default(), vec![]);
+    let (mut sums, mut work) = (Sums::new(layout, count), Work::default());
+    let mut rows = LocalRows::default();
     extended.each_retained(|of, sd, row| {
-        partials.clear();
-        extended.parameters.partials(&Equation { of, sd, row }, &mut shared, &mut partials);
-        if partials.iter().all(|own| own.1 == 0.0) {
-            return;
+        rows.clear(0);
+        rows.push(extended, (of, sd, row), layout.unknowns());
+        if rows.partials.iter().any(|own| own.1 != 0.0) {
+            sums.add(&rows, &[], &mut work);
         }
-        sums.add(row.constant, &partials);
-        work.select(&partials);
-        work.left.clear();
-        work.left.resize(work.columns.len(), 0.0);
-        let left = &mut work.left;
-        Work::each_active(&work.active, &partials, |column, partial| left[column] += partial);
-        others.clear();
-        others.extend(extended.free(row));
-        sums.reduce(&others, &mut work);
     });
     sums
 }
