@@ -129,13 +129,12 @@ impl Trial {
         let alone = shared.then(|| found.alone(&self.assembled.problem, threads));
         let mut all = Tests::unknown(&self.suspects);
         let parts = all.parts(&self.suspects);
-        let fill = |_, (suspects, mut part): (&[Suspect], Part<'_>)| {
-            for suspect in suspects {
-                let size = suspect.rows.len();
-                part.put(size, self.test(suspect, (found, groups), &terms, alone.as_ref()));
+        let fill = |number: usize, mut part: Part<'_>| {
+            for index in TOGETHER * number..(TOGETHER * (number + 1)).min(self.suspects.len()) {
+                let suspect = self.suspects.get(index);
+                part.put(suspect.rows.len(), self.test(&suspect, (found, groups), &terms, alone.as_ref()));
             }
         };
-        let parts = self.suspects.all.chunks(TOGETHER).zip(parts).collect();
         threads.install(|| parallel::each_of(parts, &fill));
         Ok(all)
     }
@@ -155,7 +154,7 @@ impl Trial {
     /// Tests a group; None if all its rows are excluded.
     pub(super) fn test(
         &self,
-        suspect: &Suspect,
+        suspect: &Suspect<'_>,
         (found, groups): (&Leverages, &[f64]),
         terms: &Terms<'_>,
         alone: Option<&Alone>,
@@ -164,7 +163,7 @@ impl Trial {
             return self.image_test((group, point), (found, groups), alone);
         }
         let size = suspect.rows.len();
-        let taking: Vec<usize> = (0..size).filter(|&k| self.is_in(suspect.rows[k].0)).collect();
+        let taking: Vec<usize> = (0..size).filter(|&k| self.is_in(suspect.rows[k])).collect();
         if taking.is_empty() {
             return None;
         }
@@ -176,7 +175,7 @@ impl Trial {
         let cofactors = left(&leverages);
         let known = alone.map(|_| left(&by_point));
         let test = GroupTest::new(&residual, &cofactors, known.as_deref());
-        let rows: Vec<(Row, usize)> = taking.iter().map(|&k| suspect.rows[k]).collect();
+        let rows: Vec<Row> = taking.iter().map(|&k| suspect.rows[k]).collect();
         let units = self.units(suspect, &rows);
         let (error, error_sd) = in_units(&units, &test.error, &test.cofactors);
         let whole = taking.len() == size;
@@ -242,7 +241,7 @@ impl Trial {
     /// with additional observations, which are tested apart from them.
     fn leverages(
         &self,
-        suspect: &Suspect,
+        suspect: &Suspect<'_>,
         found: &Leverages,
         terms: &Terms<'_>,
         taking: &[usize],
@@ -250,7 +249,7 @@ impl Trial {
     ) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
         let problem = &self.assembled.problem;
         let (size, count) = (suspect.rows.len(), taking.len());
-        let residual = |&k: &usize| misclosure(suspect.rows[k].0, &self.observation_sd, found, terms);
+        let residual = |&k: &usize| misclosure(suspect.rows[k], &self.observation_sd, found, terms);
         let residuals = taking.iter().map(residual).collect();
         if let Home::Tie(tie) = suspect.home {
             let block = &found.cofactors.ties[problem.layout().tie_block(tie)];
@@ -273,14 +272,14 @@ impl Trial {
     /// Returns the whitened equations of the parameters of a group, over all parameters of its block; zero for excluded rows.
     pub(super) fn term_rows(
         &self,
-        suspect: &Suspect,
+        suspect: &Suspect<'_>,
         terms: &Terms<'_>,
     ) -> Result<Vec<Function>, NetworkError> {
         let (found, sd) = (self.found()?, &self.assembled.problem.sd);
         let range = self.unknowns_at(suspect.home);
-        let of = |&(row, _): &(Row, usize)| {
+        let of = |&row: &Row| {
             let mut function: Function = range.clone().map(|unknown| (unknown, 0.0)).collect();
-            if let Row::Unknown(unknown) = row {
+            if let Some(unknown) = self.unknown_of(row) {
                 let (row, _) = terms.row(unknown);
                 let free = row.into_iter().filter(|(i, _)| sd[*i] != 0.0 && !found.held.contains(i));
                 free.for_each(|(i, value)| function[i - range.start].1 = value);
@@ -318,10 +317,11 @@ impl Trial {
 }
 
 /// Returns the misclosure of a row, divided by its standard deviation.
-pub(super) fn misclosure(row: Row, observation_sd: &[f64], found: &Leverages, terms: &Terms<'_>) -> f64 {
-    match row {
-        Row::Equation(equation) => weighted(found.residuals[equation], observation_sd[equation]),
-        Row::Unknown(unknown) => terms.row(unknown).1,
+pub(super) fn misclosure((row, _): Row, observation_sd: &[f64], found: &Leverages, terms: &Terms<'_>) -> f64 {
+    let row = row as usize;
+    match row.checked_sub(observation_sd.len()) {
+        None => weighted(found.residuals[row], observation_sd[row]),
+        Some(unknown) => terms.row(unknown).1,
     }
 }
 

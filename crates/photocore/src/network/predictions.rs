@@ -54,20 +54,20 @@ impl Trial {
         let terms = self.terms(&self.sd, &found.values);
         let near = self.near(suspects, &self.observation_sd, &terms, threads)?;
         let predict = |(&index, near): (&usize, &RowCofactors)| {
-            let suspect = &self.suspects.all[index];
+            let suspect = self.suspects.get(index);
             let size = suspect.rows.len();
-            let out: Vec<usize> = (0..size).filter(|&k| !self.is_in(suspect.rows[k].0)).collect();
-            if out.is_empty() || self.is_gone(suspect) {
+            let out: Vec<usize> = (0..size).filter(|&k| !self.is_in(suspect.rows[k])).collect();
+            if out.is_empty() || self.is_gone(&suspect) {
                 return None;
             }
             let count = out.len();
             let leverages = DMatrix::from_row_slice(count, count, &sub(&near.equations, size, &out));
             let c = DMatrix::identity(count, count) + leverages;
-            let rows: Vec<(Row, usize)> = out.iter().map(|&k| suspect.rows[k]).collect();
-            let misclosures = rows.iter().map(|row| misclosure(row.0, &self.observation_sd, found, &terms));
+            let rows: Vec<Row> = out.iter().map(|&k| suspect.rows[k]).collect();
+            let misclosures = rows.iter().map(|&row| misclosure(row, &self.observation_sd, found, &terms));
             let d = DVector::from_iterator(count, misclosures);
             let statistic = d.dot(&c.clone().cholesky()?.solve(&d));
-            let (error, error_sd) = in_units(&self.units(suspect, &rows), d.as_slice(), c.as_slice());
+            let (error, error_sd) = in_units(&self.units(&suspect, &rows), d.as_slice(), c.as_slice());
             Some(Prediction { statistic, rows: out, error, error_sd })
         };
         Ok(suspects.iter().zip(&near).map(predict).collect())
@@ -86,7 +86,7 @@ impl Trial {
         let failed = |error| NetworkError::new(error, &self.assembled);
         let (mut places, mut ties) = (vec![], vec![]);
         for &index in suspects {
-            match self.suspects.all[index].home {
+            match self.suspects.get(index).home {
                 Home::Group { point, .. } => places.push(point),
                 Home::Tie(tie) => ties.push(tie),
                 Home::Point(_) | Home::Block(_) => {}
@@ -100,7 +100,7 @@ impl Trial {
             places.into_iter().zip(of_points.map_err(failed)?).collect();
         let mut of_ties = found.rows_of_ties(problem, observation_sd, &ties, threads).into_iter();
         let mut of = |&index: &usize| {
-            let suspect = &self.suspects.all[index];
+            let suspect = self.suspects.get(index);
             let size = suspect.rows.len();
             let rows = match suspect.home {
                 Home::Group { group, point } => {
@@ -108,7 +108,7 @@ impl Trial {
                     return Ok(of_points[&point].selected(first..first + size));
                 }
                 Home::Tie(_) => of_ties.next().unwrap_or_default(),
-                Home::Point(_) | Home::Block(_) => self.term_rows(suspect, terms)?,
+                Home::Point(_) | Home::Block(_) => self.term_rows(&suspect, terms)?,
             };
             found.of_rows(layout, &rows).map_err(|error| failed(error.into()))
         };
@@ -116,7 +116,7 @@ impl Trial {
     }
 
     /// Returns true if the parameters of a group are excluded with it: fixed now, but not in the input.
-    fn is_gone(&self, suspect: &Suspect) -> bool {
+    fn is_gone(&self, suspect: &Suspect<'_>) -> bool {
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
         let gone = |unknowns: std::ops::Range<usize>| {
             unknowns.into_iter().any(|unknown| problem.sd[unknown] == 0.0 && self.sd[unknown] != 0.0)
@@ -214,9 +214,9 @@ impl Trial {
 
     /// Returns the equations of observed coordinates of a local point.
     fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<Function> {
-        let mut own = self.on_place(place).iter().map(|&index| &self.suspects.all[index]);
+        let mut own = self.on_place(place).iter().map(|&index| self.suspects.get(index));
         let control = own.find(|suspect| matches!(suspect.home, Home::Point(_)));
-        control.and_then(|control| self.term_rows(control, terms).ok()).unwrap_or_default()
+        control.and_then(|control| self.term_rows(&control, terms).ok()).unwrap_or_default()
     }
 
     /// Returns the equation index of each row of the groups at a local point, and its whitened misclosure.
@@ -231,12 +231,12 @@ impl Trial {
         let groups = problem.layout().groups_of(place);
         let (mut rows, mut off) = (vec![], vec![]);
         for &index in self.on_place(place) {
-            let suspect = &self.suspects.all[index];
+            let suspect = self.suspects.get(index);
             let first = match suspect.home {
                 Home::Group { group, .. } => 2 * (group - groups.start),
                 _ => 2 * groups.len(),
             };
-            for (k, &(row, _)) in suspect.rows.iter().enumerate() {
+            for (k, &row) in suspect.rows.iter().enumerate() {
                 rows.push(first + k);
                 off.push(misclosure(row, observation_sd, found, terms));
             }

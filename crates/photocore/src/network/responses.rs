@@ -59,7 +59,7 @@ impl Covariances {
         let products =
             ObservationRows::products(problem, values, self.linearized.held(), &solutions, threads);
         let (width, suspects) = (solutions.len(), self.suspects());
-        let rows = || suspects.rows_of(0..suspects.all.len(), problem.layout().equations());
+        let rows = || suspects.rows_of(0..suspects.len());
         Ok((0..width)
             .flat_map(|k| rows().map(move |row| (row, k)))
             .map(|(row, k)| products[row * width + k])
@@ -74,7 +74,7 @@ impl Trial {
     /// # Errors
     /// Responses before any adjustment; an interruption, insufficient memory.
     pub fn responses(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
-        let all = self.rows_of(0..self.suspects.all.len());
+        let all = self.rows_of(0..self.suspects.len());
         let starts = self.suspects.row_starts();
         let asked: Vec<usize> = suspects.iter().flat_map(|&index| starts[index]..starts[index + 1]).collect();
         let mut columns = Vec::with_capacity(all.len() * asked.len());
@@ -136,7 +136,7 @@ impl Trial {
 
     /// Returns the rows of some groups among the rows of [`ObservationRows`].
     fn rows_of(&self, suspects: Range<usize>) -> Vec<usize> {
-        self.suspects.rows_of(suspects, self.assembled.problem.layout().equations()).collect()
+        self.suspects.rows_of(suspects).collect()
     }
 
     /// Returns, for each photo that steps by a rotation vector, the index of its angles and the matrix from steps to angles.
@@ -205,7 +205,7 @@ impl Trial {
         let is_photo = |block: Option<usize>| block.is_some_and(|block| block < model.cameras.len());
         let mut all = Vec::new();
         for (&index, own) in suspects.iter().zip(&near) {
-            let suspect = &self.suspects.all[index];
+            let suspect = self.suspects.get(index);
             let rows = suspect.rows.len();
             let carrier = match suspect.home {
                 Home::Group { group, .. } => Some(model.carrier(model.images[group].photo)),
@@ -262,7 +262,7 @@ impl Trial {
             rows.flat_map(|row| own.cofactors[row * count..][starts[j]..starts[j + 1]].to_vec()).collect()
         };
         let mut found = vec![];
-        let is_in = |&k: &usize| self.suspects.all[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
+        let is_in = |&k: &usize| self.suspects.get(own.suspects[k]).rows.iter().any(|&row| self.is_in(row));
         let taking_part: Vec<usize> = (0..own.suspects.len()).filter(is_in).collect();
         let alone: Vec<Vec<f64>> = (0..own.suspects.len()).map(|k| block(k, k)).collect();
         let odds: Vec<f64> = alone.iter().map(|cofactors| leverage_odds(from_identity(cofactors))).collect();

@@ -29,6 +29,17 @@ pub enum Subject {
     Common(usize),
 }
 
+/// Subjects of each type, in the order of the types.
+const SUBJECTS: [fn(usize) -> Subject; 7] = [
+    Subject::Image,
+    Subject::Control,
+    Subject::Position,
+    Subject::Attitude,
+    Subject::Observation,
+    Subject::Camera,
+    Subject::Common,
+];
+
 impl Subject {
     /// Returns the number of its type, in the order of the types.
     pub fn kind(self) -> usize {
@@ -42,15 +53,18 @@ impl Subject {
             Self::Common(_) => 6,
         }
     }
-}
 
-/// One component of a test group.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Row {
-    /// An equation, in the order of groups and rows, then of ties and rows.
-    Equation(usize),
-    /// A parameter as its own observation.
-    Unknown(usize),
+    /// Returns its index among those of its type.
+    pub fn index(self) -> usize {
+        let (Self::Image(index)
+        | Self::Control(index)
+        | Self::Position(index)
+        | Self::Attitude(index)
+        | Self::Observation(index)
+        | Self::Camera(index)
+        | Self::Common(index)) = self;
+        index
+    }
 }
 
 /// Location of the parameters of a test group.
@@ -66,30 +80,44 @@ pub(super) enum Home {
     Block(usize),
 }
 
+/// A row of a test group, numbered as in [`crate::adjustment::ObservationRows`] (equations of groups, of ties, then parameters as their
+/// own observations), and its component.
+pub(super) type Row = (u32, u32);
+
 /// A test group.
-#[derive(Debug, Clone)]
-pub(super) struct Suspect {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Suspect<'a> {
     pub subject: Subject,
     pub home: Home,
     /// Point of an image, or of its control.
     pub point: Option<usize>,
     /// Photo of an image, or of its position or attitude.
     pub photo: Option<usize>,
-    /// Rows, each with its component.
-    pub rows: SmallVec<[(Row, usize); 3]>,
+    pub rows: &'a [Row],
 }
 
 /// Active test groups: images in their order, then control, positions, attitudes, additional observations, cameras, shared parameters.
 /// Their rows are numbered consecutively.
 #[derive(Debug)]
 pub struct Suspects {
-    pub(super) all: Vec<Suspect>,
+    /// Number of equations of groups, of these and ties.
+    equations: [usize; 2],
+    /// Type and index of the subject of each group.
+    subjects: Vec<(u8, u32)>,
+    /// Point of an image, else the index of its home.
+    homes: Vec<u32>,
+    points: Vec<u32>,
+    photos: Vec<u32>,
+    rows: Vec<Row>,
     row_starts: Vec<usize>,
     block_starts: Vec<usize>,
     deviations: Vec<f64>,
     by_point: OnceLock<Lists>,
     by_photo: OnceLock<Lists>,
 }
+
+/// Number of an object that a group does not have, or place of an excluded image.
+const NONE: u32 = u32::MAX;
 
 /// Groups in the order of some objects.
 #[derive(Debug)]
@@ -99,17 +127,17 @@ struct Lists {
 }
 
 impl Lists {
-    fn new(objects: impl Iterator<Item = Option<usize>> + Clone) -> Self {
-        let count = objects.clone().flatten().max().map_or(0, |last| last + 1);
+    fn new(objects: &[u32]) -> Self {
+        let some = || objects.iter().enumerate().filter(|own| *own.1 != NONE);
+        let some = || some().map(|(group, &object)| (group, object as usize));
+        let count = some().map(|own| own.1 + 1).max().unwrap_or(0);
         let mut starts = vec![0; count + 1];
-        objects.clone().flatten().for_each(|object| starts[object + 1] += 1);
+        some().for_each(|own| starts[own.1 + 1] += 1);
         (0..count).for_each(|k| starts[k + 1] += starts[k]);
         let (mut next, mut groups) = (starts.clone(), vec![0; starts[count]]);
-        for (group, object) in objects.enumerate() {
-            if let Some(object) = object {
-                groups[next[object]] = group;
-                next[object] += 1;
-            }
+        for (group, object) in some() {
+            groups[next[object]] = group;
+            next[object] += 1;
         }
         Self { starts, groups }
     }
@@ -123,52 +151,108 @@ impl Lists {
 impl Suspects {
     /// Returns the test groups of a network with `count` images and the given cameras of its photos.
     pub(super) fn new(assembled: &Assembled, count: usize, camera_of_photo: &dyn Fn(usize) -> usize) -> Self {
-        let model = &assembled.problem.model;
-        let mut all = Vec::with_capacity(model.images.len() + model.points.len() + model.observations.len());
-        all.extend(images(assembled, count));
-        all.extend(of_points(assembled));
-        all.extend(of_photos(assembled));
-        all.extend(observations(assembled));
-        all.extend(of_blocks(assembled, camera_of_photo));
-        let problem = &assembled.problem;
-        let own = |suspect: &Suspect, row| {
-            deviation(&problem.model, suspect, row, (&problem.observation_sd, &problem.sd))
-        };
-        let mut deviations = Vec::with_capacity(all.iter().map(|suspect| suspect.rows.len()).sum());
-        for suspect in &all {
-            deviations.extend(suspect.rows.iter().map(|&row| own(suspect, row)));
-        }
-        Self::of_rows(all, deviations)
+        let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
+        let groups = layout.groups() * layout.rows();
+        let mut all = Self::empty(
+            [groups, layout.equations()],
+            model.images.len() + model.points.len() + model.observations.len(),
+        );
+        all.add_images(assembled, count);
+        all.add_points(assembled);
+        all.add_photos(assembled);
+        all.add_observations(assembled);
+        all.add_blocks(assembled, camera_of_photo);
+        all
     }
 
-    fn of_rows(all: Vec<Suspect>, deviations: Vec<f64>) -> Self {
-        let sizes = || all.iter().map(|suspect| suspect.rows.len());
+    /// Returns no groups, with room for some.
+    fn empty(equations: [usize; 2], count: usize) -> Self {
+        let starts = || {
+            let mut starts = Vec::with_capacity(count + 1);
+            starts.push(0);
+            starts
+        };
         Self {
-            row_starts: starts(sizes()),
-            block_starts: starts(sizes().map(|size| size.pow(2))),
-            deviations,
+            equations,
+            subjects: Vec::with_capacity(count),
+            homes: Vec::with_capacity(count),
+            points: Vec::with_capacity(count),
+            photos: Vec::with_capacity(count),
+            rows: Vec::with_capacity(2 * count),
+            row_starts: starts(),
+            block_starts: starts(),
+            deviations: Vec::with_capacity(2 * count),
             by_point: OnceLock::new(),
             by_photo: OnceLock::new(),
-            all,
         }
+    }
+
+    /// Adds a group, with the standard deviation of each row.
+    fn push(&mut self, suspect: &Suspect<'_>, deviations: impl Iterator<Item = f64>) {
+        let (subject, home) = (suspect.subject, suspect.home);
+        self.subjects.push((subject.kind() as u8, subject.index() as u32));
+        let (Home::Group { point: index, .. } | Home::Tie(index) | Home::Point(index) | Home::Block(index)) =
+            home;
+        self.homes.push(index as u32);
+        let number = |object: Option<usize>| object.map_or(NONE, |object| object as u32);
+        self.points.push(number(suspect.point));
+        self.photos.push(number(suspect.photo));
+        self.rows.extend_from_slice(suspect.rows);
+        self.row_starts.push(self.rows.len());
+        self.block_starts.push(self.block_starts[self.block_starts.len() - 1] + suspect.rows.len().pow(2));
+        self.deviations.extend(deviations);
+    }
+
+    /// Adds a group of an assembled network.
+    fn add(&mut self, assembled: &Assembled, suspect: &Suspect<'_>) {
+        let problem = &assembled.problem;
+        let sd = (&problem.observation_sd[..], &problem.sd[..]);
+        self.push(suspect, suspect.rows.iter().map(|&row| deviation(&problem.model, suspect, row, sd)));
     }
 
     /// Returns observations of unit weight, each a group, without points and photos.
     #[cfg(test)]
     pub(super) fn of_single_rows(count: usize, subject: fn(usize) -> Subject) -> Self {
-        let suspect = |row| Suspect {
-            subject: subject(row),
-            home: Home::Tie(row),
-            point: None,
-            photo: None,
-            rows: SmallVec::from_iter([(Row::Equation(row), 0)]),
+        let mut all = Self::empty([0, count], count);
+        for row in 0..count {
+            let rows = &[(row as u32, 0)];
+            let suspect =
+                Suspect { subject: subject(row), home: Home::Tie(row), point: None, photo: None, rows };
+            all.push(&suspect, std::iter::once(1.0));
+        }
+        all
+    }
+
+    /// Returns a group.
+    pub(super) fn get(&self, index: usize) -> Suspect<'_> {
+        let (subject, rows, home) =
+            (self.subject(index), &self.rows[self.rows(index)], self.homes[index] as usize);
+        let size = rows.len();
+        let home = match subject {
+            Subject::Image(_) if (rows[0].0 as usize) < self.equations[0] => {
+                Home::Group { group: rows[0].0 as usize / size, point: home }
+            }
+            Subject::Image(_) | Subject::Observation(_) => Home::Tie(home),
+            Subject::Control(_) => Home::Point(home),
+            _ => Home::Block(home),
         };
-        Self::of_rows((0..count).map(suspect).collect(), vec![1.0; count])
+        let object = |number: u32| (number != NONE).then_some(number as usize);
+        Suspect { subject, home, point: object(self.points[index]), photo: object(self.photos[index]), rows }
+    }
+
+    /// Returns all groups.
+    pub(super) fn all(&self) -> impl Iterator<Item = Suspect<'_>> {
+        (0..self.len()).map(|index| self.get(index))
+    }
+
+    fn subject(&self, index: usize) -> Subject {
+        let (kind, index) = self.subjects[index];
+        SUBJECTS[kind as usize](index as usize)
     }
 
     /// Returns the number of groups.
     pub(super) fn len(&self) -> usize {
-        self.all.len()
+        self.subjects.len()
     }
 
     /// Returns the rows of a group among all rows.
@@ -188,7 +272,7 @@ impl Suspects {
 
     /// Returns the groups of a point: its images and its control.
     pub(super) fn on_point(&self, point: usize) -> &[usize] {
-        self.by_point.get_or_init(|| Lists::new(self.all.iter().map(|suspect| suspect.point))).of(point)
+        self.by_point.get_or_init(|| Lists::new(&self.points)).of(point)
     }
 
     /// Returns the groups of a photo: its images, its position and its attitude.
@@ -197,7 +281,7 @@ impl Suspects {
     }
 
     fn by_photo(&self) -> &Lists {
-        self.by_photo.get_or_init(|| Lists::new(self.all.iter().map(|suspect| suspect.photo)))
+        self.by_photo.get_or_init(|| Lists::new(&self.photos))
     }
 
     /// Returns the number of photos with groups.
@@ -207,7 +291,7 @@ impl Suspects {
 
     /// Returns the object of each group.
     pub fn subjects(&self) -> impl Iterator<Item = Subject> {
-        self.all.iter().map(|suspect| suspect.subject)
+        (0..self.len()).map(|index| self.subject(index))
     }
 
     /// Returns the first row of each group among all rows, and the number of rows at the end.
@@ -217,7 +301,7 @@ impl Suspects {
 
     /// Returns the component of each row.
     pub fn components(&self) -> impl Iterator<Item = usize> {
-        self.all.iter().flat_map(|suspect| suspect.rows.iter().map(|&(_, component)| component))
+        self.rows.iter().map(|&(_, component)| component as usize)
     }
 
     /// Returns the given standard deviation of each row, in its unit.
@@ -225,13 +309,9 @@ impl Suspects {
         &self.deviations
     }
 
-    /// Returns the rows of some groups as numbered in [`crate::adjustment::ObservationRows`]: equations, then parameters.
-    pub(super) fn rows_of(&self, some: Range<usize>, equations: usize) -> impl Iterator<Item = usize> {
-        let number = move |&(row, _): &(Row, usize)| match row {
-            Row::Equation(equation) => equation,
-            Row::Unknown(unknown) => equations + unknown,
-        };
-        self.all[some].iter().flat_map(move |suspect| suspect.rows.iter().map(number))
+    /// Returns the numbers of the rows of some groups in [`crate::adjustment::ObservationRows`].
+    pub(super) fn rows_of(&self, some: Range<usize>) -> impl Iterator<Item = usize> {
+        self.rows[self.row_starts[some.start]..self.row_starts[some.end]].iter().map(|&(row, _)| row as usize)
     }
 }
 
@@ -246,133 +326,124 @@ fn starts(sizes: impl ExactSizeIterator<Item = usize>) -> Vec<usize> {
     all
 }
 
-/// Returns the standard deviation of a row of a group, given the standard deviations of equations and parameters.
+/// Returns the standard deviation of a row of a group, given those of the equations and of the parameters.
 pub(super) fn deviation(
     model: &Bundle,
-    suspect: &Suspect,
-    (row, component): (Row, usize),
+    suspect: &Suspect<'_>,
+    (row, component): Row,
     (of_equations, of_unknowns): (&[f64], &[f64]),
 ) -> f64 {
-    match (row, suspect.subject, suspect.home) {
-        (_, Subject::Observation(_), Home::Tie(tie)) => {
-            model.observations[tie - model.tied_images()].root.row(component).norm()
+    match (suspect.subject, suspect.home, (row as usize).checked_sub(of_equations.len())) {
+        (Subject::Observation(_), Home::Tie(tie), _) => {
+            model.observations[tie - model.tied_images()].root.row(component as usize).norm()
         }
-        (Row::Equation(equation), ..) => of_equations[equation],
-        (Row::Unknown(unknown), ..) => of_unknowns[unknown],
+        (.., None) => of_equations[row as usize],
+        (.., Some(unknown)) => of_unknowns[unknown],
     }
 }
 
-fn of_photos(assembled: &Assembled) -> Vec<Suspect> {
-    let model = &assembled.problem.model;
-    let halves = match model.poses {
-        PoseNumbers::Angles(_) => [0..3, 3..6],
-        PoseNumbers::Vectors => [3..6, 0..3],
-    };
-    let subjects: [fn(usize) -> Subject; 2] = [Subject::Position, Subject::Attitude];
-    let half = |(subject, half): (fn(usize) -> Subject, Range<usize>)| {
-        (0..model.cameras.len()).filter_map(move |photo| {
-            let first = model.of_block(photo).start + half.start;
-            weighted(assembled, subject(photo), Home::Block(photo), first..first + 3)
-        })
-    };
-    subjects.into_iter().zip(halves).flat_map(half).collect()
-}
-
-/// Returns groups of the weighted parameters of cameras and shared parameters.
-fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) -> Vec<Suspect> {
-    let model = &assembled.problem.model;
-    let with_camera = (0..model.cameras.len()).filter(|&photo| model.has_own_camera(photo));
-    let own = with_camera.filter_map(|photo| {
-        let block = model.of_photo(photo);
-        let subject = Subject::Camera(camera_of_photo(photo));
-        weighted(assembled, subject, Home::Block(photo), block.start + 6..block.end)
-    });
-    let shared = (0..model.stations()).flat_map(|block| {
-        let all = model.owners(block).into_iter();
-        all.filter_map(move |(owner, unknowns)| {
-            let subject = match owner {
-                Owner::Camera(camera) => Subject::Camera(camera),
-                Owner::Common(common) => Subject::Common(common),
-                Owner::Photo(_) => return None,
+impl Suspects {
+    /// Adds the active ones among `count` images, in their order.
+    fn add_images(&mut self, assembled: &Assembled, count: usize) {
+        let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
+        let groups = layout.groups();
+        let mut of_image = vec![(NONE, NONE); count];
+        for (point, images) in model.point_images.start.windows(2).enumerate() {
+            (images[0]..images[1])
+                .for_each(|place| of_image[model.point_images.order[place]] = (place as u32, point as u32));
+        }
+        for (image, (place, point)) in of_image.into_iter().enumerate().filter(|own| own.1.0 != NONE) {
+            let (place, point) = (place as usize, point as usize);
+            let home = match place.checked_sub(groups) {
+                None => Home::Group { group: place, point },
+                Some(tie) => Home::Tie(tie),
             };
-            weighted(assembled, subject, Home::Block(block), unknowns)
-        })
-    });
-    own.chain(shared).collect()
-}
-
-/// Place of an excluded image.
-const OUT: u32 = u32::MAX;
-
-/// Returns groups of the active ones among `count` images, in their order.
-fn images(assembled: &Assembled, count: usize) -> impl Iterator<Item = Suspect> {
-    let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
-    let groups = layout.groups();
-    let mut of_image = vec![(OUT, OUT); count];
-    for (point, images) in model.point_images.start.windows(2).enumerate() {
-        (images[0]..images[1])
-            .for_each(|place| of_image[model.point_images.order[place]] = (place as u32, point as u32));
+            let first = (layout.rows() * place) as u32;
+            let suspect = Suspect {
+                subject: Subject::Image(image),
+                home,
+                point: Some(assembled.points[point]),
+                photo: Some(model.images[place].photo),
+                rows: &[(first, 0), (first + 1, 1)],
+            };
+            self.add(assembled, &suspect);
+        }
     }
-    let suspect = move |(image, (place, point)): (usize, (u32, u32))| {
-        if place == OUT {
-            return None;
+
+    fn add_points(&mut self, assembled: &Assembled) {
+        let mut places: Vec<usize> = (0..assembled.points.len()).collect();
+        places.sort_by_key(|&place| assembled.points[place]);
+        for place in places {
+            let subject = Subject::Control(assembled.points[place]);
+            self.add_weighted(
+                assembled,
+                subject,
+                Home::Point(place),
+                assembled.problem.model.of_point(place),
+            );
         }
-        let (place, point) = (place as usize, point as usize);
-        let first = layout.rows() * place;
-        let home = match place.checked_sub(groups) {
-            None => Home::Group { group: place, point },
-            Some(tie) => Home::Tie(tie),
+    }
+
+    fn add_photos(&mut self, assembled: &Assembled) {
+        let model = &assembled.problem.model;
+        let halves = match model.poses {
+            PoseNumbers::Angles(_) => [0, 3],
+            PoseNumbers::Vectors => [3, 0],
         };
-        Some(Suspect {
-            subject: Subject::Image(image),
-            home,
-            point: Some(assembled.points[point]),
-            photo: Some(model.images[place].photo),
-            rows: SmallVec::from_slice(&[(Row::Equation(first), 0), (Row::Equation(first + 1), 1)]),
-        })
-    };
-    of_image.into_iter().enumerate().filter_map(suspect)
-}
-
-fn of_points(assembled: &Assembled) -> Vec<Suspect> {
-    let of = |(place, &point): (usize, &usize)| {
-        let unknowns = assembled.problem.model.of_point(place);
-        Some((point, weighted(assembled, Subject::Control(point), Home::Point(place), unknowns)?))
-    };
-    let mut all: Vec<(usize, Suspect)> = assembled.points.iter().enumerate().filter_map(of).collect();
-    all.sort_by_key(|own| own.0);
-    all.into_iter().map(|(_, suspect)| suspect).collect()
-}
-
-fn observations(assembled: &Assembled) -> Vec<Suspect> {
-    let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
-    let first = layout.groups() * layout.rows();
-    let of = |(i, tied): (usize, &super::observations::TiedObservation)| {
-        let tie = model.tied_images() + i;
-        let rows = layout.tie_rows(tie).enumerate().map(|(k, row)| (Row::Equation(first + row), k)).collect();
-        Suspect {
-            subject: Subject::Observation(tied.index),
-            home: Home::Tie(tie),
-            point: None,
-            photo: None,
-            rows,
+        let subjects: [fn(usize) -> Subject; 2] = [Subject::Position, Subject::Attitude];
+        for (subject, half) in subjects.into_iter().zip(halves) {
+            for photo in 0..model.cameras.len() {
+                let first = model.of_block(photo).start + half;
+                self.add_weighted(assembled, subject(photo), Home::Block(photo), first..first + 3);
+            }
         }
-    };
-    let mut order: Vec<usize> = (0..model.observations.len()).collect();
-    order.sort_by_key(|&i| model.observations[i].index);
-    order.into_iter().map(|i| of((i, &model.observations[i]))).collect()
-}
+    }
 
-/// Returns a group of the weighted ones among some parameters; None if there are none.
-fn weighted(assembled: &Assembled, subject: Subject, home: Home, unknowns: Range<usize>) -> Option<Suspect> {
-    let of = |(k, unknown): (usize, usize)| {
-        assembled.problem.is_weighted(unknown).then_some((Row::Unknown(unknown), k))
-    };
-    let rows: SmallVec<[(Row, usize); 3]> = unknowns.enumerate().filter_map(of).collect();
-    let (point, photo) = match subject {
-        Subject::Control(point) => (Some(point), None),
-        Subject::Position(photo) | Subject::Attitude(photo) => (None, Some(photo)),
-        _ => (None, None),
-    };
-    (!rows.is_empty()).then_some(Suspect { subject, home, point, photo, rows })
+    fn add_observations(&mut self, assembled: &Assembled) {
+        let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
+        let mut order: Vec<usize> = (0..model.observations.len()).collect();
+        order.sort_by_key(|&i| model.observations[i].index);
+        for i in order {
+            let tie = model.tied_images() + i;
+            let rows = layout.tie_rows(tie).map(|row| (self.equations[0] + row) as u32).zip(0..);
+            let rows: SmallVec<[Row; 3]> = rows.collect();
+            let subject = Subject::Observation(model.observations[i].index);
+            let suspect = Suspect { subject, home: Home::Tie(tie), point: None, photo: None, rows: &rows };
+            self.add(assembled, &suspect);
+        }
+    }
+
+    /// Adds groups of the weighted parameters of cameras and shared parameters.
+    fn add_blocks(&mut self, assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) {
+        let model = &assembled.problem.model;
+        for photo in (0..model.cameras.len()).filter(|&photo| model.has_own_camera(photo)) {
+            let (subject, block) = (Subject::Camera(camera_of_photo(photo)), model.of_photo(photo));
+            self.add_weighted(assembled, subject, Home::Block(photo), block.start + 6..block.end);
+        }
+        for block in 0..model.stations() {
+            for (owner, unknowns) in model.owners(block) {
+                let subject = match owner {
+                    Owner::Camera(camera) => Subject::Camera(camera),
+                    Owner::Common(common) => Subject::Common(common),
+                    Owner::Photo(_) => continue,
+                };
+                self.add_weighted(assembled, subject, Home::Block(block), unknowns);
+            }
+        }
+    }
+
+    /// Adds a group of the weighted ones among some parameters, if there are any.
+    fn add_weighted(&mut self, assembled: &Assembled, subject: Subject, home: Home, unknowns: Range<usize>) {
+        let weighted = unknowns.zip(0..).filter(|own| assembled.problem.is_weighted(own.0));
+        let number = |(unknown, component)| ((self.equations[1] + unknown) as u32, component);
+        let rows: SmallVec<[Row; 3]> = weighted.map(number).collect();
+        let (point, photo) = match subject {
+            Subject::Control(point) => (Some(point), None),
+            Subject::Position(photo) | Subject::Attitude(photo) => (None, Some(photo)),
+            _ => (None, None),
+        };
+        if !rows.is_empty() {
+            self.add(assembled, &Suspect { subject, home, point, photo, rows: &rows });
+        }
+    }
 }

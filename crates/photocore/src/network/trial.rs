@@ -224,12 +224,12 @@ impl Trial {
             return Ok(None);
         }
         let (groups, all) = (problem.layout().groups(), found.weights.unwrap_or_default());
-        let weight = |suspect: &Suspect| match suspect.home {
+        let weight = |suspect: Suspect<'_>| match suspect.home {
             Home::Group { group, .. } => all.get(group).copied(),
             Home::Tie(tie) => all.get(groups + tie).copied(),
             Home::Point(_) | Home::Block(_) => None,
         };
-        let weights = self.suspects.all.iter().map(|suspect| weight(suspect).unwrap_or(1.0)).collect();
+        let weights = self.suspects.all().map(|suspect| weight(suspect).unwrap_or(1.0)).collect();
         self.assembled.problem.initial = found.unknowns;
         Ok(Some(weights))
     }
@@ -291,11 +291,11 @@ impl Trial {
         let Assembled { problem, .. } = &mut self.assembled;
         problem.observation_sd.clone_from(&self.observation_sd);
         problem.sd.clone_from(&self.sd);
-        let rows = self.suspects.all.iter().flat_map(|suspect| suspect.rows.iter());
-        for (&(row, _), _) in rows.zip(&out.rows).filter(|(_, out)| **out) {
-            match row {
-                Row::Equation(equation) => problem.observation_sd[equation] = f64::INFINITY,
-                Row::Unknown(unknown) => problem.sd[unknown] = f64::INFINITY,
+        let rows = self.suspects.rows_of(0..self.suspects.len());
+        for (row, _) in rows.zip(&out.rows).filter(|(_, out)| **out) {
+            match row.checked_sub(problem.observation_sd.len()) {
+                None => problem.observation_sd[row] = f64::INFINITY,
+                Some(unknown) => problem.sd[unknown] = f64::INFINITY,
             }
         }
         for place in out.points.iter().filter_map(|&point| self.place[point]) {
@@ -325,22 +325,27 @@ impl Trial {
 
     /// Returns true if a row is active.
     pub(super) fn is_in(&self, row: Row) -> bool {
-        match row {
-            Row::Equation(equation) => self.assembled.problem.observation_sd[equation].is_finite(),
-            Row::Unknown(unknown) => self.assembled.problem.is_weighted(unknown),
+        match self.unknown_of(row) {
+            None => self.assembled.problem.observation_sd[row.0 as usize].is_finite(),
+            Some(unknown) => self.assembled.problem.is_weighted(unknown),
         }
     }
 
-    pub(super) fn deviation(&self, suspect: &Suspect, row: (Row, usize)) -> f64 {
+    /// Returns the parameter that a row observes; None for an equation.
+    pub(super) fn unknown_of(&self, row: Row) -> Option<usize> {
+        (row.0 as usize).checked_sub(self.observation_sd.len())
+    }
+
+    pub(super) fn deviation(&self, suspect: &Suspect<'_>, row: Row) -> f64 {
         suspects::deviation(&self.assembled.problem.model, suspect, row, (&self.observation_sd, &self.sd))
     }
 
     /// Returns the matrix from whitened errors of some rows of a group to their units.
-    pub(super) fn units(&self, suspect: &Suspect, rows: &[(Row, usize)]) -> DMatrix<f64> {
+    pub(super) fn units(&self, suspect: &Suspect<'_>, rows: &[Row]) -> DMatrix<f64> {
         let model = &self.assembled.problem.model;
         if let (Subject::Observation(_), Home::Tie(tie)) = (suspect.subject, suspect.home) {
             let root = &model.observations[tie - model.tied_images()].root;
-            let components: Vec<usize> = rows.iter().map(|&(_, component)| component).collect();
+            let components: Vec<usize> = rows.iter().map(|&(_, component)| component as usize).collect();
             return root.select_rows(&components).select_columns(&components);
         }
         let sd = rows.iter().map(|&row| self.deviation(suspect, row));

@@ -13,14 +13,7 @@ pub struct NetworkSuspects(pub(super) Arc<Suspects>);
 
 /// Returns the number of the type, and the index.
 pub(super) fn subject(subject: Subject) -> (u8, i64) {
-    let (Subject::Image(index)
-    | Subject::Control(index)
-    | Subject::Position(index)
-    | Subject::Attitude(index)
-    | Subject::Observation(index)
-    | Subject::Camera(index)
-    | Subject::Common(index)) = subject;
-    (subject.kind() as u8, index as i64)
+    (subject.kind() as u8, subject.index() as i64)
 }
 
 #[pymethods]

@@ -115,7 +115,7 @@ impl Trial {
         let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
         let effect = |error: usize| {
             let single = error.checked_sub(sets).map(|k| &singles[worst[k]]);
-            let own = single.map_or(vec![], |single| self.points_of(single.suspect));
+            let own = single.map_or(vec![], |single| self.points_of(&single.suspect));
             sample.effect(&changes, error, &own)
         };
         let effects = threads.install(|| parallel::map(errors.len(), 1, effect));

@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::super::group_tests::Tested;
-use super::super::suspects::{Home, Row, Subject, Suspect};
+use super::super::suspects::{Home, Subject, Suspect};
 use super::super::trial::Trial;
 use super::catalogue::Catalogue;
 use super::facts::Facts;
@@ -23,7 +23,7 @@ const AT_LEAST: usize = 16;
 /// A hypothesis on a group, or on one of its components.
 pub(super) struct Single<'a> {
     pub hypothesis: Hypothesis,
-    pub suspect: &'a Suspect,
+    pub suspect: Suspect<'a>,
     /// The error whose effect is reported: equations of unit weight with their shares.
     pub error: Vec<(EquationOf, f64)>,
     /// Errors of unit weight in the units of the observations, by column.
@@ -57,11 +57,11 @@ pub(super) fn single_errors<'a>(
 ) -> Vec<Single<'a>> {
     let Some(groups) = found.cofactors.groups.as_deref() else { return vec![] };
     let terms = trial.terms(&trial.assembled.problem.sd, &found.values);
-    let is_single = |suspect: &&Suspect| !matches!(suspect.subject, Subject::Image(_));
-    let suspects: Vec<&Suspect> = trial.suspects.all.iter().filter(is_single).collect();
+    let is_single = |suspect: &Suspect<'_>| !matches!(suspect.subject, Subject::Image(_));
+    let suspects: Vec<Suspect<'_>> = trial.suspects.all().filter(is_single).collect();
     let part = |some: Range<usize>| -> Vec<Single<'a>> {
         let tested = suspects[some].iter().filter_map(|&suspect| {
-            let tested = trial.test(suspect, (found, groups), &terms, None)?;
+            let tested = trial.test(&suspect, (found, groups), &terms, None)?;
             Some(trial.errors_of(suspect, &tested, criteria))
         });
         tested.flatten().collect()
@@ -98,14 +98,14 @@ fn code(subject: Subject) -> &'static str {
 
 impl Trial {
     /// The errors of a group: of all its components, then of each.
-    fn errors_of<'a>(&self, suspect: &'a Suspect, tested: &Tested, criteria: &Criteria) -> Vec<Single<'a>> {
+    fn errors_of<'a>(&self, suspect: Suspect<'a>, tested: &Tested, criteria: &Criteria) -> Vec<Single<'a>> {
         let size = suspect.rows.len();
         let active: Vec<usize> = (0..size).filter(|&k| !tested.residual[k].is_nan()).collect();
         let redundancy = DMatrix::from_row_slice(size, size, &tested.cofactors);
         let residual = DVector::from_column_slice(&tested.residual);
         let mut sets = vec![(None, active.clone())];
         if active.len() > 1 {
-            sets.extend(active.iter().map(|&k| (Some(suspect.rows[k].1), vec![k])));
+            sets.extend(active.iter().map(|&k| (Some(suspect.rows[k].1 as usize), vec![k])));
         }
         let of = |(component, rows): (Option<usize>, Vec<usize>)| {
             let score = residual.select_rows(&rows);
@@ -115,8 +115,8 @@ impl Trial {
             let judged =
                 Judged::new(&score, &DMatrix::identity(count, count), &block, &vec![LARGE; count], criteria);
             let shares = rows.iter().zip(judged.error.iter().flatten());
-            let error = shares.map(|(&k, &value)| (self.equation(suspect, k), value)).collect();
-            let units = self.units(suspect, &rows.iter().map(|&k| suspect.rows[k]).collect::<Vec<_>>());
+            let error = shares.map(|(&k, &value)| (self.equation(&suspect, k), value)).collect();
+            let units = self.units(&suspect, &rows.iter().map(|&k| suspect.rows[k]).collect::<Vec<_>>());
             let hypothesis = Hypothesis {
                 code: code(suspect.subject),
                 about: About::Group(suspect.subject, component),
@@ -134,15 +134,16 @@ impl Trial {
     }
 
     /// The equation of a row of a suspect that is no image of a local point.
-    fn equation(&self, suspect: &Suspect, row: usize) -> EquationOf {
+    fn equation(&self, suspect: &Suspect<'_>, row: usize) -> EquationOf {
         let layout = self.assembled.problem.layout();
-        match (suspect.rows[row].0, suspect.home) {
-            (Row::Unknown(unknown), _) => EquationOf::Unknown(unknown),
-            (Row::Equation(equation), Home::Tie(tie)) => {
+        let equation = suspect.rows[row].0 as usize;
+        match (self.unknown_of(suspect.rows[row]), suspect.home) {
+            (Some(unknown), _) => EquationOf::Unknown(unknown),
+            (None, Home::Tie(tie)) => {
                 let first = layout.groups() * layout.rows() + layout.tie_rows(tie).start;
                 EquationOf::Tie { tie, row: equation - first }
             }
-            (Row::Equation(equation), _) => {
+            (None, _) => {
                 let local = if let Home::Group { point, .. } = suspect.home { point } else { 0 };
                 EquationOf::Group { group: equation / layout.rows(), local, row: equation % layout.rows() }
             }
@@ -150,7 +151,7 @@ impl Trial {
     }
 
     /// The points of the network that the observations of a suspect belong to.
-    pub(super) fn points_of(&self, suspect: &Suspect) -> Vec<usize> {
+    pub(super) fn points_of(&self, suspect: &Suspect<'_>) -> Vec<usize> {
         match (suspect.subject, suspect.home) {
             (Subject::Control(point), _) => vec![point],
             (Subject::Observation(_), Home::Tie(tie)) => {

@@ -47,15 +47,14 @@ impl Groups {
                 on_trajectories[trajectory].push(photo);
             }
         }
-        let is_observation = |suspect: &Suspect| matches!(suspect.subject, Subject::Observation(_));
-        let of = |suspect: &Suspect| match suspect.home {
-            Home::Tie(tie) if is_observation(suspect) => objects(trial, tie - model.tied_images(), photos),
+        let is_observation = |suspect: &Suspect<'_>| matches!(suspect.subject, Subject::Observation(_));
+        let of = |suspect: Suspect<'_>| match suspect.home {
+            Home::Tie(tie) if is_observation(&suspect) => objects(trial, tie - model.tied_images(), photos),
             _ => Objects::default(),
         };
-        let all = &suspects.all;
         Self {
-            objects: all.iter().filter(|own| is_observation(own)).map(of).collect(),
-            first_observation: all.iter().position(is_observation).unwrap_or(all.len()),
+            objects: suspects.all().filter(is_observation).map(of).collect(),
+            first_observation: suspects.all().position(|own| is_observation(&own)).unwrap_or(suspects.len()),
             on_trajectories,
             control: settings.control,
             is_small: suspects.row_starts()[suspects.len()] <= settings.max_rows,
@@ -92,15 +91,15 @@ impl Groups {
     }
 
     pub fn point(&self, group: usize) -> Option<usize> {
-        self.table.all[group].point
+        self.table.get(group).point
     }
 
     pub fn photo(&self, group: usize) -> Option<usize> {
-        self.table.all[group].photo
+        self.table.get(group).photo
     }
 
     fn subject(&self, group: usize) -> Subject {
-        self.table.all[group].subject
+        self.table.get(group).subject
     }
 
     /// Returns the type of a group; see [`Subject::kind`].
