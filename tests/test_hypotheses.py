@@ -484,6 +484,39 @@ def test_a_target_that_was_measured_on_a_neighbour_is_named():
     assert first.fields["named"].fields["point"] == block.point_ids[point]
 
 
+def test_wrong_fixed_coordinates_of_a_point_with_distances_are_named():
+    """All its observations show the error; T is the decrease of the sum of squares if they are free."""
+    block = block_of("clean")
+    *gnss, _ = block.observations
+    places, sd = block.point_positions.copy(), block.point_sd.copy()
+    adjusted = adjust(block).point_positions
+    point, *others = np.flatnonzero(np.isfinite(adjusted).all(axis=1))[[3, 10, 20, 30]].tolist()
+    lengths = np.linalg.norm(adjusted[others] - adjusted[point], axis=1)
+    bars = [
+        Distance(block.point_ids[point], block.point_ids[k], length, 0.01)
+        for k, length in zip(others, lengths, strict=True)
+    ]
+    places[point], sd[point] = adjusted[point] + [0.3, 0.1, 0.0], 0.0
+    fixed = block.replace(point_positions=places, point_sd=sd, observations=[*gnss, *bars])
+    sd = sd.copy()
+    sd[point] = np.inf
+    result, free = adjust(fixed), adjust(fixed.replace(point_sd=sd))
+    decrease = result.sum_and_freedom[0] - free.sum_and_freedom[0]
+    assert evaluated(result)["fixed-point", point] == pytest.approx(decrease, rel=0.01)
+    first = result.verdict.message.fields["errors"][0].fields["named"]
+    assert first.code == "hypothesis.fixed-point"
+    assert first.fields["point"] == block.point_ids[point]
+
+
+def test_images_of_another_size_are_named():
+    """All pixels of images of half the size; positions without control show the principal distance."""
+    camera = Camera("simple_pinhole", {"f": 3600.0, "cx": 2000.0, "cy": 1500.0})
+    block = simulate(strips=3, photos_per_strip=8, camera=camera, position_sd=0.02, seed=6).block
+    half = Camera("simple_pinhole", {name: 0.5 * value for name, value in camera.parameters.items()})
+    named = adjust(block.replace(cameras=[half])).verdict.message.fields["errors"][0].fields["named"]
+    assert named.code == "hypothesis.camera-size"
+
+
 @pytest.mark.parametrize("strips", [1, 4])
 @pytest.mark.parametrize(("share", "position_sd"), [(0.005, 0.05), (0.1, np.inf)])
 def test_another_origin_of_the_images_of_a_photo_is_named(strips, share, position_sd):

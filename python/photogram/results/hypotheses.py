@@ -28,7 +28,7 @@ OF_CAMERAS = frozenset(
     {
         *("camera-f", "camera-f-single", "camera-point", "camera-term", "readout-time"),
         "readout-time-columns",
-        *("camera-affinity", "camera-radial", "camera-exchanged"),
+        *("camera-affinity", "camera-radial", "camera-exchanged", "camera-size"),
     }
 )
 SHARES = ("gnss-next", "gnss-previous", "camera-exchanged")  # Their parameter is 0 or 1
@@ -70,13 +70,14 @@ SCALES = frozenset({"control-scale", "distance-scale", "scale"})
 UNGRADED = frozenset(
     {
         *("attitude", "photo", "object-point", "camera", "unknown", "bending", "control-bending"),
-        *("camera-f-strip", "camera-f-half", "readout-time-columns"),
+        *("camera-f-strip", "camera-f-half", "camera-size", "fixed-point", "readout-time-columns"),
     }
 )
 """Undetected errors that are no reason for a reservation: of single photos and targets, whose other
-observations have hypotheses of their own; of weighted parameters; bending,
-whose causes (terms of distortion) are hypotheses of their own; principal distances of a strip or a flight,
-and a readout by columns, which few cameras have."""
+observations have hypotheses of their own; of weighted parameters; bending and the image size,
+whose causes (terms of distortion, principal distance) are hypotheses of their own; principal distances of a
+strip or a flight; fixed points, of which only those with distances have hypotheses; and a readout by columns,
+which few cameras have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +158,7 @@ class Hypotheses:
             fields: dict[str, Any] = {"set": max(index, 0) + 1, "parameters": self.sets[row]["parameters"]}
             if code == "photo":
                 fields["photo"] = str(self.suspects.given.photo_ids[index])
-            if code == "object-point":
+            if code in ("object-point", "fixed-point"):
                 fields["point"] = str(self.suspects.given.point_ids[index])
             if index >= 0 and code in OF_CAMERAS:
                 cameras = getattr(self.suspects.given, "camera_names", ())
@@ -182,7 +183,7 @@ class Hypotheses:
             ),
             **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
             **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
-            **dict.fromkeys(("camera-affinity", "camera-radial", "distance-scale", *SHARES), ""),
+            **dict.fromkeys(("camera-affinity", "camera-radial", "camera-size", "distance-scale", *SHARES), ""),
             **dict.fromkeys(("time-offset", "readout-time", "readout-time-columns"), self.times),
         }
         return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()

@@ -98,8 +98,9 @@ def hypotheses(
 
     odds = _log_odds(change(statistic), k, np.maximum(found["observations"], k + 1), count)
     odds -= np.nansum(np.square(estimate / found["plausible"]), axis=1) / 2
-    # Terms of distortion bend a network; that the heights of many control points do is rare.
-    odds[np.array(found["code"]) == "control-bending"] -= math.log(ALTERNATIVES)
+    # Terms of distortion bend a network, other principal distances have nearly the effect of an image size:
+    # bent heights of many control points and resized images are rare.
+    odds[np.isin(found["code"], ("control-bending", "camera-size"))] -= math.log(ALTERNATIVES)
     shares = np.isin(found["code"], SHARES)
     odds[shares] -= np.square((estimate[shares, 0] - 1.0) / WHOLE) / 2
     largest = float(np.nanmax(tests.statistic[images], initial=0.0))

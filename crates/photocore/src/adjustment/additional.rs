@@ -411,8 +411,8 @@ impl Sums {
     /// Adds the equations of a block; `inverse` is that of its normal matrix.
     fn add(&mut self, rows: &LocalRows, inverse: &[f64], work: &mut Work) {
         let mut last = 0;
-        for &(parameter, _) in &rows.partials {
-            self.observations[parameter] += 1;
+        for &(parameter, partial) in &rows.partials {
+            self.observations[parameter] += usize::from(partial != 0.0);
             last = last.max(numbered(&mut self.numbers, &mut self.parameters, parameter));
         }
         for &(unknown, _) in &rows.others {

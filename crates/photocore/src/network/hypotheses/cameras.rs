@@ -19,7 +19,7 @@ const MOST_SETS: usize = 8;
 const DISTANCE: f64 = 0.05;
 /// Plausible error of the principal point, in widths of the image.
 const POINT: f64 = 0.02;
-/// Plausible share of an exchange of its coordinates: all of it.
+/// Plausible share of an exchange of its coordinates, or of a change of the image size: all of it.
 const SHARE: f64 = 1.0;
 /// Photos of each half of a flight.
 const FEWEST_OF_HALF: usize = 3;
@@ -71,7 +71,7 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
         vec![("camera-f", distances, DISTANCE * own.scale()), ("camera-point", points, POINT * width)];
     hypotheses.extend(others.take(MOST_TERMS).map(|&own| ("camera-term", vec![own], f64::NAN)));
     let count = own.parameter_names().iter().filter(|own| DISTANCES.contains(&own.0)).count();
-    let (mut whole, mut exchanged) = (None, None);
+    let (mut whole, mut exchanged, mut middle) = (None, None, vec![]);
     for (code, parameters, size) in hypotheses.into_iter().filter(|own| !own.1.is_empty()) {
         let names: Vec<&'static str> = parameters.iter().map(|own| own.1).collect();
         // One error of both principal distances; another scale of one axis is an affinity.
@@ -84,8 +84,11 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
         }
         match (code, &columns[..], &parameters[..]) {
             ("camera-f", &[column], own) if own.len() == count => whole = Some(column),
-            ("camera-point", &[first, second], &[(x, _), (y, _)]) => {
+            ("camera-point", &[first, second], &[(x, _), (y, name)]) => {
                 let between = own.parameters()[y] - own.parameters()[x];
+                if name == POINTS[1] {
+                    middle = vec![(first, own.parameters()[x]), (second, own.parameters()[y])];
+                }
                 let exchange = [(first, between), (second, -between)];
                 exchanged = (between != 0.0).then_some(exchange);
             }
@@ -99,6 +102,11 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
             &[SHARE],
             vec![columns.to_vec()],
         );
+    }
+    if let (Some(column), false) = (whole, middle.is_empty()) {
+        // Images of another size: all pixels of the camera change by one factor.
+        middle.push((column, own.scale()));
+        catalogue.add_combination(("camera-size", Some(camera)), &["share"], &[SHARE], vec![middle]);
     }
     whole
 }

@@ -1,4 +1,5 @@
-//! Object points: the target of one point is misplaced in all images, which its control and distances show.
+//! Object points with several observations: the target of one point is misplaced in all images, which its control and distances show; the
+//! fixed coordinates of one point are wrong, which all its observations show.
 
 use nalgebra::Vector3;
 
@@ -26,6 +27,10 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, names: &[usize]) {
     places.truncate(MOST);
     for place in places {
         let own = catalogue.place_of_point(place);
+        if catalogue.sd[bundle.of_point(place)].iter().all(|&sd| sd == 0.0) {
+            let columns = catalogue.add(("fixed-point", Some(names[place])), &catalogue.axis_names(), &[]);
+            catalogue.shift_place(Seen::Control, &own, &columns, 1.0);
+        }
         let axes = catalogue.axes_at(own.position);
         let columns = catalogue.add(("object-point", Some(names[place])), &catalogue.axis_names(), &[]);
         for (k, &column) in columns.iter().enumerate() {

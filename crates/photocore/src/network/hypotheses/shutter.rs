@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::super::trial::Trial;
+use super::cameras::{MOST_CAMERAS, equal_cameras};
 use super::catalogue::{Catalogue, Cause, put};
 use super::hypothesis::{About, Hypothesis};
 use crate::Threads;
@@ -18,19 +19,16 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     let moves = |photo: usize| {
         facts.velocities.get(photo).is_some_and(|velocity| velocity.iter().all(|value| value.is_finite()))
     };
-    for (camera, lines) in facts.readouts.iter().enumerate().filter(|(_, lines)| !lines.is_empty()) {
-        let photos: Vec<usize> = (0..catalogue.bundle.cameras.len())
-            .filter(|&photo| trial.camera_of_photo[photo] == camera && moves(photo))
-            .collect();
-        if photos.is_empty() {
-            continue;
-        }
-        let add = |(code, &line): (&&'static str, &[f64; 3])| {
-            (catalogue.add((*code, Some(camera)), &["readout"], &[READOUT])[0], line)
-        };
-        let columns: Vec<(usize, [f64; 3])> = CODES.iter().zip(lines).map(add).collect();
+    let lines_of = |photo: usize| -> &[[f64; 3]] {
+        facts.readouts.get(trial.camera_of_photo[photo]).map_or(&[], Vec::as_slice)
+    };
+    for mut photos in equal_cameras(catalogue).into_iter().take(MOST_CAMERAS) {
+        photos.retain(|&photo| moves(photo) && !lines_of(photo).is_empty());
+        let Some(&first) = photos.first() else { continue };
+        let camera = Some(trial.camera_of_photo[first]);
+        let columns = CODES.map(|code| catalogue.add((code, camera), &["readout"], &[READOUT])[0]);
         for photo in photos {
-            catalogue.shutters[photo].clone_from(&columns);
+            catalogue.shutters[photo] = columns.into_iter().zip(lines_of(photo).iter().copied()).collect();
             let velocity = Vector3::from(facts.velocities[photo]);
             catalogue.velocities[photo] = catalogue.place_of_photo(photo).change(&velocity);
         }
