@@ -43,60 +43,62 @@ def skew(turns):
 
 
 class Survey:
-    """Three strips of four photos over thirty points: observed poses, or `weighted` photos and camera."""
+    """Three strips of photos over hilly ground: observed poses, or `weighted` photos and camera.
 
-    def __init__(self, *, weighted):
+    No point has more than `rays` images.
+    """
+
+    def __init__(self, *, weighted, photos_per_strip=4, points=30, rays=12):
         rng = np.random.default_rng(5)
+        photos = 3 * photos_per_strip
         self.weighted = weighted
-        self.strips = np.arange(12) // 4
-        x, y = 25.0 * (np.arange(12) % 4), 45.0 * self.strips
-        centres = np.column_stack([x, y, 100.0 + 0 * x]) + rng.normal(size=(12, 3))
-        angles = rng.normal(size=(12, 3)) * 0.05 + [0, 0, np.pi / 2]
+        self.strips = np.arange(photos) // photos_per_strip
+        x, y = 25.0 * (np.arange(photos) % photos_per_strip), 45.0 * self.strips
+        centres = np.column_stack([x, y, 100.0 + 0 * x]) + rng.normal(size=(photos, 3))
+        angles = rng.normal(size=(photos, 3)) * 0.05 + [0, 0, np.pi / 2]
         self.poses = np.hstack([centres, angles])
-        self.points = np.column_stack(
-            [rng.uniform(-15, 90, 30), rng.uniform(-20, 110, 30), rng.uniform(-9, 9, 30)]
-        )
+        low, high = [-15, -20, -9], [x.max() + 15, 110, 9]
+        self.points = np.column_stack([rng.uniform(*ends, points) for ends in zip(low, high, strict=True)])
         self.cameras = np.tile([F, CX, CY, 0.0 if weighted else -0.05], (1 if weighted else 2, 1))
-        self.of_camera = np.zeros(12, dtype=np.int64) if weighted else np.arange(12) % 2
-        photos, seen = (each.ravel() for each in np.indices((12, 30)))
+        self.of_camera = np.zeros(photos, dtype=np.int64) if weighted else np.arange(photos) % 2
+        photo, seen = (each.ravel() for each in np.indices((photos, points)))
         rows = {
-            "centre": self.poses[photos, :3],
-            "angles": self.poses[photos, 3:],
+            "centre": self.poses[photo, :3],
+            "angles": self.poses[photo, 3:],
             "point": self.points[seen],
         }
-        xy = images({**rows, "camera": self.cameras[self.of_camera[photos]], "shift": 0.0})
+        xy = images({**rows, "camera": self.cameras[self.of_camera[photo]], "shift": 0.0})
         inside = (xy > 0).all(axis=1) & (xy < [WIDTH, HEIGHT]).all(axis=1)
-        inside &= np.bincount(seen[inside], minlength=30)[seen] > 1
-        self.photos, self.seen, self.xy = photos[inside], seen[inside], xy[inside]
-        often = np.argsort(-np.bincount(self.seen, minlength=30), kind="stable")
-        self.control, self.ends = (
-            np.sort(often[:7]),
-            [(often[0], often[9]), (often[0], often[12]), (often[9], often[15])],
-        )
+        inside &= np.bincount(seen[inside], minlength=points)[seen] > 1
+        earlier = np.cumsum(inside.reshape(photos, points), axis=0).ravel()
+        inside &= earlier <= rays
+        self.photos, self.seen, self.xy = photo[inside], seen[inside], xy[inside]
+        often = np.argsort(-np.bincount(self.seen, minlength=points), kind="stable").tolist()
+        self.control = np.sort(often[:7])
+        self.ends = [(often[0], often[8]), (often[0], often[9]), (often[8], often[10])]
         self.control_sd = np.where(np.arange(7) % 2, 0.05, SD["control"])
         self.sets = dict(zip(self.control.tolist(), (np.arange(7) % 2).tolist(), strict=True))
-        self.velocities = np.where(self.strips[:, np.newaxis] % 2, -1, 1) * [25.0, 0.5, 0.1] + rng.normal(
-            size=(12, 3)
-        )
+        way = np.where(self.strips[:, np.newaxis] % 2, -1, 1) * [25.0, 0.5, 0.1]
+        self.velocities = way + rng.normal(size=(photos, 3))
 
     def block(self, rng):
         """Return a block with noise."""
-        noise = rng.normal
-        centres = self.poses[:, :3] + noise(size=(12, 3)) * SD["positions"]
-        sd = np.full((30, 3), np.inf)
-        places = np.full((30, 3), np.nan)
+        noise, points, shape = rng.normal, len(self.points), (len(self.poses), 3)
+        centres = self.poses[:, :3] + noise(size=shape) * SD["positions"]
+        sd = np.full((points, 3), np.inf)
+        places = np.full((points, 3), np.nan)
         sd[self.control] = self.control_sd[:, np.newaxis]
         places[self.control] = self.points[self.control] + noise(size=(7, 3)) * sd[self.control]
-        names, ids = [f"i{row}" for row in range(12)], [f"p{row}" for row in range(30)]
+        names, ids = [f"i{row}" for row in range(len(self.poses))], [f"p{row}" for row in range(points)]
         photos, observations, parameters = {}, [], {"f": F, "cx": CX, "cy": CY}
         if self.weighted:
-            angles = self.poses[:, 3:] + noise(size=(12, 3)) * SD["attitudes"]
+            angles = self.poses[:, 3:] + noise(size=shape) * SD["attitudes"]
             photos = {"photo_position_sd": SD["positions"], "photo_attitude_sd": SD["attitudes"]}
             photos |= {"photo_positions_observed": centres, "photo_attitudes_observed": angles}
             parameters["f"] += noise() * SD["cameras"]
         else:
             matrices = rotation_matrix(self.poses[:, 3:]).transpose(0, 2, 1)
-            turns = rotation_matrix(noise(size=(12, 3)) * SD["attitudes"])
+            turns = rotation_matrix(noise(size=shape) * SD["attitudes"])
             parameters["k"] = -0.05
             observations = [
                 *(Position(*own, SD["positions"]) for own in zip(names, centres, strict=True)),
@@ -132,10 +134,10 @@ class Survey:
         observed = [each.position for each in block.observations if isinstance(each, Position)]
         return {
             "velocities": self.velocities,
-            "times": np.arange(12.0).tolist(),
+            "times": np.arange(float(len(self.poses))).tolist(),
             "observed": block.photo_positions_observed if self.weighted else np.array(observed),
             "position_sets": self.strips.tolist(),
-            "control_sets": [self.sets.get(point) for point in range(30)],
+            "control_sets": [self.sets.get(point) for point in range(len(self.points))],
             "readouts": [[[0.0, 1 / HEIGHT, -0.5], [1 / WIDTH, 0.0, -0.5]] for _ in self.cameras],
             "widths": [WIDTH for _ in self.cameras],
             "photos": [0, 5],
@@ -235,7 +237,10 @@ class Dense:
             }
             observed["cameras"] = np.array([[block.cameras[0].parameters["f"]]])
         else:
-            observed |= {"positions": survey.facts(block)["observed"], "attitudes": np.zeros((12, 3))}
+            observed |= {
+                "positions": survey.facts(block)["observed"],
+                "attitudes": np.zeros((len(survey.poses), 3)),
+            }
         lengths = [each.length for each in block.observations if isinstance(each, Distance)]
         observed["distances"] = np.array(lengths)[:, np.newaxis]
         sd = {
@@ -257,8 +262,12 @@ class Dense:
             },
             "control": {"point": points[survey.control]},
             "positions": {"centre": poses[:, :3]},
-            "attitudes": {"angles": poses[:, 3:], "observed": self.matrices, "turn": np.zeros((12, 3))},
-            "angles": {"angles": poses[:, 3:], "turn": np.zeros((12, 3))},
+            "attitudes": {
+                "angles": poses[:, 3:],
+                "observed": self.matrices,
+                "turn": np.zeros((len(poses), 3)),
+            },
+            "angles": {"angles": poses[:, 3:], "turn": np.zeros((len(poses), 3))},
             "distances": {"first": points[first], "second": points[second]},
             "cameras": {"camera": state["cameras"]},
         }
