@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from surveys import HEIGHT, WIDTH, Survey, angles_of, projected, rotation
+from surveys import HEIGHT, WIDTH, Survey, angles_of, pixels, rotation
 
 Mistake = Callable[[Survey, float], Survey]
 Condition = Callable[[Survey], bool]
@@ -152,7 +152,7 @@ def _displaced(survey: Survey, size: float) -> np.ndarray:
     place = survey.points[[target(survey)]]
     for row in np.flatnonzero(survey.seen == target(survey)):
         pose = survey.poses[survey.photos[row]]
-        change[row] = projected(pose, place + size * np.array([0.6, 0.6, 0.5])) - projected(pose, place)
+        change[row] = pixels(pose, place + size * np.array([0.6, 0.6, 0.5])) - pixels(pose, place)
     return np.nan_to_num(change)
 
 
@@ -188,14 +188,14 @@ def _readout(survey: Survey, size: float, axis: int = 1) -> np.ndarray:
     change = np.zeros_like(survey.xy)
     for photo, pose in enumerate(survey.poses):
         velocity = _velocity(survey, photo)
-        own = survey.photos == photo
+        own = (survey.photos == photo) & (survey.cameras is None or survey.cameras[photo] == 0)
         seconds = size * (survey.xy[own, axis] / (WIDTH, HEIGHT)[axis] - 0.5)
         moved = [
-            projected(np.concatenate([pose[:3] + velocity * t, pose[3:]]), survey.points[[k]])[0]
-            - projected(pose, survey.points[[k]])[0]
+            pixels(np.concatenate([pose[:3] + velocity * t, pose[3:]]), survey.points[[k]])[0]
+            - pixels(pose, survey.points[[k]])[0]
             for k, t in zip(survey.seen[own], seconds, strict=True)
         ]
-        change[own] = np.nan_to_num(moved)
+        change[own] = np.nan_to_num(moved).reshape(-1, 2)
     return change
 
 
@@ -270,11 +270,11 @@ def _has_attitudes(survey: Survey) -> bool:
 
 
 def _has_target(survey: Survey) -> bool:
-    """Whether the first distance has a point that is control or an end of other distances, too."""
+    """Whether the first end has three or more observations; of two, the errors are inseparable."""
     if not survey.bars:
         return False
     ends = [end for bar in survey.bars for end in bar[:2]]
-    return ends.count(target(survey)) + (target(survey) in survey.control) > 1
+    return ends.count(target(survey)) + (target(survey) in survey.control) > 2
 
 
 MISTAKES: dict[str, tuple[str, Condition, Mistake]] = {
@@ -313,7 +313,7 @@ MISTAKES: dict[str, tuple[str, Condition, Mistake]] = {
     ),
     "one distance": ("distance", lambda s: len(s.bars) > 0, _bar),
     "all distances": ("distance-scale", lambda s: len(s.bars) > 1, _bars),
-    "principal distance": ("camera-f", lambda s: True, lambda s, d: replace(s, focal=s.focal + d)),
+    "principal distance": ("camera-f", lambda s: not s.focal_sd, lambda s, d: replace(s, focal=s.focal + d)),
     "GNSS of one strip": (
         "gnss-set",
         lambda s: s.gnss is not None and np.ptp(s.poses[:, 1]) > 15,
@@ -326,7 +326,8 @@ MISTAKES: dict[str, tuple[str, Condition, Mistake]] = {
     ),
     "GNSS of one flight": (
         "gnss-half",
-        lambda s: s.gnss is not None and not 50 < np.ptp(s.poses[:, 1]) < 100,  # Two strips are two flights
+        # Two strips are two flights.
+        lambda s: s.gnss is not None and len(s.poses) > 5 and not 50 < np.ptp(s.poses[:, 1]) < 100,
         _gnss(
             lambda s, d: (
                 (np.arange(len(s.poses)) < len(s.poses) // 2)[:, np.newaxis] * np.array([0.6, 0.6, 0.5]) * d
@@ -358,7 +359,7 @@ MISTAKES: dict[str, tuple[str, Condition, Mistake]] = {
         lambda s: True,
         _images(lambda s, _: np.full(s.xy.shape, (WIDTH - HEIGHT) / 2) * [-1.0, 1.0]),
     ),
-    "radial distortion": ("camera-radial", lambda s: True, _images(_radial)),
+    "radial distortion": ("camera-radial", lambda s: s.k is None, _images(_radial)),
     "term of distortion": (
         "camera-term",
         lambda s: s.k is not None,
@@ -486,6 +487,9 @@ GIVEN = {
     "image X": 5.0,
 }
 """Sizes of errors that have no minimal detectable bias, in pixels or exposures."""
+
+LARGEST = {"readout-time": 0.5, "readout-time-columns": 0.5}
+"""Sizes in exposures that errors do not exceed: a readout ends before the next one."""
 
 ACCURACY = frozenset(
     {

@@ -109,12 +109,18 @@ def angles_of(m: np.ndarray) -> tuple[float, float, float]:
     return math.atan2(-m[2, 1], m[2, 2]), phi, math.atan2(-m[1, 0], m[0, 0])
 
 
-def projected(pose: np.ndarray, points: np.ndarray, focal: float = F) -> np.ndarray:
-    """Return (n, 2) pixels, rows downward; NaN for points behind or outside of the image."""
+def pixels(pose: np.ndarray, points: np.ndarray, focal: float = F) -> np.ndarray:
+    """Return (n, 2) pixels, rows downward; NaN for points behind."""
     u = (points - pose[:3]) @ rotation(*pose[3:]).T
     with np.errstate(all="ignore"):
         xy = np.column_stack([WIDTH / 2 - focal * u[:, 0] / u[:, 2], HEIGHT / 2 + focal * u[:, 1] / u[:, 2]])
-    inside = (u[:, 2] < 0) & (xy > 0).all(axis=1) & (xy < [WIDTH, HEIGHT]).all(axis=1)
+    return np.where(u[:, 2:] < 0, xy, math.nan)
+
+
+def projected(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return (n, 2) pixels; NaN for points behind or outside of the image."""
+    xy = pixels(pose, points)
+    inside = (xy > 0).all(axis=1) & (xy < [WIDTH, HEIGHT]).all(axis=1)
     return np.where(inside[:, np.newaxis], xy, math.nan)
 
 

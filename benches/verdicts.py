@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from mistakes import ACCURACY, GIVEN, MISTAKES, TWICE, target
+from mistakes import ACCURACY, GIVEN, LARGEST, MISTAKES, TWICE, target
 from photogram import PhotogramError, Result, adjust, snoop
 from surveys import Survey, surveys
 
 WRONG = 5.0  # Standard deviations by which a mistake moves points of a wrong result
 SIZES = 0.5, 1.0, 3.0, 10.0  # of planted errors, in minimal detectable biases
+LENS = "camera-f", "camera-point", "camera-term", "camera-radial"
 SINGLE = "control-point", "image", "position", "attitude", "distance", "camera"  # Codes of single errors
 
 
@@ -87,25 +88,30 @@ def sharpened(clean: Result, wrong: Result) -> float:
 def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
     """Whether the headline names the true cause, or inseparable ones with it; None if the result is usable.
 
-    A lens model includes the terms of distortion.
+    A lens model includes the parameters of the camera.
     """
     code = result.verdict.code
     fields = result.verdict.message.fields
     if code == "common-error" and result.reliability_summary:
         # Errors whose statistics differ by less than odds of 20 : 1 are inseparable by the data.
-        true, first = hypothesis.partition(" ")[0], fields["errors"][0].fields["named"].code.partition(".")[2]
+        named = [each.fields["named"].code.partition(".")[2] for each in fields["errors"]]
+        named += [
+            each.code.partition(".")[2]
+            for line in result.verdict.lines
+            if line.code == "line.inseparable"
+            for each in line.fields["others"]
+        ]
+        true, first = hypothesis.partition(" ")[0], named[0]
         largest: dict[str, float] = defaultdict(float)
         statistics = result.reliability_summary.hypotheses.statistic
         for code, statistic in zip(codes_of(result), statistics.tolist(), strict=True):
             largest[code] = max(largest[code], statistic)
-        return true == first or largest[true] > largest[first] - 2 * math.log(20)
+        return true in named or largest[true] > largest[first] - 2 * math.log(20)
     if code == "gross-errors" and hypothesis.startswith(("control-point", "object-point")):
         return f"control point {point}" in str(fields["suspects"][0])
     if hypothesis.partition(" ")[0] in SINGLE:
         return None  # Errors of single observations other than these are not common errors.
-    return (
-        None if result.verdict.usable else code == "model" and hypothesis in ("camera-radial", "camera-term")
-    )
+    return None if result.verdict.usable else code == "model" and hypothesis in LENS
 
 
 def print_table() -> None:
@@ -160,7 +166,8 @@ def main() -> None:
             unit = size_of(clean, hypothesis, survey) if hypothesis else 1.0
             if math.isnan(unit):
                 unit = GIVEN.get(hypothesis, 0.005 if survey.close else 0.1)
-            for size in SIZES if hypothesis else (1.0,):
+            largest = LARGEST.get(hypothesis, math.inf)
+            for size in [own for own in SIZES if own * unit <= largest] if hypothesis else (1.0,):
                 wrong = mistake(survey, size * unit)
                 try:
                     result = adjusted(wrong)
