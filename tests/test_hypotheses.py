@@ -8,7 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, Distance, InputError, Position, adjust, read_result, score_test, simulate
+from photogram import (
+    Block,
+    Camera,
+    Distance,
+    InputError,
+    Position,
+    adjust,
+    read_result,
+    score_test,
+    simulate,
+    snoop,
+)
 from photogram.network import Attitude, rotation_matrix
 from photogram.results.duplicates import duplicates
 from photogram.statistics.findings import IMAGES, Removed
@@ -322,6 +333,24 @@ def test_the_limit_of_undetected_errors_decides_the_verdict():
             result.with_max_bias_ratio(wrong)
 
 
+def test_special_cases_of_an_undetected_error_are_counted():
+    """A shift of all control includes an error of all heights."""
+    result = adjust(block_of("clean")).with_max_bias_ratio(0.5)
+    found = result._hypotheses()
+    codes = [found.code[row] for row in found.harmful]
+    assert "control-shift" in codes
+    assert "control-heights" not in codes
+    assert "control-heights" in {found.code[row] for row in found.effects if found.effects[row].others > 40}
+    nested = {
+        each.fields["error"].fields["named"].code: each.fields["n"]
+        for each in result.verdict.message.fields["errors"]
+        if each.code == "unchecked.nested"
+    }
+    assert nested["hypothesis.control-shift"] == nested["hypothesis.gnss-shift"] == 1
+    named = [each for each in result.verdict.message.fields["errors"] if each.code != "unchecked.sd"]
+    assert len(named) == len(found.harmful)
+
+
 def test_the_limit_is_an_option_and_a_setting(run, tmp_path):
     for number, given in enumerate((["--max-bias-ratio", 0.5], ["--set", "adjust.max_bias_ratio=0.5"])):
         folder = tmp_path / str(number)
@@ -558,6 +587,27 @@ def test_a_scale_of_all_distances_is_named():
     verdict = adjust(block.replace(observations=[*gnss, *distances])).verdict
     first = verdict.message.fields["errors"][0].fields["named"]
     assert (verdict.code, first.code) == ("common-error", "hypothesis.distance-scale")
+
+
+def test_snooping_names_the_scale_of_all_distances_although_control_is_fixed():
+    """Errors of fixed points resemble errors in common, but explain less."""
+    block = block_of("clean")
+    *gnss, _ = block.observations
+    places, control = adjust(block).point_positions, np.isfinite(block.point_sd).all(axis=1)
+    others = np.flatnonzero(np.isfinite(places).all(axis=1) & ~control)[:12].reshape(-1, 2)
+    distances = [
+        Distance(block.point_ids[i], block.point_ids[j], 1.01 * np.linalg.norm(places[i] - places[j]), 0.01)
+        for i, j in others
+    ]
+    fixed = block.replace(
+        observations=[*gnss, *distances],
+        point_positions=np.where(control[:, np.newaxis], places, np.nan),
+        point_sd=np.where(control[:, np.newaxis], 0.0, [np.inf] * 3),
+    )
+    found = snoop(fixed)
+    assert not found.removed
+    first = found.result.verdict.message.fields["errors"][0].fields["named"]
+    assert first.code == "hypothesis.distance-scale"
 
 
 def test_an_exchanged_principal_point_is_named():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -35,7 +35,7 @@ from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
 from photogram.results.fixed_tests import held_remark, held_tested
-from photogram.results.hypothesis_tests import hypotheses
+from photogram.results.hypothesis_tests import hypotheses, largest_odds
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.network_trial import (
@@ -159,21 +159,27 @@ def snoop_block(
         (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
     )
 
+    @cache
+    def held() -> list[Tested]:
+        with suppress(AdjustmentError):
+            return held_tested(adjusted(block)) if has_held else []
+        return []
+
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
         facts = block_facts(block, np.array([values[:3] for values in trial.core.photos]))
         parts = trial, tests, facts, point_axes(block), standing.sum_and_freedom, MAX_BIAS_RATIO
         found, known = hypotheses(*parts, known=options.is_known), options.is_known
-        if errors := found.common_errors():
+        rivals = largest_odds(held())  # Errors of fixed values resemble common errors
+        if errors := found.common_errors(rivals):
             return errors
         # Factors of images are estimated, and need no stop.
         types = type_factors(trial, tests, MAX_BIAS_RATIO, standing.sum_and_freedom) if known else []
-        return [needed(each) for each in wrong_types(types, found.odds()) if each.group != IMAGES]
+        return [needed(each) for each in wrong_types(types, found.odds(rivals)) if each.group != IMAGES]
 
     try:
         trial = block_trial(block, None, core, threads, control=control)
-        # Errors of fixed values resemble common errors.
-        outcome = snooped(trial, options, None if start else afresh, None if has_held else common, start)
-        if not has_held and Removed([], trial.suspects.counts(outcome.out.rows, outcome.active)).excessive:
+        outcome = snooped(trial, options, None if start else afresh, common, start)
+        if Removed([], trial.suspects.counts(outcome.out.rows, outcome.active)).excessive:
             # A robust start removes members of sets before errors in common are tested.
             other = block_trial(block, None, core, threads, control=control)
             with suppress(LostSupportError, _photocore.BlockError):
@@ -200,7 +206,7 @@ def snoop_block(
         trial,
         outcome,
         options,
-        held=lambda: held_tested(adjusted(block)) if has_held else [],
+        held=held,
         exchanged=exchanged,
     )
 
