@@ -190,9 +190,31 @@ class Hypotheses:
 
     @property
     def harmful(self) -> list[int]:
-        """Rows whose undetected errors move too many points, the worst first."""
+        """Rows whose undetected errors move too many points, the worst first, without special cases."""
         rows = [row for row in self.effects if self._is_harmful(row)]
-        return sorted(rows, key=lambda row: (not np.isnan(self.mdb[row, 0]), -self.effects[row].rank))
+        rows.sort(key=lambda row: (not np.isnan(self.mdb[row, 0]), -self.effects[row].rank))
+        special = {other for row in rows for other in self._special_cases(row)}
+        return [row for row in rows if row not in special]
+
+    def _special_cases(self, row: int) -> list[int]:
+        """Return rows of harmful errors of one parameter that an error of the same observations includes.
+
+        Of equal errors, the first one includes the others. Tests of other observations may be equal although
+        their effects differ.
+        """
+        if row >= len(self.sets):
+            return []
+        count = [len(own["parameters"]) for own in self.sets]
+        source = [
+            SCALES if code in SCALES else code.partition("-")[0] for code in self.code[: len(count)].tolist()
+        ]
+        nested = np.flatnonzero(self.correlations[row] >= NESTED).tolist()
+        return [
+            other
+            for other in nested
+            if source[other] == source[row] and count[other] == 1 and (count[row] > 1 or other > row)
+            if other in self.effects and self._is_harmful(other)
+        ]
 
     @property
     def worst(self) -> int | None:
@@ -204,13 +226,15 @@ class Hypotheses:
         return [self.sentence(row) for row in self.harmful]
 
     def sentence(self, row: int) -> Phrase:
-        """Return the message on an undetected error with a known effect."""
+        """Return the message on an undetected error with a known effect, and on its special cases."""
         if np.isnan(self.mdb[row, 0]):
-            return phrase("unchecked.any", named=self.name(row))
-        size, named = self._main_component(row)
-        effect = self.effects[row]
-        fields = {"size": size, "named": named, "percent": 100 * effect.points / self.points}
-        return Phrase("unchecked.mdb", {**fields, "ratio": effect.ratio})
+            error = phrase("unchecked.any", named=self.name(row))
+        else:
+            size, named = self._main_component(row)
+            fields = {"size": size, "named": named, "percent": 100 * self.effects[row].points / self.points}
+            error = Phrase("unchecked.mdb", {**fields, "ratio": self.effects[row].ratio})
+        special = len(self._special_cases(row))
+        return phrase("unchecked.nested", error=error, n=special) if special else error
 
     def _main_component(self, row: int) -> tuple[str, Phrase]:
         """Return the size of an error, and its name if one component is nearly all of it."""
