@@ -181,3 +181,19 @@ def test_a_pair_of_a_large_block_is_found_among_some_of_its_images(monkeypatch):
     assert {pair.fields["one"], pair.fields["other"]} == set(names)
     assert photo in pair.fields["photos"]
     assert asked[-1] < 0.8 * asked[0]
+
+
+def test_a_pair_is_no_shift_of_the_images_of_its_photo():
+    """A shift by two widths of the image explains most of the residuals; no origin is that far away."""
+    options = {"points_per_photo": 57, "side_overlap": 0.6, "control_spacing": 2, "control_sd": 0.5}
+    block = simulate(strips=3, photos_per_strip=9, photo_to_ground=True, seed=8002, **options).block
+    photo, points = (
+        block.photo_ids.index("0209"),
+        [block.point_ids.index(name) for name in ("P000322", "P000323")],
+    )
+    rows = np.flatnonzero((block.image_photos == photo) & np.isin(block.image_points, points))
+    xy = block.image_xy.copy()
+    xy[rows] = xy[rows[::-1]]
+    texts = [finding.text for finding in diagnose(block.replace(image_xy=xy)).grave]
+    assert any("P000322" in text and "P000323" in text for text in texts)
+    assert not any("shift" in text for text in texts)

@@ -38,6 +38,7 @@ EXPLAINED = 0.15  # Least part of the excess of the sum of squares that a common
 ABSURD = 5.0  # Standard deviations of plausible sizes beyond which an error has no plausible size
 ABSURD_PART, UNKNOWN_PART = 0.9, 0.7
 """Least parts of this excess that errors without a plausible size, or with an unknown one, explain."""
+IMAGE_WIDTH = 10.0  # Plausible shifts of the images of a photo; no origin is farther away
 LISTED = 10  # Rows of each table of documents
 DIFFERS = 1.5  # Factor of standard deviations from which on a readout time differs between photos
 SEPARABLE = 0.9  # Largest correlation of the tests of separable errors (Foerstner 1983)
@@ -317,6 +318,8 @@ class Hypotheses:
         if self.code[row] == "photo":
             # Its pose nearly absorbs the shift: a large one explains gross errors of several images, too.
             level, least = level / len(self.suspects.given.photo_ids), ABSURD_PART
+            if (sizes > IMAGE_WIDTH).any():
+                return False
         return bool(self.probability[row] < level and self.statistic[row] >= least * self.excess)
 
     def odds(self, rivals: float = -math.inf) -> float:
