@@ -29,7 +29,6 @@ from surveys import Survey, surveys
 WRONG = 5.0  # Standard deviations by which a mistake moves points of a wrong result
 SIZES = 0.5, 1.0, 3.0, 10.0  # of planted errors, in minimal detectable biases
 LENS = "camera-f", "camera-point", "camera-term", "camera-radial"
-SINGLE = "control-point", "image", "position", "attitude", "distance", "camera"  # Codes of single errors
 
 
 def codes_of(result: Result) -> np.ndarray:
@@ -85,10 +84,29 @@ def sharpened(clean: Result, wrong: Result) -> float:
         return float(np.nanmedian(clean.point_sd / wrong.point_sd[: len(clean.point_sd)]))
 
 
-def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
+def single_error(survey: Survey, hypothesis: str) -> str:
+    """Return the name of the observation that has a single error; empty for errors in common."""
+    code, first = hypothesis.partition(" ")[0], next(iter(survey.control), -1)
+    if code == "distance":
+        return "distance p{} - p{}".format(*survey.bars[0])
+    of_photo = "of photo " if survey.weighted else ""
+    names = {
+        "control-point": f"control point p{first}",
+        "position": f"position {of_photo}i1",
+        "attitude": f"attitude {of_photo}i1",
+        "image": f"image of point p{survey.seen[0]} on photo i{survey.photos[0]}",
+        "camera": "parameters of camera 1",
+    }
+    if code == "object-point":
+        return f"control point p{target(survey)}"
+    return names.get(code, "")
+
+
+def is_cause(result: Result, hypothesis: str, single: str) -> bool | None:
     """Whether the headline names the true cause, or inseparable ones with it; None if the result is usable.
 
-    A lens model includes the parameters of the camera.
+    `single` is the name of the observation with a single error. A lens model includes the parameters of the
+    camera.
     """
     code = result.verdict.code
     fields = result.verdict.message.fields
@@ -107,10 +125,10 @@ def is_cause(result: Result, hypothesis: str, point: str) -> bool | None:
         for code, statistic in zip(codes_of(result), statistics.tolist(), strict=True):
             largest[code] = max(largest[code], statistic)
         return true in named or largest[true] > largest[first] - 2 * math.log(20)
-    if code == "gross-errors" and hypothesis.startswith(("control-point", "object-point")):
-        return f"control point {point}" in str(fields["suspects"][0])
-    if hypothesis.partition(" ")[0] in SINGLE:
-        return None  # Errors of single observations other than these are not common errors.
+    if single and code == "gross-errors":
+        return single in str(fields["suspects"][0])
+    if single and not hypothesis.startswith("object-point"):
+        return None  # Other messages do not name single observations.
     return None if result.verdict.usable else code == "model" and hypothesis in LENS
 
 
@@ -185,8 +203,7 @@ def main() -> None:
                 if off > WRONG and good:
                     bad.append(f"block {number} ({of}), {name} {size:g}: {off:.1f} sd, {verdict.code}")
                 if size >= 3 and hypothesis:
-                    point = target(survey) if hypothesis == "object-point" else next(iter(survey.control), -1)
-                    first = is_cause(result, hypothesis, f"p{point}")
+                    first = is_cause(result, hypothesis, single_error(survey, hypothesis))
                     causes[name] += [] if first is None else [first]
                     if first is False:
                         others.append(f"block {number} ({of}), {name} {size:g}: {verdict.headline}")
