@@ -2,7 +2,7 @@
 
 Further options: `--snoop` removes gross errors, `--loss huber` or `cauchy` adjusts robustly, `--strict`
 counts results as accepted whose exit code is 0 with `--strict`, `--only TEXT` selects mistakes by name,
-`--table` prints which mistakes plant each code of the catalogue.
+`--large` has one flight of 500 photos, `--table` prints which mistakes plant each code of the catalogue.
 
 Blocks with one practical mistake each (`mistakes.py`) are adjusted, and the verdict is compared with the
 truth: a result is wrong if the mistake has moved two other points by more than 5 standard deviations. No
@@ -24,7 +24,7 @@ import numpy as np
 
 from mistakes import ACCURACY, GIVEN, LARGEST, MISTAKES, TWICE, target
 from photogram import PhotogramError, Result, adjust, snoop
-from surveys import Survey, surveys
+from surveys import Survey, aerial, surveys
 
 WRONG = 5.0  # Standard deviations by which a mistake moves points of a wrong result
 SIZES = 0.5, 1.0, 3.0, 10.0  # of planted errors, in minimal detectable biases
@@ -151,6 +151,7 @@ def main() -> None:
     parser.add_argument("--strict", action="store_true", help="exit codes with warnings")
     parser.add_argument("--loss", choices=("huber", "cauchy"), help="adjust robustly")
     parser.add_argument("--only", default="", help="only mistakes with this text in their name")
+    parser.add_argument("--large", action="store_true", help="one flight of 500 photos instead of blocks")
     parser.add_argument("--table", action="store_true", help="list the mistakes of each hypothesis")
     options = parser.parse_args()
     if options.table:
@@ -167,7 +168,10 @@ def main() -> None:
             return snoop(survey.block(), **datum).result  # type: ignore[return-value]
         return adjust(survey.block(), loss=options.loss, **datum)
 
-    for number, survey in enumerate(surveys(rng, options.blocks)):
+    chosen = (
+        [aerial(rng, 10, 50, 12, True, attitudes=True)] if options.large else surveys(rng, options.blocks)
+    )
+    for number, survey in enumerate(chosen):
         try:
             clean = adjust(survey.block(), datum="inner" if survey.is_free else None)
             same = adjusted(survey) if options.snoop or options.loss else clean
