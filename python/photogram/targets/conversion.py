@@ -135,7 +135,7 @@ class Conversion(Documented):
                 "knots": camera.knots,
                 "size": list(found.size),
                 "pixel_origin": "center",
-                "distances": [each if math.isfinite(each) else None for each in found.distances],
+                "distances": found.distances,
                 "motion": found.fitted.motion,
                 "rms": self.rms,
                 "largest": self.largest,

@@ -15,9 +15,8 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, VERMILION, round_length
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
-from photogram.targets.grouping import CRITICAL_TEST_VALUE, mean_residuals
+from photogram.targets.grouping import CRITICAL_TEST_VALUE, group_statistics, outlying_images
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
-from photogram.targets.tables import outlying_images, view_rms
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
@@ -229,9 +228,9 @@ def plot_board_residuals(calibrated: Calibrated) -> Plot:
         The adjusted calibration.
     """
     corners, places = calibrated.calibration.corners, calibrated.points
-    mean, tests = mean_residuals(calibrated, corners.point[corners.use], len(places))
-    seen = np.isfinite(mean).all(axis=1)
-    marked = np.asarray((np.abs(tests) > CRITICAL_TEST_VALUE).any(axis=1))
+    found = group_statistics(calibrated.result, corners.point[corners.use], len(places))
+    mean, seen = found.mean, np.isfinite(found.mean).all(axis=1)
+    marked = np.asarray((np.abs(found.tests) > CRITICAL_TEST_VALUE).any(axis=1))
     unit = calibrated.calibration.board.unit
     low, high = places[seen, :2].min(axis=0), places[seen, :2].max(axis=0)
     extent = np.maximum(high - low, 1e-12)
@@ -253,7 +252,7 @@ def plot_poorest_views(calibrated: Calibrated) -> Plot:
     """
     corners, result = calibrated.calibration.corners, calibrated.result
     picture = corners.picture[corners.use]
-    rms = view_rms(picture, result.residuals, len(corners.pictures))
+    rms = group_statistics(result, picture, len(corners.pictures)).rms
     worst = np.argsort(-np.nan_to_num(rms), kind="stable")[:VIEWS_DRAWN].tolist()
     panels, outliers = [], outlying_images(calibrated)
     for each in worst:

@@ -15,16 +15,18 @@ import numpy as np
 
 from photogram.adjustment.components import variance_components
 from photogram.arguments.arrays import one_of
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.components import VarianceComponents
 from photogram.results.grouping import GroupsArgument
-from photogram.show.quantity import Axis, Quantity, chosen
+from photogram.show.quantity import Axis, Quantity, chosen, column
 from photogram.targets.options import CornerBasis
 from photogram.targets.regularisation import weighted_block
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
+    from photogram.results.result import Result
     from photogram.targets import Calibrated
 
 Groups = Literal["camera", "level", "point", "cell", "radius"]
@@ -32,6 +34,75 @@ Groups = Literal["camera", "level", "point", "cell", "radius"]
 CELLS_OF_PICTURE = (12, 8)  # across and down
 RINGS_OF_PICTURE = 10
 CRITICAL_TEST_VALUE = 3.3  # p = 0.001
+
+
+@dataclass(frozen=True, eq=False)
+class GroupStatistics:
+    """Residuals of the used corners in G groups; NaN for empty groups."""
+
+    corners: Indices  # (G,) number of corners
+    rms: Floats  # (G,) root mean square of the residuals, pixels
+    redundancy: Floats  # (G,)
+    chi2: Floats  # (G,) sum of squares of the weighted residuals
+    mean: Floats  # (G, 2) mean residual, pixels, and its test value
+    tests: Floats
+
+
+def group_statistics(result: Result, group: Indices, count: int) -> GroupStatistics:
+    """Return statistics of `count` groups; `group` is (m,) of each image, -1: none."""
+    own = group >= 0
+    corners = np.bincount(group[own], minlength=count)
+
+    def sums(values: Floats) -> Floats:
+        parts = [np.bincount(group[own], weights=column[own], minlength=count) for column in values.T]
+        return np.stack(parts, axis=1)
+
+    weighted = result.residuals / result.image_given_sd
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = np.sqrt(sums(np.nan_to_num(result.redundancy)) * result.covariance_scale)
+        return GroupStatistics(
+            corners=corners,
+            rms=np.sqrt(sums(result.residuals**2).sum(axis=1) / (2 * corners)),
+            redundancy=sums(result.redundancy).sum(axis=1),
+            chi2=sums(weighted**2).sum(axis=1),
+            mean=sums(result.residuals) / corners[:, np.newaxis],
+            tests=sums(np.nan_to_num(weighted)) / spread,
+        )
+
+
+_PIXELS = (Axis.of("px", "px"),)
+
+
+def views(calibrated: Calibrated) -> list[Quantity]:
+    """Return the views with images, corners, rms, redundancy, chi2, largest residual."""
+    corners, result = calibrated.calibration.corners, calibrated.result
+    count, of_picture, use = corners.view_count, corners.views, corners.use
+    view = of_picture[corners.picture[use]]
+    found = group_statistics(result, view, count)
+    largest = np.zeros(count)
+    np.maximum.at(largest, view, np.nan_to_num(np.abs(result.standardized)).max(axis=1, initial=0.0))
+    marked = np.bincount(view[outlying_images(calibrated)], minlength=count) > 0
+    left_out = np.bincount(of_picture[corners.picture[~use]], minlength=count)
+    names = np.array(corners.view_names(), dtype=object)
+    return [
+        replace(column("view", names, "View", kind="name"), member="name", about="first picture of the view"),
+        column("pictures", np.bincount(of_picture, minlength=count), "Pictures"),
+        column("corners", found.corners, "Corners"),
+        column("left_out", left_out, "Left out"),
+        column("rms_px", found.rms, "rms", axes=_PIXELS, kind="value"),
+        column("redundancy", found.redundancy, "Redundancy"),
+        column("chi2", found.chi2, "chi²", figures=4),
+        column("largest_standardized", largest, "Largest standardized", marked=marked),
+    ]
+
+
+def outlying_images(calibrated: Calibrated) -> Bools:
+    """Return (m,) the images that are outliers of the verdict."""
+    outliers = np.zeros(len(calibrated.result.residuals), dtype=bool)
+    for kind, places in calibrated.verdict.outlying.items():
+        if isinstance(kind, Phrase) and kind.code in ("test.images", "test.image_coordinates"):
+            outliers[[place[0] for place in places]] = True
+    return outliers
 
 
 def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list[Quantity]:
@@ -49,43 +120,21 @@ def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list
     """
     one_of("by", by, get_args(Groups))
     names, group = _grouped(calibrated, by, camera)
-    result, count = calibrated.result, len(names)
-    own = group >= 0
-    used = np.bincount(group[own], minlength=count)
-    weighted = (result.residuals / result.image_given_sd) ** 2
-    mean, tests = mean_residuals(calibrated, group, count)
+    found = group_statistics(calibrated.result, group, len(names))
     with np.errstate(invalid="ignore", divide="ignore"):
-        rms = np.sqrt(_sums(group[own], result.residuals[own] ** 2, count).sum(axis=1) / (2 * used))
-        redundancy = _sums(group[own], result.redundancy[own], count).sum(axis=1)
-        sigma = np.sqrt(_sums(group[own], weighted[own], count).sum(axis=1) / redundancy)
-    kept, marked = used > 0, np.abs(np.nan_to_num(tests)) > CRITICAL_TEST_VALUE
-    pixels = (Axis.of("px", "px"),)
+        sigma = np.sqrt(found.chi2 / found.redundancy)
+    marked = np.abs(np.nan_to_num(found.tests)) > CRITICAL_TEST_VALUE
     axes = (Axis.of("x", "px"), Axis.of("y", "px"))
     columns = [
-        Quantity(np.array(names, dtype=object), (), "name", by, by, head=_HEADS[by]),
-        Quantity(used, name="corners", member="corners", head="Corners"),
-        Quantity(rms, pixels, "value", "rms", "rms_px", head="rms", figures=3),
-        Quantity(redundancy, name="redundancy", member="redundancy", head="Redundancy"),
-        Quantity(sigma, name="sigma", member="sigma", head="Sigma", figures=3),
-        Quantity(mean, axes, "value", "mean_", "mean_px", head="Mean {}", figures=2),
-        Quantity(tests, axes, "number", "t_", "t", head="t {}", figures=2, marked=marked),
+        column(by, np.array(names, dtype=object), _HEADS[by], kind="name"),
+        column("corners", found.corners, "Corners"),
+        Quantity(found.rms, _PIXELS, "value", "rms", "rms_px", head="rms", figures=3),
+        column("redundancy", found.redundancy, "Redundancy"),
+        column("sigma", sigma, "Sigma", figures=3),
+        Quantity(found.mean, axes, "value", "mean_", "mean_px", head="Mean {}", figures=2),
+        Quantity(found.tests, axes, "number", "t_", "t", head="t {}", figures=2, marked=marked),
     ]
-    return chosen(columns, np.flatnonzero(kept))
-
-
-def mean_residuals(calibrated: Calibrated, group: Indices, count: int) -> tuple[Floats, Floats]:
-    """Return (count, 2) mean group residuals (px) and test values, ignoring group -1."""
-    result = calibrated.result
-    own = group >= 0
-    weighted = result.residuals / result.image_given_sd
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = (
-            _sums(group[own], result.residuals[own], count)
-            / np.bincount(group[own], minlength=count)[:, None]
-        )
-        spread = np.sqrt(_sums(group[own], np.nan_to_num(result.redundancy[own]), count))
-        tests = _sums(group[own], np.nan_to_num(weighted[own]), count) / spread
-    return mean, tests / np.sqrt(result.covariance_scale)
+    return chosen(columns, np.flatnonzero(found.corners))
 
 
 def _grouped(calibrated: Calibrated, by: Groups, camera: int) -> tuple[list[str], Indices]:
@@ -123,10 +172,6 @@ _HEADS = {
     "cell": "Cell, column and row",
     "radius": "Radius, px",
 }
-
-
-def _sums(group: Indices, values: Floats, count: int) -> Floats:
-    return np.stack([np.bincount(group, weights=column, minlength=count) for column in values.T], axis=1)
 
 
 def corner_components(

@@ -5,8 +5,7 @@ It extends the document of the block by board, views and projection uncertainty.
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -23,17 +22,15 @@ from photogram.targets.drawing import (
     plot_poorest_views,
     plot_uncertainty,
 )
-from photogram.targets.grouping import Groups, residual_groups
+from photogram.targets.grouping import Groups, residual_groups, views
 from photogram.targets.maps import UncertaintyMap, distance_text, map_name
 from photogram.targets.tables import (
+    MIN_PRIOR_REDUNDANCY,
     STRETCHES,
     board_facts,
     board_fit,
     prior_shift,
-    spline_lines,
     splines,
-    views,
-    worst_points,
 )
 
 if TYPE_CHECKING:
@@ -44,26 +41,21 @@ if TYPE_CHECKING:
 def calibration_page(calibrated: Calibrated) -> Document:
     """Return the report of a calibration for the browser."""
     page = (calibrated.snooped or calibrated.result).document()
-    board: list[Part] = [Facts("The board", board_facts(calibrated))]
-    if worst := worst_points(calibrated):
-        board.append(Remarks(worst))
-    table = [*views(calibrated), Quantity(calibrated.poses, member="pose")]
-    intro = (
-        "Pictures of one view show the board in one pose. chi² is the weighted sum of squares of its corners."
-    )
-    moved = prior_shift(calibrated)
     worth = calibrated.worth
+    tables = [
+        Table("splines", "Splined lenses", splines(calibrated), about=KNOTS),
+        Table("moved_by_priors", "Changes by priors of cameras", prior_shift(calibrated)),
+    ]
     sections = [
         worth_section(worth),
-        Section("board", "Board", board),
-        Section("views", "Views", [Table("views", "Views", table)], intro),
-        Section("corners", "Residuals of corners", _residuals(calibrated)),
-        Section("splines", "Splined lenses", [Remarks(told)] if (told := spline_lines(calibrated)) else []),
-        Section(
-            "priors",
-            "Priors of cameras",
-            [Table("moved_by_priors", "What they have moved", moved)] if moved else [],
+        Section("board", "Board", [Facts("The board", board_facts(calibrated))]),
+        Section.of(
+            Table(
+                "views", "Views", [*views(calibrated), Quantity(calibrated.poses, member="pose")], about=VIEWS
+            )
         ),
+        Section("corners", "Residuals of corners", _residuals(calibrated)),
+        *(Section.of(each) for each in tables if each.visible),
     ]
     highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]
     return replace(
@@ -72,6 +64,13 @@ def calibration_page(calibrated: Calibrated) -> Document:
         highlights=highlights,
         sections=[*sections, *page.sections],
     )
+
+
+VIEWS = "Pictures of one view show the board in one pose. chi² is the weighted sum of squares of its corners."
+KNOTS = (
+    f"Knots with a redundancy below {MIN_PRIOR_REDUNDANCY:g} are determined by their priors. Projection has"
+    " no uncertainty beyond the knots; all pixels are within the knots if fov_x_deg is sufficient."
+)
 
 
 def _residuals(calibrated: Calibrated) -> list[Part]:
@@ -174,13 +173,12 @@ def _title(found: UncertaintyMap) -> str:
 
 def _members(calibrated: Calibrated) -> dict[str, Any]:
     sensors = [
-        {"camera": calibrated.cameras[row].name, "pose": calibrated.sensors[row].tolist()}
+        {"camera": calibrated.cameras[row].name, "pose": calibrated.sensors[row]}
         for row in calibrated.sensors_adjusted()
     ]
     return {
         "board": _board(calibrated),
         **({"sensors": sensors} if sensors else {}),
-        **({"splines": [asdict(each) for each in told]} if (told := splines(calibrated)) else {}),
         **({} if calibrated.worth is None else worth_members(calibrated.worth)),
     }
 
@@ -201,11 +199,9 @@ def _board(calibrated: Calibrated) -> dict[str, Any]:
         ),
     }
     if (bend := calibrated.bend) is not None:
-        found["bend"] = bend.position[:2].tolist()
-        found["bend_covariance"] = bend.covariance.tolist()
+        found |= {"bend": bend.position[:2], "bend_covariance": bend.covariance}
     if fit is not None:
-        found["plane"] = fit.plane.tolist()
-        found["rms_out_of_plane"] = fit.rms_out_of_plane
+        found |= members(fit, "plane", "rms_out_of_plane")
         found["spacing_ppm"] = dict(zip(STRETCHES, fit.stretch.tolist(), strict=True))
         found["sd_spacing_ppm"] = dict(zip(STRETCHES, fit.sd.tolist(), strict=True))
     return found
@@ -222,8 +218,9 @@ def worth_files(worth: Worth) -> dict[str, bytes]:
 
 def worth_members(worth: Worth) -> dict[str, Any]:
     """Return the JSON members of the assessment."""
+    maps = ("camera", "datum", "noise_only", "model", "distance", "columns", "rows", "sd", "covariances")
     return {
-        "maps": [_map(each) for each in worth.maps],
+        "maps": [members(each, *maps, largest_where_seen="largest") for each in worth.maps],
         "cross_validation": [_cross(each) for each in worth.cross],
         "difference": [_difference(each) for each in worth.differences],
         "suggested_views": [_suggested(each) for each in worth.suggestions],
@@ -231,20 +228,10 @@ def worth_members(worth: Worth) -> dict[str, Any]:
     }
 
 
-def _finite(distance: float) -> float | None:
-    return distance if math.isfinite(distance) else None
-
-
-def _map(uncertainty: UncertaintyMap) -> dict[str, Any]:
-    names = ("camera", "datum", "noise_only", "model", "columns", "rows", "sd", "covariances")
-    own = members(uncertainty, *names, largest_where_seen="largest")
-    return {**own, "distance": _finite(uncertainty.distance)}
-
-
 def _cross(cross: CrossValidation) -> dict[str, Any]:
     splits = [
         {
-            "views": [list(part) for part in parts],
+            "views": parts,
             "tests": [_test(test) for test in tests],
             "dk": changes_between(*housings)[0][: cross.whole.board.start],
         }
@@ -258,20 +245,15 @@ def _test(test: DifferenceTest) -> dict[str, Any]:
 
 
 def _difference(difference: CameraDifference) -> dict[str, Any]:
-    names = ("cameras", "rms", "largest", "columns", "rows", "vectors", "covariances", "remarks")
+    own = ("cameras", "distances", "rms", "largest", "columns", "rows", "vectors", "covariances", "remarks")
     others = {"motion": "fitted.motion", "rotation_deg": "rotation", "shared_corners": "shared"}
-    return {
-        **members(difference, *names, **others),
-        "distances": [_finite(distance) for distance in difference.distances],
-        "test": difference.test and _test(difference.test),
-    }
+    return {**members(difference, *own, **others), "test": difference.test and _test(difference.test)}
 
 
 def _suggested(suggestions: Suggestions) -> dict[str, Any]:
     names = {"name": "candidate.name", "pose": "candidate.pose"}
     return {
-        "camera": suggestions.camera,
-        "distance": _finite(suggestions.distance),
+        **members(suggestions, "camera", "distance"),
         "largest_before": float(np.max(suggestions.before)),
         "views": [members(view, "corners", "largest", "rms", **names) for view in suggestions.views],
     }

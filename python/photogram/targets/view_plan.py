@@ -291,7 +291,7 @@ class ViewPlan(Documented):
                 "size": calibration.corners.sizes[0],
                 "model": nominal.model,
                 "sd_of_corners": calibration.sd0,
-                "distance": self.distance if math.isfinite(self.distance) else None,
+                "distance": self.distance,
                 "need": self.need or None,
                 "enough": self.enough,
                 "largest": self.largest,
