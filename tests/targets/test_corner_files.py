@@ -12,7 +12,7 @@ from message_codes import described, refusal
 from photogram import Camera, InputError
 from photogram.targets import Board, CalibrationOptions, read
 from photogram.targets.corner_files import holds_targets, read_table, read_vnl, sorted_files
-from photogram.targets.corners import Grouping, grouped
+from photogram.targets.corners import grouped
 from photogram.targets.mrcal import read_model
 from photogram.targets.opencv_corners import read_npz, read_storage
 from photogram.targets.reading import _measured
@@ -47,7 +47,7 @@ def test_text_of_mrcal(tmp_path):
     assert found.point.tolist() == [0, 1, 3, 4, 5, 0, 1, 2, 3, 4, 5]
     assert found.sd[:2].tolist() == [1.0, 4.0]
     assert found.use.tolist() == [True, True, False, False, *[True] * 7]
-    corners, _ = grouped(found, Grouping(size=(640, 480)))
+    corners, _ = grouped(found, CalibrationOptions(size=(640, 480)))
     assert corners.pictures == ("a.jpg", "c.jpg")
 
 
@@ -90,7 +90,7 @@ def test_table_with_levels_cameras_views_and_times(tmp_path):
     found = read_table(path, SMALL)
     assert (found.cameras, found.views) == (["left", "right"], ["7", "7"])
     assert found.sd.tolist() == [2.0, 1.0]
-    corners, _ = grouped(found, Grouping())
+    corners, _ = grouped(found, CalibrationOptions())
     assert corners.camera_names == ("left", "right")
     assert corners.views.tolist() == [0, 0]
 
@@ -135,7 +135,7 @@ def test_corners_that_a_table_calls_off_do_not_count(tmp_path):
 def test_cameras_by_the_names_of_their_images(tmp_path):
     lines = rows("left07.jpg", "right07.jpg", "left02.jpg", "other.jpg")
     found = read_table(written(tmp_path / "c.csv", "image,point,x,y", *lines), SMALL)
-    corners, told = grouped(found, Grouping(cameras=("left*.jpg", "right*.jpg")))
+    corners, told = grouped(found, CalibrationOptions(cameras=("left*.jpg", "right*.jpg")))
     assert corners.camera_names == ("left", "right")
     assert dict(zip(corners.pictures, corners.views.tolist(), strict=True)) == {
         "left07.jpg": 0,
@@ -144,10 +144,10 @@ def test_cameras_by_the_names_of_their_images(tmp_path):
     }
     assert "other.jpg" in str(told[0])
     with refusal("targets.two-cameras image=left07.jpg"):
-        grouped(found, Grouping(cameras=("left*.jpg", "*07.jpg")))
-    apart, _ = grouped(found, Grouping(cameras=("left*.jpg", "right*.jpg"), apart=True))
+        grouped(found, CalibrationOptions(cameras=("left*.jpg", "*07.jpg")))
+    apart, _ = grouped(found, CalibrationOptions(cameras=("left*.jpg", "right*.jpg"), sync="none"))
     assert apart.views.tolist() == [0, 1, 2]
-    corner, _ = grouped(found, Grouping(origin="corner"))
+    corner, _ = grouped(found, CalibrationOptions(pixel_origin="corner"))
     assert corner.xy[0].tolist() == [10.0, 19.75]
 
 
@@ -162,10 +162,10 @@ def test_views_by_time_in_files_of_kalibr(tmp_path):
         written(tmp_path / f"{camera}.txt", *lines)
     _, _, corners = sorted_files(tmp_path)
     found = _measured(tmp_path, corners, SMALL)
-    by_time, _ = grouped(found, Grouping(views="time", within=0.005))
+    by_time, _ = grouped(found, CalibrationOptions(views="time", within=0.005))
     assert by_time.camera_names == ("cam0", "cam1")
     assert by_time.views.tolist() == [0, 1, 2, 0, 1, 2]
-    by_name, _ = grouped(found, Grouping())
+    by_name, _ = grouped(found, CalibrationOptions())
     assert by_name.views.tolist() == [0, 1, 2, 3, 4, 5]
     assert by_time.times[3] - by_time.times[0] == pytest.approx(0.002, abs=1e-6)
 
@@ -248,7 +248,7 @@ def test_arrays_of_python_objects_are_not_unpickled(tmp_path):
     path = tmp_path / "corners.npz"
     ragged = np.array([XY, XY[:3]], dtype=object)
     np.savez(path, imgpoints=ragged, objpoints=ragged)
-    with refusal("targets.array-objects name=imgpoints"):
+    with refusal("targets.array-damaged name=imgpoints reason=Object arrays cannot be loaded"):
         read_npz(path, None)
     path.write_bytes(b"PK\x03\x04 no archive")
     with refusal("error.parse format=archive of arrays (npz) reason=File is not a zip file"):

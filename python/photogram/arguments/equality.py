@@ -29,6 +29,10 @@ class Valued:
         values = (getattr(self, name) for name in self._compared())
         return hash((type(self).__name__, *(each for each in values if isinstance(each, str | bool | None))))
 
+    def _set(self, name: str, value: object) -> None:
+        """Set a field of a frozen dataclass, in its `__post_init__`."""
+        object.__setattr__(self, name, value)
+
     def _compared(self) -> list[str]:
         return [each.name for each in fields(self) if each.name not in self._BESIDE]  # type: ignore[arg-type]
 

@@ -236,8 +236,8 @@ def _files(found: Calibrated, formats: Sequence[str], need: float | None) -> dic
     from photogram.show.quantity import frame
     from photogram.targets import camera_files
     from photogram.targets.camera_formats import FILE, cameras_covariance
-    from photogram.targets.page import worth_files
     from photogram.targets.grouping import views
+    from photogram.targets.page import worth_files
 
     files = {**table_files(found.result), "views.csv": csv_text(frame(views(found)))}
     plain = to_files(adjusted_project(found), "plain")

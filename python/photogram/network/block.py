@@ -192,9 +192,6 @@ class Block(Valued, Brief):
     def __post_init__(self) -> None:
         check_block(self, {each.name for each in fields(self)})
 
-    def _set(self, name: str, value: Any) -> None:
-        object.__setattr__(self, name, value)
-
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the block, as shown by its `repr` and in notebooks."""
         held, known = np.isfinite(self.point_sd).any(axis=1), np.isfinite(self.point_positions).any(axis=1)

@@ -123,9 +123,6 @@ class Board(Valued, Brief):
             if getattr(self, name) is not None:
                 self._set(name, _length(name, getattr(self, name)))
 
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
-
     def _refuse(self, *fields: str) -> None:
         for name in fields:
             if getattr(self, name) is not None:

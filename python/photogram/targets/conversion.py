@@ -20,7 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Quantity, Table, members
 from photogram.summaries import Rows
 from photogram.targets.calibration_difference import CameraDifference, Fitted, motion_of, points_at
 from photogram.targets.lens_fit import (
@@ -130,22 +130,20 @@ class Conversion(Documented):
             members={
                 "kind": "lens conversion",
                 "source": {"name": self.source.title, "model": self.source.model},
-                "model": camera.model,
-                "parameters": dict(camera.parameters),
-                "knots": camera.knots,
-                "size": list(found.size),
                 "pixel_origin": "center",
-                "distances": found.distances,
-                "motion": found.fitted.motion,
-                "rms": self.rms,
-                "largest": self.largest,
-                "largest_at": list(self.where),
-                "not_shown": self.unseen,
-                "columns": found.columns,
-                "rows": found.rows,
-                "difference": found.vectors,
-                "names": list(self.names),
-                "covariance": self.covariance,
+                **members(camera, "model", "parameters", "knots"),
+                **members(
+                    found,
+                    "size",
+                    "distances",
+                    "columns",
+                    "rows",
+                    motion="fitted.motion",
+                    difference="vectors",
+                ),
+                **members(
+                    self, "rms", "largest", "names", "covariance", largest_at="where", not_shown="unseen"
+                ),
             },
         )
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from fnmatch import translate
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from photogram.lazy_dataclasses import converting_dataclass, dataclass, field, r
 from photogram.messages import Message
 from photogram.summaries import Brief, Rows, few
 from photogram.targets.board import Board
-from photogram.targets.options import ViewBy
+from photogram.targets.options import CalibrationOptions
 from photogram.words import Phrase, phrase
 
 MIN_CORNERS_PER_VIEW = 6
@@ -116,9 +116,6 @@ class Corners(Valued, Brief):
         for row in repeated_pairs(self.views, self.cameras, len(self.camera_names)).tolist():
             fields = {"picture": self.pictures[row], "camera": self.camera_names[self.cameras[row]]}
             raise InputError(phrase("targets.second-picture", **fields))
-
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
 
     def title(self, row: int) -> str:
         """Return the name of a corner with its image."""
@@ -226,20 +223,7 @@ class Measured:
             object.__setattr__(self, name, np.broadcast_to(getattr(self, name), len(self.point)))
 
 
-@dataclass(frozen=True)
-class Grouping:
-    """Cameras and views of images as specified by the user."""
-
-    cameras: Sequence[str] = ()  # a pattern (`left*.jpg`) of image names for each camera
-    views: ViewBy = "name"  # criterion for images of one view
-    within: float = 0.005  # largest time difference within a view, seconds
-    apart: bool = False  # whether every image is a separate view: not synchronised
-    size: Size | None = None  # width and height of all images
-    # Location of coordinates 0, 0: center or upper-left corner of the first pixel
-    origin: Literal["center", "corner"] = "center"
-
-
-def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
+def grouped(measured: Measured, how: CalibrationOptions) -> tuple[Corners, list[Message]]:
     """Return corners by cameras and views, and warnings."""
     names, keys, keep, messages = _cameras_and_views(measured, how)
     # Images without corners are not used.
@@ -252,7 +236,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
     camera_names = list(dict.fromkeys(names[row] for row in kept))
     if patterns:
         camera_names.sort(key=patterns.index)
-    if how.apart:
+    if how.sync == "none":
         views = np.arange(len(rows))
     elif how.views == "time":
         views = _by_time(measured, rows, [names[row] for row in kept], how.within)
@@ -266,7 +250,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
     if len(set(pictures)) < len(pictures):
         pictures = [f"{names[row]}/{measured.images[row]}" for row in kept]
     sizes = {**measured.sizes, **_sizes_of_pictures(measured, names, kept, how)}
-    shift = 0.5 if how.origin == "corner" else 0.0
+    shift = 0.5 if how.pixel_origin == "corner" else 0.0
     with at_place(Place(measured.path)):
         corners = Corners(
             pictures=pictures,
@@ -285,7 +269,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
 
 
 def _sizes_of_pictures(
-    measured: Measured, names: Sequence[str], rows: list[int], how: Grouping
+    measured: Measured, names: Sequence[str], rows: list[int], how: CalibrationOptions
 ) -> dict[str, Size]:
     """Return the common size of the images of each camera, if known."""
     found: dict[str, Size] = {}
@@ -300,7 +284,7 @@ def _sizes_of_pictures(
 
 
 def _cameras_and_views(
-    measured: Measured, how: Grouping
+    measured: Measured, how: CalibrationOptions
 ) -> tuple[list[str], list[str], Bools, list[Message]]:
     """Return camera names, view keys and use of images, and messages."""
     images = measured.images

@@ -114,18 +114,8 @@ class UncertaintyMap(Brief):
     def to_npz(self) -> bytes:
         """Return the arrays and `sd` in the format of NumPy, named by attribute."""
         content = io.BytesIO()
-        np.savez_compressed(
-            content,
-            columns=self.columns,
-            rows=self.rows,
-            sd=self.sd,
-            covariances=self.covariances,
-            corners=self.corners,
-            size=np.array(self.size),
-            distance=np.array(self.distance),
-            title=np.array(self.title),
-            model=np.array(self.model),
-        )
+        names = ("columns", "rows", "sd", "covariances", "corners", "size", "distance", "title", "model")
+        np.savez_compressed(content, **{name: np.asarray(getattr(self, name)) for name in names})
         return content.getvalue()
 
     def to_csv(self) -> bytes:

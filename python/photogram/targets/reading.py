@@ -12,12 +12,13 @@ from photogram.arguments.fields import options_of
 from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.io.places import Place, at_place
+from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board, picture_size, read_board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corner_files import Form, files_at, is_picture, sorted_files
-from photogram.targets.corners import Corners, Grouping, Measured, grouped
+from photogram.targets.corners import Corners, Measured, grouped
 from photogram.targets.detection import detected
 from photogram.targets.first_calibration import first_values
 from photogram.targets.lens_fit import KNOTS
@@ -68,7 +69,7 @@ def read(
         assert chosen.spacing is not None
         board = Board(columns=board[0], rows=board[1], spacing=chosen.spacing)
     own = board if isinstance(board, Board) else _only_board(described)
-    size = chosen.size or next(map(picture_size, described), None)
+    chosen = replace(chosen, size=chosen.size or next(map(picture_size, described), None))
     if chosen.knots is not None and (models or chosen.model != KNOTTED):
         raise InputError(phrase("targets.knots-of", model=KNOTTED))
     if models:
@@ -82,7 +83,6 @@ def read(
         return calibration.replace(
             cameras=cameras_of_model, regularise=prior, sd0=chosen.sd0, messages=messages, board=board
         )
-    how = Grouping(chosen.cameras, chosen.views, chosen.within, sync == "none", size, chosen.pixel_origin)
     pictures = [] if corners else [each for each in files_at(path) if is_picture(each)]
     if pictures and own is None:
         raise InputError(phrase("targets.no-board"), file=path)
@@ -98,7 +98,7 @@ def read(
         own = own.replace(shape=shape)
     if chosen.unit is not None:
         own = own.replace(unit=chosen.unit)
-    seen, remarks = grouped(found, how)
+    seen, remarks = grouped(found, chosen)
     with at_place(Place(path)):
         start = first_values(own, seen, chosen.model, chosen.knots or KNOTS)
     poses = start.picture_poses if sync == "none" else start.poses

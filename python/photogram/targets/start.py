@@ -86,9 +86,6 @@ class Start(Valued, Brief):
         if self.sync == "offset":
             self._set_motion()
 
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
-
     def _set_motion(self) -> None:
         """Compute the board motion about each view; omit images with unknown motion."""
         corners, tied = self.corners, self.tied[self.corners.cameras]

@@ -17,7 +17,7 @@ from photogram.network.cameras import Camera
 from photogram.network.hull import hull
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
-from photogram.show.quantity import Axis, Quantity, Table, of_each
+from photogram.show.quantity import Axis, Quantity, Table, members, of_each
 from photogram.show.sketch.marks import Mark, Markers, Panel, Polygons, boxes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
@@ -291,10 +291,8 @@ class ViewPlan(Documented):
                 "size": calibration.corners.sizes[0],
                 "model": nominal.model,
                 "sd_of_corners": calibration.sd0,
-                "distance": self.distance,
                 "need": self.need or None,
-                "enough": self.enough,
-                "largest": self.largest,
+                **members(self, "distance", "enough", "largest"),
                 "maps": worth_members(worth)["maps"],
             },
         )
