@@ -37,8 +37,11 @@ def test_points_and_both_parts_of_their_covariance(datum):
 
 
 def test_rays_that_do_not_meet_have_no_point():
-    found = triangulated(
-        rig_small(), (0, 1), np.array([[[640.0, 480.0], [20.0, 900.0]], [[np.nan] * 2] * 2]), SD
-    )
-    assert np.isnan(found.points[1]).all()
-    assert np.isnan(found.by_pixels[1]).all()
+    apart = [[20.0, 480.0], [1200.0, 480.0]]  # rays that intersect behind the cameras
+    pixels = np.array([[[640.0, 480.0], [20.0, 900.0]], [[np.nan] * 2] * 2, apart])
+    for found in (
+        triangulated(rig_small(), (0, 1), pixels, SD),
+        triangulated(rig_small(), (0, 1), pixels[1:], SD),
+    ):
+        assert np.isnan(found.points[-2:]).all()
+        assert np.isnan(found.by_pixels[-2:]).all()

@@ -38,7 +38,6 @@ from .uncertainty import difference as difference
 from .uncertainty import projection_uncertainty as projection_uncertainty
 from .uncertainty import uncertainty_against_distance as uncertainty_against_distance
 from .uncertainty import uncertainty_map as uncertainty_map
-from .view_plan import PlannedView as PlannedView
 from .view_plan import ViewPlan as ViewPlan
 from .view_plan import plan_views as plan_views
 from .view_plan import plot_planned_views as plot_planned_views

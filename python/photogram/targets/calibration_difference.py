@@ -20,6 +20,7 @@ from photogram.network.hull import hull, outside
 from photogram.summaries import Brief, Rows
 from photogram.targets.cross_validation import DifferenceTest
 from photogram.targets.housing import transformed
+from photogram.targets.lens_fit import Moved, Points
 from photogram.targets.maps import at_distance, image_grid
 from photogram.targets.projection import fixed_points, of_functions, point_partials, worst
 from photogram.targets.sightings import nearest_rotations
@@ -382,20 +383,16 @@ def fitted_motion(
     motion, free = np.eye(4), slice(0 if finite else 3, 6)
     unit = towards / np.linalg.norm(towards, axis=1)[:, np.newaxis]
     motion[:3, :3] = nearest_rotations((aims.T @ unit)[np.newaxis])[0]
+    if criterion == "pixels":
+        known = np.isfinite(imaged(b, transformed(motion, towards)).xy).all(axis=1)
+        roots = np.linalg.cholesky(weights[known]).transpose(0, 2, 1)
+        shown = Points(towards[known], places[known], finite, roots)
+        return Fitted(shown.least(Moved(b, motion), [], free).motion, finite, count)
     for _ in range(STEPS):
         moved = transformed(motion, towards)
         by_motion = motion_partials(moved, finite)[:, :, free]
-        if criterion == "pixels":
-            images = imaged(b, moved)
-            known = np.isfinite(images.xy).all(axis=1)
-            partials = (images.by_point @ by_motion)[known]
-            weighted = (weights[known] @ partials).reshape(-1, partials.shape[2])
-            normal = weighted.T @ partials.reshape(weighted.shape)
-            right = weighted.T @ (places - images.xy)[known].ravel()
-        else:
-            normal, right = _angle_step(moved, aims, weights**2, by_motion)
         step = np.zeros(6)
-        step[free] = np.linalg.solve(normal, right)
+        step[free] = np.linalg.solve(*_angle_step(moved, aims, weights**2, by_motion))
         motion = moved_by(motion, step)
         if np.abs(step[3:]).max() < TOLERANCE and np.abs(step[:3]).max() < TOLERANCE * np.min(distances):
             break

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -115,7 +116,8 @@ class UncertaintyMap(Brief):
         """Return the arrays and `sd` in the format of NumPy, named by attribute."""
         content = io.BytesIO()
         names = ("columns", "rows", "sd", "covariances", "corners", "size", "distance", "title", "model")
-        np.savez_compressed(content, **{name: np.asarray(getattr(self, name)) for name in names})
+        arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in names}
+        np.savez_compressed(content, **arrays)
         return content.getvalue()
 
     def to_csv(self) -> bytes:

@@ -12,6 +12,7 @@ Q contains cameras, sensors, and the positions of all board points, of which a r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from itertools import product
 
@@ -110,16 +111,16 @@ class Added:
 
 @dataclass(frozen=True, eq=False)
 class NewView:
-    """Suggested view, and the uncertainty map after adding it.
+    """Suggested or planned view, and the uncertainty map after adding it.
 
     Attributes
     ----------
     candidate
-        Suggested view.
+        Board position in words, and its pose: board -> camera 0.
     corners
         (K,) number of corners in the image of each camera.
     sd
-        (n,) standard deviations of the map in the worst direction, pixels.
+        (n,) standard deviations of the map in the worst direction, pixels; NaN without a map.
     """
 
     candidate: Candidate
@@ -135,6 +136,17 @@ class NewView:
     def rms(self) -> float:
         """Root mean square over the map, pixels."""
         return float(np.sqrt(np.mean(self.sd**2)))
+
+
+def effects_of(views: Sequence[NewView], before: float) -> list[str]:
+    """Return the effect of each view on the largest standard deviation; `before` is NaN without a map."""
+    said = []
+    for each in views:
+        code = "unknown" if math.isnan(each.largest) else "smaller" if math.isfinite(before) else "first"
+        sizes = {"before": before, "largest": each.largest}
+        said.append(str(phrase(f"views.{code}", view=each.candidate.name, **sizes)))
+        before = each.largest
+    return said
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -163,12 +175,7 @@ class Suggestions(Brief):
     @property
     def sentences(self) -> list[str]:
         """Suggested views and their effect, one line per view."""
-        largest, said = float(self.before.max()), []
-        for each in self.views:
-            sizes = {"before": largest, "largest": each.largest}
-            said.append(str(phrase("views.smaller", view=each.candidate.name, **sizes)))
-            largest = each.largest
-        return said
+        return effects_of(self.views, float(self.before.max()))
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the suggested views."""

@@ -17,19 +17,21 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.adjustment.adjustment import adjust
 from photogram.arguments.arrays import number, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.block import Block
+from photogram.network.rays import meet_rays
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, camera_number, housed_with, housing_of, size_of, transformed
 from photogram.targets.maps import image_grid
 from photogram.targets.projection import housing_rows
-from photogram.targets.vision import imaged, motion_partials, rays
+from photogram.targets.vision import imaged, motion_partials, photo_poses, rays
 from photogram.words import phrase
 
-STEPS = 30
-TOLERANCE = 1e-12  # relative to the distance of the point
+TOLERANCE = 1e-9  # in standard deviations of a point
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,68 +87,51 @@ def triangulated(
     the unknowns (:func:`~photogram.targets.projection.housing_rows`) for points fixed to the housing. None:
     points are fixed to the axes of camera 0.
     """
-    points = _settled(housing, cameras, pixels, _met(housing, cameras, pixels))
-    residuals, by_point, by_common = _rows(housing, cameras, pixels, points)
-    with np.errstate(invalid="ignore"):
-        inverse = _inverted(by_point.transpose(0, 2, 1) @ by_point)
-        effects = -inverse @ by_point.transpose(0, 2, 1) @ by_common
+    points, by_pixels = _intersected(housing, cameras, pixels, pixel_sd)
+    parts = [housing.linearized(camera, points) for camera in cameras]
+    xy, by_point, by_common = (np.stack(each, axis=1) for each in zip(*parts, strict=True))
+    crossed = np.einsum("nkip,nkic->npc", by_point, by_common)
+    effects = -by_pixels / pixel_sd**2 @ crossed
     if still is not None:
         effects = effects - motion_partials(points) @ still[:, : housing.common]
     effects = effects.reshape(-1, housing.common)
     common = housing.variance * housing.cofactors[: housing.common, : housing.common]
-    return Triangulated(
-        points, residuals.reshape(pixels.shape), pixel_sd**2 * inverse, effects @ common @ effects.T
+    return Triangulated(points, pixels - xy, by_pixels, effects @ common @ effects.T)
+
+
+def _intersected(
+    housing: Housing, cameras: Sequence[int], pixels: Floats, pixel_sd: float
+) -> tuple[Floats, Floats]:
+    """Return least-squares points (n, 3) of fixed cameras, and their covariances; NaN without a point."""
+    poses = housing.sensors[[*cameras]]
+    centres, attitudes = photo_poses(poses)
+    towards = [
+        rays(housing.cameras[each], pixels[:, row]) @ pose[:3, :3]
+        for row, (each, pose) in enumerate(zip(cameras, poses, strict=True))
+    ]
+    looking = np.nan_to_num(np.stack(towards, axis=1))  # no direction without a pixel: not in front
+    points, photos = np.indices(pixels.shape[:2]).reshape(2, -1)
+    met = meet_rays(points, len(pixels), centres[photos], looking.reshape(-1, 3))
+    in_front = (np.einsum("nki,nki->nk", looking, met[:, np.newaxis] - centres) > 0).all(axis=1)
+    if not in_front.any():
+        return np.full_like(met, np.nan), np.full((len(met), 3, 3), np.nan)
+    used = in_front[points]
+    block = Block(
+        photo_positions=centres,
+        photo_attitudes=attitudes.values("omega_phi_kappa"),
+        photo_position_sd=0.0,
+        photo_attitude_sd=0.0,
+        cameras=[housing.cameras[each].replace(sd=0.0, covariance=None, knot_sd=None) for each in cameras],
+        photo_cameras=np.arange(len(cameras)),
+        point_positions=met,
+        point_sd=np.inf,
+        image_photos=photos[used],
+        image_points=points[used],
+        image_xy=pixels[in_front].reshape(-1, 2),
+        image_sd=pixel_sd,
     )
-
-
-def _met(housing: Housing, cameras: Sequence[int], pixels: Floats) -> Floats:
-    """Return (n, 3) points nearest to all rays: sum (I - r r') (X - O) = 0."""
-    normal, right = np.zeros((len(pixels), 3, 3)), np.zeros((len(pixels), 3))
-    for row, camera in enumerate(cameras):
-        turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
-        looking = rays(housing.cameras[camera], pixels[:, row]) @ turn
-        across = np.eye(3) - looking[:, :, np.newaxis] * looking[:, np.newaxis]
-        normal += across
-        right -= across @ (turn.T @ shift)
-    return np.asarray((_inverted(normal) @ right[:, :, np.newaxis])[:, :, 0])
-
-
-def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats) -> Floats:
-    """Return the least-squares points; NaN without convergence."""
-    moved = np.full(len(points), np.inf)
-    for _ in range(STEPS):
-        residuals, by_point, _ = _rows(housing, cameras, pixels, points)
-        transposed = by_point.transpose(0, 2, 1)
-        right = transposed @ residuals[:, :, np.newaxis]
-        step = (_inverted(transposed @ by_point) @ right)[:, :, 0]
-        points = points + step
-        with np.errstate(invalid="ignore"):
-            moved = np.linalg.norm(step, axis=1) / np.linalg.norm(points, axis=1)
-        if not (moved > TOLERANCE).any():
-            break
-    return np.asarray(np.where((moved <= 1e3 * TOLERANCE)[:, np.newaxis], points, np.nan))
-
-
-def _rows(
-    housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Return (n, 2 k) misfits, partials (n, 2 k, 3) by points, (n, 2 k, c) by unknown."""
-    parts = [housing.linearized(camera, points) for camera in cameras]
-    xy, by_point, by_common = (np.stack(each, axis=1) for each in zip(*parts, strict=True))
-    shape = len(points), 2 * len(cameras)
-    return (
-        (pixels - xy).reshape(shape),
-        by_point.reshape(*shape, 3),
-        by_common.reshape(*shape, housing.common),
-    )
-
-
-def _inverted(matrices: Floats) -> Floats:
-    rows = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
-    rows = rows[np.linalg.cond(matrices[rows]) < 1 / np.finfo(float).eps]
-    found = np.full_like(matrices, np.nan)
-    found[rows] = np.linalg.inv(matrices[rows])
-    return found
+    result = adjust(block, unit_variance="unity", tolerance=TOLERANCE)
+    return result.point_positions, result.point_cofactors
 
 
 Axes = Literal["axes", "corners"]

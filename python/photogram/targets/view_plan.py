@@ -17,7 +17,7 @@ from photogram.network.cameras import Camera
 from photogram.network.hull import hull
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
-from photogram.show.quantity import Axis, Quantity, Table, members, of_each
+from photogram.show.quantity import Axis, Quantity, Table, column, members, of_each
 from photogram.show.sketch.marks import Mark, Markers, Panel, Polygons, boxes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
@@ -35,6 +35,8 @@ from photogram.targets.new_views import (
     GRID,
     TILTS,
     Candidate,
+    NewView,
+    effects_of,
     shown_of,
     suggest_views,
     views_over_picture,
@@ -108,23 +110,25 @@ def plan_views(
     first = [held[len(held) // 2]]
     taken = views_towards(middle, "middle of the picture", board, first, FIRST_TILTS, [""])
     candidates = views_over_picture(camera, size, board, held, whole=board.found_whole)
-    worst, largest = (distances or (math.inf,))[0], [math.nan] * (len(FIRST_TILTS) - 1)
+    worst, sds = (distances or (math.inf,))[0], [np.array([math.nan])] * (len(FIRST_TILTS) - 1)
     known = weakly_known(camera, size)
     while True:
         found = _predicted(known, board, size, sd0, taken)
-        largest.append(float(np.nanmax(uncertainty_map(found, 0, worst, GRID).sd)))
-        report(f"view {len(taken)}: largest standard deviation {largest[-1]:.3g} px")
-        if len(taken) >= views or largest[-1] <= need:
+        sd = uncertainty_map(found, 0, worst, GRID).sd
+        sds.append(sd[np.isfinite(sd)])
+        largest = float(sds[-1].max())
+        report(f"view {len(taken)}: largest standard deviation {largest:.3g} px")
+        if len(taken) >= views or largest <= need:
             break
         taken.append(suggest_views(found, worst, candidates).views[0].candidate)
     maps = [
         uncertainty_map(found, 0, each, model=MODEL)
         for each in distances or (worst, median_distance(found, 0))
     ]
-    corners = np.bincount(found.calibration.corners.picture).tolist()
+    corners = np.bincount(found.calibration.corners.picture)[:, np.newaxis]
     return ViewPlan(
         calibrated=replace(found, worth=Worth(maps=tuple(maps))),
-        views=tuple(map(PlannedView, taken, corners, largest)),
+        views=tuple(map(NewView, taken, corners, sds)),
         distance=worst,
         need=need,
     )
@@ -154,26 +158,6 @@ def _predicted(
     return Calibrated(calibration=start, result=result)
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedView:
-    """Planned view of the board.
-
-    Attributes
-    ----------
-    candidate
-        Board position in words, and its pose: board -> camera.
-    corners
-        Number of corners in the image.
-    largest
-        Largest standard deviation over the image with this view and the previous ones, pixels; NaN for the
-        first three.
-    """
-
-    candidate: Candidate
-    corners: int
-    largest: float
-
-
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ViewPlan(Documented):
     """Planned views of a board for the calibration of a camera.
@@ -184,7 +168,7 @@ class ViewPlan(Documented):
         Predicted calibration with error-free corners. Its `calibration` has the corners and poses, its
         `worth` the maps. Covariances are a priori, residuals are meaningless.
     views
-        Views in order of benefit.
+        Views in order of benefit; the first three have no map.
     distance
         Distance of the map used for the choice, in the unit of the board; infinite: directions.
     need
@@ -192,7 +176,7 @@ class ViewPlan(Documented):
     """
 
     calibrated: Calibrated
-    views: tuple[PlannedView, ...]
+    views: tuple[NewView, ...]
     distance: float
     need: float
 
@@ -222,14 +206,7 @@ class ViewPlan(Documented):
     @property
     def sentences(self) -> list[str]:
         """Views in order, with the effect of each."""
-        said, before = [], math.nan
-        for each in self.views:
-            code = "smaller" if math.isfinite(before) else "first"
-            code = "unknown" if math.isnan(each.largest) else code
-            sizes = {"before": before, "largest": each.largest}
-            said.append(str(phrase(f"views.{code}", view=each.candidate.name, **sizes)))
-            before = each.largest
-        return said
+        return effects_of(self.views, math.nan)
 
     @property
     def assumed(self) -> list[str]:
@@ -309,7 +286,7 @@ def _views(plan: ViewPlan) -> Table:
     columns = [
         Quantity(np.arange(1, len(poses) + 1), name="view", member="view", head="View"),
         of_each(plan.views, "candidate.name", (), "name", name="board", member="board", head="Board"),
-        of_each(plan.views, "corners", name="corners", head="Corners"),
+        column("corners", np.concatenate([each.corners for each in plan.views]), "Corners"),
         of_each(
             plan.views, "largest", pixels, "value", name="largest_px", member="largest_px", head="Largest"
         ),
