@@ -28,7 +28,6 @@ from photogram.targets.corners import Corners
 from photogram.targets.motion import motion_of
 from photogram.targets.output import Rig
 from photogram.targets.reading import read
-from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 from photogram.words import Phrase, option_sd, phrase
 
@@ -44,7 +43,7 @@ def read_project(path: Path, options: ReadOptions) -> Project:
     return project_of(found, path)
 
 
-def project_of(calibration: Start, path: Path | None = None) -> Project:
+def project_of(calibration: Calibration, path: Path | None = None) -> Project:
     """Convert a calibration to a project; pixels count from the corner."""
     middle = calibration.block()
     cameras = [shifted(each) for each in middle.cameras]

@@ -24,11 +24,11 @@ from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.statistics.verdict import Verdict
 from photogram.summaries import Rows
-from photogram.targets.start import CLOCK, Start
+from photogram.targets.motion import CLOCK
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
 if TYPE_CHECKING:
-    from photogram.targets import Worth
+    from photogram.targets import Calibration, Worth
 
 Part = Literal["cameras", "sensors", "board", "views"]
 # Names of unknowns, their identifiers in the result, and their partials by steps of the block, or the numbers
@@ -55,7 +55,7 @@ class Calibrated(Judged, Documented):
         Assessment with uncertainty maps and cross-validation for reports.
     """
 
-    calibration: Start
+    calibration: Calibration
     result: Result
     unregularised: Result | None = None
     snooped: Snooped | None = None
@@ -136,7 +136,7 @@ class Calibrated(Judged, Documented):
         """Return the cameras with an adjusted sensor pose."""
         return [self._numbers[each.name] for each in self.result.unknowns if each.kind == "sensor"]
 
-    def restarted(self) -> Start:
+    def restarted(self) -> Calibration:
         """Return the calibration with adjusted free values; other values are as given."""
         own, bend, found = self.calibration, self.bend, self.offsets
         late = np.array([found[each.name].values[0] if each.name in found else 0.0 for each in self.cameras])
@@ -174,16 +174,8 @@ class Calibrated(Judged, Documented):
         InputError, OutOfMemoryError, KeyboardInterrupt
             As in :meth:`photogram.Result.covariance`, or if a part does not exist.
         """
-        names, wanted, steps = self._selected(parts)
-        found = self.result.covariance(wanted) / self.result.covariance_scale
-        start = 0
-        for each in steps:
-            own = slice(start, start + _count(each))
-            if not isinstance(each, int):
-                found[own] = each @ found[own]
-                found[:, own] = found[:, own] @ each.T
-            start = own.stop
-        return names, found
+        names, _, _ = self._selected(parts)
+        return names, self.combined(np.eye(len(names)), parts)
 
     def combined(self, partials: Floats, parts: Sequence[Part]) -> Floats:
         """Return the (m, m) cofactors of linear combinations of some parts: J Q J'.
@@ -203,7 +195,7 @@ class Calibrated(Judged, Documented):
         _, wanted, steps = self._selected(parts)
         own, start = partials.copy(), 0
         for each in steps:
-            columns = slice(start, start + _count(each))
+            columns = slice(start, start + (each if isinstance(each, int) else len(each)))
             if not isinstance(each, int):
                 own[:, columns] = own[:, columns] @ each
             start = columns.stop
@@ -248,7 +240,3 @@ class Calibrated(Judged, Documented):
         photos = [self.result.block.photo_ids[row] for row in self.photos.tolist()]
         names = [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
         return names, [("step", photos)], [view_steps(pose) for pose in self.poses]
-
-
-def _count(partials: Floats | int) -> int:
-    return partials if isinstance(partials, int) else len(partials)

@@ -23,6 +23,7 @@ from photogram.targets.corners import Corners
 from photogram.targets.vision import FLIP, composed, photo_poses
 from photogram.words import phrase
 
+CLOCK = "of "  # prefix of the camera in the name of its clock offset
 MAX_GAP_SECONDS = 0.2  # between views that determine the motion of the board
 EACH_SIDE = 2
 POWERS = 2 * EACH_SIDE  # of time

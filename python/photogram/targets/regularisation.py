@@ -29,7 +29,7 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.network.block import Block
-    from photogram.targets.start import Start
+    from photogram.targets import Calibration
 
 CORE = ("fx", "fy", "f", "cx", "cy")
 DENOMINATOR = ("k4", "k5", "k6")
@@ -73,7 +73,7 @@ def regularised(
     return found
 
 
-def weighted_block(start: Start) -> Block:
+def weighted_block(start: Calibration) -> Block:
     """Return the block of a calibration with the priors of its cameras."""
     if start.regularise is None:
         return start.block()
