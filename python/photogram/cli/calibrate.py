@@ -167,14 +167,10 @@ def _plan(
 
 def _board(seen: CalibrationOptions) -> Board:
     """Return the board of `--board`."""
-    from photogram.targets import Board
-    from photogram.targets.board import read_board
+    from photogram.targets.reading import board_of
 
-    if isinstance(seen.board, tuple):
-        board = Board(columns=seen.board[0], rows=seen.board[1], spacing=seen.spacing or 0.0)
-    elif isinstance(seen.board, Path):
-        board = read_board(seen.board)
-    else:
+    board = board_of(seen, [seen.board] if isinstance(seen.board, Path) else [])
+    if board is None:
         raise misuse("--plan", "requires", options="--board")
     changes = {"unit": seen.unit, "shape": seen.shape}
     return board.replace(**{name: value for name, value in changes.items() if value})

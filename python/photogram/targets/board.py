@@ -20,10 +20,9 @@ from photogram.arguments.arrays import (
     number,
     shaped,
     text,
-    whole_number,
 )
 from photogram.arguments.equality import Valued
-from photogram.arguments.fields import check_fields
+from photogram.arguments.fields import check_fields, option
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.delimited import read_columns
@@ -87,13 +86,13 @@ class Board(Valued, Brief):
     rows: int = 0
     spacing: tuple[float, float] | float | None = None
     unit: str = field(default="m", metadata={"check": text})
-    tag_size: float | None = None
-    tag_spacing: float | None = None
+    tag_size: float | None = option(None, 1 / MAX_LENGTH, MAX_LENGTH)
+    tag_spacing: float | None = option(None, 1 / MAX_LENGTH, MAX_LENGTH)
     points: ArrayLike | None = None
     point_names: Sequence[str] | None = None
     shape: Shape | None = None
-    sd_plane: float | None = None
-    sd_spacing: float | None = None
+    sd_plane: float | None = option(None, 1 / MAX_LENGTH, MAX_LENGTH)
+    sd_spacing: float | None = option(None, 1 / MAX_LENGTH, MAX_LENGTH)
     point_sd: ArrayLike | None = None
 
     def __post_init__(self) -> None:
@@ -119,9 +118,6 @@ class Board(Valued, Brief):
             self._check_grid()
         if self.point_sd is not None:
             self._set("point_sd", shaped("point_sd", self.point_sd, (len(self.places), 3), "not-negative"))
-        for name in ("sd_plane", "sd_spacing"):
-            if getattr(self, name) is not None:
-                self._set(name, _length(name, getattr(self, name)))
 
     def _refuse(self, *fields: str) -> None:
         for name in fields:
@@ -133,10 +129,8 @@ class Board(Valued, Brief):
         self._refuse("points", "point_names")
         least = 1 if self.kind == "aprilgrid" else 2
         for name in ("columns", "rows"):
-            count = whole_number(f"{name} of a board", getattr(self, name))
-            if count < least:
+            if (count := getattr(self, name)) < least:
                 raise argument_error(name, "least", low=least, value=count)
-            self._set(name, count)
         columns, rows = self.grid
         if columns * rows > MAX_POINTS:
             raise argument_error("columns x rows", "most", high=MAX_POINTS, value=columns * rows)
@@ -144,7 +138,6 @@ class Board(Valued, Brief):
             for name in ("tag_size", "tag_spacing"):
                 if getattr(self, name) is None:
                     raise argument_error(name, "empty")
-                self._set(name, _length(name, getattr(self, name)))
             assert self.tag_size is not None
             assert self.tag_spacing is not None
             pitch = self.tag_size * (1 + self.tag_spacing)

@@ -137,11 +137,7 @@ class Calibration(Valued, Brief):
         if self.sync == "none" or self.references is None:
             self._set("references", np.arange(count) if self.sync == "none" else np.zeros(count, np.int64))
         check_arrays(self, cameras=count, views=self.corners.view_count)
-        over = np.flatnonzero(self.corners.point >= len(self.board.places))
-        if len(over):
-            fields = {"count": len(self.board.places), "board": self.board.described}
-            corner = self.corners.title(int(over[0]))
-            raise InputError(phrase("targets.corner-beyond", corner=corner, **fields))
+        self.corners.check(self.board)
         self._leave_out(np.asarray(self.poses))
         for name in ("sd_sensors", "sd_bend"):
             values = np.asarray(getattr(self, name))

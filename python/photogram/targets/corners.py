@@ -164,6 +164,13 @@ class Corners(Valued, Brief):
             use=self.use[own],
         )
 
+    def check(self, board: Board) -> None:
+        """Raise an InputError if a board lacks one of the points."""
+        beyond = np.flatnonzero(self.point >= len(board.places))
+        if len(beyond):
+            fields = {"count": len(board.places), "board": board.described}
+            raise InputError(phrase("targets.corner-beyond", corner=self.title(int(beyond[0])), **fields))
+
     def poor(self, places: Floats) -> dict[str, Phrase]:
         """Return images that do not determine a camera, with reasons.
 

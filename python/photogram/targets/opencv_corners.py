@@ -62,7 +62,7 @@ def read_storage(path: Path, board: Board | None) -> Measured:
             places, points = grid.reshape(-1, grid.shape[-1]), content["grid_points"]
             if places.shape != board.places.shape:
                 raise points.error(phrase("targets.other-points", board=board.described))
-            if np.abs(places - board.places).max() > MAX_GRID_ERROR * min(board.pitch):
+            if _distance(places, board) > MAX_GRID_ERROR:
                 raise points.error(phrase("targets.other-places", board=board.described))
     return _measured(path, xy, board, sizes)
 
@@ -166,9 +166,13 @@ def _gridded(path: Path, places: Floats) -> Board:
         board = Board(columns=columns, rows=len(first) // columns, spacing=spacing)
     except InputError:
         board = None
-    far = np.inf
-    if board is not None and len(board.places) == len(first):
-        far = float(np.abs(places - first[0] - board.places).max())
-    if board is None or far > MAX_GRID_ERROR * min(spacing):
+    if board is None or not _distance(places - first[0], board) <= MAX_GRID_ERROR:
         raise InputError(phrase("targets.no-grid"), file=path)
     return board
+
+
+def _distance(places: Floats, board: Board) -> float:
+    """Return the largest distance of points from those of a board, in spacings."""
+    if places.shape[-2:] != board.places.shape:
+        return np.inf
+    return float(np.abs(places - board.places).max() / min(board.pitch))

@@ -65,10 +65,7 @@ def read(
     board, shape, sync, regularise = chosen.board, chosen.shape, chosen.sync, chosen.regularise
     models, boards, corners = sorted_files(path)
     described = [board] if isinstance(board, Path) else boards if board is None else []
-    if isinstance(board, tuple):
-        assert chosen.spacing is not None
-        board = Board(columns=board[0], rows=board[1], spacing=chosen.spacing)
-    own = board if isinstance(board, Board) else _only_board(described)
+    own = board_of(chosen, described)
     chosen = replace(chosen, size=chosen.size or next(map(picture_size, described), None))
     if chosen.knots is not None and (models or chosen.model != KNOTTED):
         raise InputError(phrase("targets.knots-of", model=KNOTTED))
@@ -94,10 +91,9 @@ def read(
     own = found.board if own is None else own
     if own is None:
         raise InputError(phrase("targets.no-board"), file=path)
-    if shape is not None:
-        own = own.replace(shape=shape)
-    if chosen.unit is not None:
-        own = own.replace(unit=chosen.unit)
+    own = own.replace(
+        **{key: each for key in ("shape", "unit") if (each := getattr(chosen, key)) is not None}
+    )
     seen, remarks = grouped(found, chosen)
     with at_place(Place(path)):
         start = first_values(own, seen, chosen.model, chosen.knots or KNOTS)
@@ -122,11 +118,16 @@ def _not_used(corners: Corners) -> list[Message]:
     return [Message(phrase("targets.unused", n=unused))] if unused else []
 
 
-def _only_board(boards: Sequence[Path]) -> Board | None:
-    if len(boards) > 1:
-        names = [each.name for each in boards]
-        raise InputError(phrase("targets.boards", count=len(boards), names=names), file=boards[1])
-    return read_board(boards[0]) if boards else None
+def board_of(options: CalibrationOptions, described: Sequence[Path]) -> Board | None:
+    """Return the board of the options, or of the only file that describes one."""
+    if isinstance(options.board, Board):
+        return options.board
+    if isinstance(options.board, tuple):
+        return Board(columns=options.board[0], rows=options.board[1], spacing=options.spacing)
+    if len(described) > 1:
+        names = [each.name for each in described]
+        raise InputError(phrase("targets.boards", count=len(described), names=names), file=described[1])
+    return read_board(described[0]) if described else None
 
 
 def _of_models(

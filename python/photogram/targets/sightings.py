@@ -13,12 +13,10 @@ from typing import Self
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.targets.board import Board
 from photogram.targets.corners import Corners
 from photogram.targets.vision import composed
-from photogram.words import phrase
 
 _MIN_COLUMN_RATIO = 1e-9  # of a homography of non-collinear corners
 
@@ -242,12 +240,8 @@ class Sightings:
 
         InputError: if points are missing on the board.
         """
+        corners.check(board)
         places = board.places
-        beyond = corners.point >= len(places)
-        if beyond.any():
-            row = int(np.argmax(beyond))
-            fields = {"count": len(places), "board": board.described}
-            raise InputError(phrase("targets.corner-beyond", corner=corners.title(row), **fields))
         axes = np.eye(4)
         if board.kind == "points":  # axes of the least-squares plane, from the centroid
             middle = places.mean(axis=0)
