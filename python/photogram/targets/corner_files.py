@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.files import read_beginning, reading
@@ -21,7 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.targets.board import Board, is_board
 from photogram.targets.corners import Measured
 from photogram.targets.opencv_corners import BEGIN_BYTES, is_npz, is_storage, read_npz, read_storage
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 _SYNONYMS: Mapping[str, str] = {
     **dict.fromkeys(("photo", "picture", "file", "filename", "img", "image_name"), "image"),
@@ -119,13 +118,9 @@ def _of_levels(table: ColumnTable) -> tuple[Floats, Bools]:
         bad = np.flatnonzero(~(sd > 0))
         if len(bad):
             row = int(bad[0])
-            raise _refusal(table, row, "sd", phrase("error.positive", value=float(sd[row])))
+            raise table.cell_error(row, "sd", "error.positive", value=float(sd[row]))
         return sd, np.ones(table.count, dtype=bool)
     return np.ones(table.count), np.ones(table.count, dtype=bool)
-
-
-def _refusal(table: ColumnTable, row: int, column: str, message: Phrase) -> InputError:
-    return table.error(row, phrase("error.column", column=column, message=message))
 
 
 def read_table(path: Path, board: Board | None) -> Measured:
@@ -163,7 +158,7 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
         times = table.numbers("time")[first]
         missing = np.flatnonzero(np.isnan(times))
         if len(missing):
-            raise _refusal(table, first[int(missing[0])], "time", phrase("error.empty"))
+            raise table.cell_error(first[int(missing[0])], "time", "error.empty")
         times = times * (1e-9 if times.max(initial=0.0) > MIN_NANOSECONDS else 1.0)
     return Measured(
         path=table.path,
@@ -186,7 +181,7 @@ def _of_images(table: ColumnTable, image: Indices, first: list[int]) -> list[str
     found = [views[row] for row in first]
     for row, own in enumerate(image.tolist()):
         if views[row] != found[own]:
-            raise _refusal(table, row, "view", phrase("targets.other-view"))
+            raise table.cell_error(row, "view", "targets.other-view")
     return found
 
 
@@ -197,7 +192,7 @@ def _points(table: ColumnTable, board: Board | None) -> Indices:
         for row, cell in enumerate(table.texts("point")):
             number = (int(cell) if cell.isdecimal() else None) if names is None else names.get(cell)
             if number is None:
-                raise _refusal(table, row, "point", phrase("targets.no-point", point=cell))
+                raise table.cell_error(row, "point", "targets.no-point", point=cell)
             found[row] = number
         return found
     if board is None:
@@ -215,8 +210,9 @@ def _whole(table: ColumnTable, name: str, count: int) -> Indices:
     bad = np.flatnonzero(~((values == np.floor(values)) & (values >= 0) & (values < count)))
     if len(bad):
         row = int(bad[0])
-        fields = {"low": 0, "high": count - 1, "value": float(values[row])}
-        raise _refusal(table, row, name, phrase("error.whole-range", **fields))
+        raise table.cell_error(
+            row, name, "error.whole-range", low=0, high=count - 1, value=float(values[row])
+        )
     return values.astype(np.int64)
 
 

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.arrays import shaped, text, truth_value
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.places import Place, at_place
 from photogram.io.sheets import UNPACKABLE, check_unpacked_size
 from photogram.memory import require
 from photogram.words import phrase
@@ -32,9 +34,6 @@ class Arrays:
         """Return an error that names an array."""
         return InputError(phrase(code, name=name, **fields), file=self.path)
 
-    def _wrong(self, name: str, code: str, **fields: object) -> InputError:
-        return self.refusal("targets.array", name, message=phrase(code, **fields))
-
     def first(self, *names: str) -> str:
         """Return the first existing name; versions of a program write different names."""
         existing = next((name for name in names if name in self), None)
@@ -44,36 +43,24 @@ class Arrays:
 
     def text(self, name: str) -> str:
         """Return an array of a single text."""
-        array = self.arrays[name]
-        if array.dtype.kind not in "US" or array.ndim:
-            raise self._wrong(name, "error.text", value=str(array.dtype))
-        return str(array)
+        with at_place(Place(self.path)):
+            return text(name, self.arrays[name].tolist())
 
     def says(self, name: str) -> bool:
         """Return whether an array is true; False if it is missing."""
         if name not in self:
             return False
-        array = self.arrays[name]
-        if array.ndim or array.dtype.kind not in "biu":
-            raise self._wrong(name, "error.flag", value=str(array.dtype))
-        return bool(array)
+        value = self.arrays[name].tolist()
+        with at_place(Place(self.path)):
+            return truth_value(name, bool(value) if type(value) is int else value)
 
     def numbers(self, name: str, *shape: int | None) -> Floats:
         """Return an array of finite numbers; None in the shape permits any length."""
         array = self.arrays[name]
-        if array.dtype.kind not in "fiu":
-            raise self._wrong(name, "error.array", of="numbers", value=str(array.dtype))
-        fits = array.ndim == len(shape) and all(
-            length is None or length == actual for length, actual in zip(shape, array.shape, strict=True)
-        )
-        if not fits:
-            wanted = " x ".join("n" if length is None else str(length) for length in shape) or "1"
-            raise self._wrong(name, "error.shape", shape=wanted, actual=str(array.shape))
-        numbers = array.astype(np.float64)
-        if not np.isfinite(numbers).all():
-            value = float(numbers[~np.isfinite(numbers)][0])
-            raise self._wrong(name, "error.finite", value=value)
-        return numbers
+        if array.ndim == len(shape):
+            shape = tuple(n if own is None else own for own, n in zip(shape, array.shape, strict=True))
+        with at_place(Place(self.path)):
+            return shaped(name, array, shape, "finite")
 
 
 def read_arrays(path: Path, data: bytes) -> Arrays:
