@@ -138,13 +138,13 @@ def dense(housing):
 
 def rows_of_view(housing, view):
     """Return whitened partials by the common unknowns and by the pose of a view; observed less computed."""
-    seen = housing.seen[housing.seen.views == view]
-    xy, by_common, by_pose, _ = view_rows(housing, housing.poses[view], seen.cameras, seen.points)
-    sd = seen.sd[:, np.newaxis]
+    seen, own = housing.seen, housing.seen.views == view
+    xy, by_common, by_pose, _ = view_rows(housing, housing.poses[view], seen.cameras[own], seen.points[own])
+    sd = seen.sd[own, np.newaxis]
     return (
         (by_common / sd[:, :, np.newaxis]).reshape(-1, housing.common),
         (by_pose / sd[:, :, np.newaxis]).reshape(-1, 6),
-        ((seen.xy - xy) / sd).ravel(),
+        ((seen.xy[own] - xy) / sd).ravel(),
     )
 
 

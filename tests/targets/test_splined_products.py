@@ -129,5 +129,5 @@ def test_partials_without_zeros_are_those_with_them(order):
     assert found.columns.shape == (50, 2 + 2 * (order + 1) ** 2)
     spread = np.zeros_like(expected.by_parameters)
     for k, columns in enumerate(found.columns.T):
-        spread[np.arange(50), :, columns] += found.by_columns[:, :, k]
+        spread[np.arange(50), :, columns] += found.by_parameters[:, :, k]
     np.testing.assert_array_equal(spread, expected.by_parameters)

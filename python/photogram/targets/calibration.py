@@ -332,11 +332,13 @@ class Calibration(Valued, Brief):
 
     def residuals(self) -> Floats:
         """Return (n, 2) observed minus computed corners with the given values, pixels."""
-        corners, poses = self.corners, self.picture_poses()
-        places = self.places()[corners.point]
-        own = poses[corners.picture]
-        seen = (own[:, :3, :3] @ places[:, :, np.newaxis])[..., 0] + own[:, :3, 3]
-        return corners.xy - images_of(self.cameras, corners.cameras[corners.picture], seen @ FLIP)
+        return self.corners.xy - self.computed(self.places())
+
+    def computed(self, places: Floats) -> Floats:
+        """Return (n, 2) the corners of board points (b, 3) with the given values, pixels."""
+        corners = self.corners
+        seen = transformed(self.picture_poses()[corners.picture], places[corners.point])
+        return images_of(self.cameras, corners.cameras[corners.picture], seen @ FLIP)
 
     def without(self, images: Bools) -> Self:
         """Return the calibration without some images (m,) of its block."""
@@ -467,9 +469,7 @@ def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:
     places = calibration.places().copy()
     if calibration.shape == "points":
         places += calibration.board.deviations(corners.view_count) * random.standard_normal(places.shape)
-    poses = calibration.picture_poses()
-    seen = transformed(poses[corners.picture], places[corners.point])
-    xy = images_of(calibration.cameras, corners.cameras[corners.picture], seen @ FLIP)
+    xy = calibration.computed(places)
     if not np.isfinite(xy).all():
         row = int(np.argmin(np.isfinite(xy).all(axis=1)))
         raise InputError(phrase("targets.no-image", corner=corners.title(row)))

@@ -18,7 +18,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
 from photogram.summaries import Brief, Rows
-from photogram.targets.cross_validation import DifferenceTest
+from photogram.targets.cross_validation import DifferenceTest, squares_of
 from photogram.targets.housing import transformed
 from photogram.targets.lens_fit import Moved, Points
 from photogram.targets.maps import at_distance, image_grid
@@ -136,10 +136,7 @@ class CameraDifference(Brief):
         with np.errstate(invalid="ignore"):
             known = np.isfinite(self.covariances).all(axis=(-2, -1)) & np.isfinite(self.vectors).all(axis=-1)
         found = np.full(known.shape, np.nan)
-        own = self.vectors[known]
-        found[known] = (own * np.linalg.solve(self.covariances[known], own[:, :, np.newaxis])[:, :, 0]).sum(
-            axis=1
-        )
+        found[known] = squares_of(self.vectors[known], self.covariances[known])
         return found / 2
 
     @property

@@ -29,6 +29,7 @@ from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, visi
 
 if TYPE_CHECKING:
     from photogram.targets import Calibration, Worth
+    from photogram.targets.housing import Housing
 
 Part = Literal["cameras", "sensors", "board", "views"]
 # Names of unknowns, their identifiers in the result, and their partials by steps of the block, or the numbers
@@ -90,6 +91,11 @@ class Calibrated(Judged, Documented):
             if each.kind == "sensor":
                 found[self._numbers[each.name]] = sensor_pose(each.position, each.attitude)
         return found
+
+    @cached_property
+    def _housings(self) -> dict[int, Housing]:
+        """Housings that products have requested, by their first camera."""
+        return {}
 
     @cached_property
     def _numbers(self) -> dict[str, int]:

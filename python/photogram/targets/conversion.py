@@ -37,7 +37,7 @@ from photogram.targets.lens_fit import (
 )
 from photogram.targets.maps import at_distance, image_grid
 from photogram.targets.output import Rig
-from photogram.targets.vision import TURNED
+from photogram.targets.vision import TURNED, names_of
 from photogram.words import phrase
 
 MIN_RELATIVE_VARIANCE = 1e-2  # added to each covariance to limit the weight of a pixel
@@ -251,7 +251,7 @@ def convert_lens(
 
 def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tuple[list[int], Floats] | None:
     """Return the source parameters and knots with a covariance, and the matrix."""
-    names = source.names + source.knot_names
+    names = names_of(source)
     if given is not None:
         own, matrix = list(given[0]), np.asarray(given[1], dtype=float)
         if unknown := [name for name in own if name not in names]:
@@ -290,7 +290,7 @@ def _passed_on(
     the ray moves by dr = -Pi^+ K ds.
     """
     rows, matrix = known
-    names = found.names
+    names = names_of(found.camera)
     _, fitted, _ = shown.linearized(found, [names.index(name) for name in free], moving)
     _, by_u, by_values = source.partials(shown.points * TURNED)
     by_ray = by_u * TURNED

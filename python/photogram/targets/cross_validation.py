@@ -71,8 +71,13 @@ class CrossMap:
     @property
     def chi2(self) -> Floats:
         """(n,) d' cov(d)^-1 d with two degrees of freedom."""
-        solved = np.linalg.solve(self.covariances, self.differences[:, :, np.newaxis])[:, :, 0]
-        return np.asarray((self.differences * solved).sum(axis=1))
+        return squares_of(self.differences, self.covariances)
+
+
+def squares_of(vectors: Floats, covariances: Floats) -> Floats:
+    """Return (n,) d' Q^-1 d of (n, 2) vectors."""
+    solved = np.linalg.solve(covariances, vectors[:, :, np.newaxis])[:, :, 0]
+    return np.asarray((vectors * solved).sum(axis=1))
 
 
 def splits(views: int, into: str | int) -> list[tuple[list[int], list[int]]]:

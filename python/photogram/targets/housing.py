@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import unknown_name
@@ -35,13 +34,6 @@ class SeenCorners:
     sd: Floats  # (m,) standard deviations a priori, pixels
     # (m, 4, 4) board -> camera at the time of each corner; None: all cameras use the pose of the view
     poses: Floats | None = None
-
-    def __getitem__(self, which: Bools) -> SeenCorners:
-        """Return some of them."""
-        poses = None if self.poses is None else self.poses[which]
-        return SeenCorners(
-            self.cameras[which], self.views[which], self.points[which], self.xy[which], self.sd[which], poses
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +103,9 @@ class Housing:
 
     def places(self, camera: int) -> tuple[Floats, Floats]:
         """Return (m, 3) corners of a camera in its axes, and (m,) their sd in pixels."""
-        seen = self.seen[self.seen.cameras == camera]
+        seen, own = self.seen, self.seen.cameras == camera
         poses = (self.sensors[camera] @ self.poses)[seen.views] if seen.poses is None else seen.poses
-        return transformed(poses, self.points[seen.points]), seen.sd
+        return transformed(poses[own], self.points[seen.points[own]]), seen.sd[own]
 
     def board_distances(self, camera: int) -> Floats:
         """Return (v,) distances of board centre and camera in its views."""
@@ -169,13 +161,10 @@ def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
     return size
 
 
-_HOUSINGS: WeakKeyDictionary[Calibrated, dict[int, Housing]] = WeakKeyDictionary()
-
-
 def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
     """Return the housing of a camera, and the camera number in it."""
     cameras = housed_with(calibrated, camera)
-    made = _HOUSINGS.setdefault(calibrated, {})
+    made = calibrated._housings
     if cameras[0] not in made:
         corners = calibrated.calibration.corners
         views = np.unique(corners.views[np.isin(corners.cameras, cameras)])

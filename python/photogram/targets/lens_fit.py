@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from itertools import compress
 from types import MappingProxyType
 from typing import Self
 
@@ -21,7 +22,7 @@ from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
 from photogram.targets.housing import transformed
 from photogram.targets.maps import image_grid
-from photogram.targets.vision import TURNED, motion_partials, moved_by, rays, values_of
+from photogram.targets.vision import TURNED, motion_partials, moved_by, names_of, rays, unknown_of, values_of
 from photogram.words import phrase
 
 MAX_STEPS, TOLERANCE, SPLINE_TOLERANCE = 100, 1e-10, 1e-6  # relative decrease of the sum of squares
@@ -37,19 +38,9 @@ class Moved:
     camera: Camera
     motion: Floats = field(default_factory=lambda: np.eye(4))
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """(p,) names of the lens parameters, followed by its knots."""
-        return self.camera.names + self.camera.knot_names
-
-    @property
-    def values(self) -> Floats:
-        """(p,) values of parameters and knots."""
-        return values_of(self.camera)
-
     def stepped(self, free: Sequence[int], moving: slice, step: Floats) -> Self:
         """Return the lens after a step of free parameters and of the motion."""
-        values = self.values.copy()
+        values = values_of(self.camera).copy()
         values[free] += step[: len(free)]
         own = self.camera
         k = len(own.names)
@@ -258,14 +249,13 @@ def shows(camera: Camera, points: Floats) -> Bools:
 
 def free_names(camera: Camera) -> list[str]:
     """Return the free parameters of a camera, followed by its free knots."""
-    own = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
-    return own + list(camera.knot_names if np.any(camera.knot_sd) else ())
+    return [*compress(names_of(camera), unknown_of(camera))]
 
 
 def fitted_in_stages(start: Moved, points: Points, free: Sequence[str], moving: slice = NO_MOTION) -> Moved:
     """Fit a lens with a growing set of free parameters, and finally its motion."""
     at = start
-    numbers = {name: k for k, name in enumerate(at.names)}
+    numbers = {name: k for k, name in enumerate(names_of(at.camera))}
     allowed, before = set(_FIRST), list[str]()
     for more in ({*()}, *_STAGES, {*free}):
         allowed |= more

@@ -32,13 +32,19 @@ def _board(text: str) -> Path | tuple[int, int]:
         raise ValueError(f"{error}, or an existing file") from None
 
 
-def _deviations(text: str) -> tuple[float, float]:
-    """Return two standard deviations with a comma between them."""
+def _numbers(text: str, count: int | None, form: str) -> list[float]:
+    """Return positive numbers with commas between them; else a ValueError with the required form."""
     try:
-        radial, tangential = map(float, text.split(","))
+        found = [float(each) for each in text.split(",") if each.strip()]
     except ValueError:
-        raise ValueError("two numbers, such as 1,0.1") from None
-    return radial, tangential
+        found = [0.0]
+    if not all(each > 0 for each in found) or count not in (None, len(found)):
+        raise ValueError(form)
+    return found
+
+
+def _deviations(text: str) -> tuple[float, ...]:
+    return tuple(_numbers(text, 2, "two numbers, such as 1,0.1"))
 
 
 def _offsets(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
@@ -141,13 +147,7 @@ Into = Literal["odd", "halves"] | int
 
 def distances_of(text: str) -> list[float]:
     """Return positive distances with commas between them."""
-    try:
-        distances = [float(each) for each in text.split(",") if each.strip()]
-    except ValueError:
-        distances = [0.0]
-    if not all(each > 0 for each in distances):
-        raise ValueError("a list of distances, such as 1,inf")
-    return distances
+    return _numbers(text, None, "a list of distances, such as 1,inf")
 
 
 def _division(text: str) -> str | int | None:

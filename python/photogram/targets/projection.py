@@ -18,7 +18,6 @@ from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
 from photogram.targets.options import DatumName
 from photogram.targets.vision import (
-    Touched,
     cross_matrices,
     has_unknown_knots,
     imaged,
@@ -84,8 +83,8 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
         by_motion = images.by_point @ motion_partials(points[part], finite)
         weighted = weights[part] @ by_motion
         normal += weighted.reshape(-1, 6).T @ by_motion.reshape(-1, 6)
-        if isinstance(images, Touched):
-            products = weighted.transpose(0, 2, 1) @ images.by_columns
+        if images.columns is not None:
+            products = weighted.transpose(0, 2, 1) @ images.by_parameters
             columns = images.columns.ravel()
             for row, own in enumerate(right):
                 own += np.bincount(columns, products[:, row].ravel(), minlength=len(own))
@@ -155,8 +154,9 @@ def _of_touched(camera: Camera, pixels: Floats, distance: float, cofactors: Floa
     images = touched(camera, points)
     by_motion = images.by_point @ motion_partials(points, finite)
     motion = np.broadcast_to(np.arange(len(cofactors) - 6, len(cofactors)), (len(points), 6))
+    assert images.columns is not None
     columns = np.hstack([images.columns, motion])
-    partials = np.concatenate([images.by_columns, by_motion], axis=2)
+    partials = np.concatenate([images.by_parameters, by_motion], axis=2)
     own = cofactors[columns[:, :, np.newaxis], columns[:, np.newaxis]]
     return np.asarray(partials @ own @ partials.transpose(0, 2, 1))
 

@@ -102,6 +102,8 @@ class Imaged:
     by_point: Floats  # (n, 2, 3) by the point: Pi
     # (n, 2, p) by the unknown parameters of the camera, then by its unknown knots: K
     by_parameters: Floats
+    # (n, k) numbers of the k unknowns that affect each point, to which (n, 2, k) partials refer; None: all
+    columns: Indices | None = None
 
 
 def imaged(camera: Camera, points: Floats) -> Imaged:
@@ -110,17 +112,7 @@ def imaged(camera: Camera, points: Floats) -> Imaged:
     return Imaged(xy, by_u * TURNED, by_parameters[:, :, unknown_of(camera)])
 
 
-@dataclass(frozen=True, eq=False)
-class Touched:
-    """Projections of n points by a splined lens, with partials by k unknowns each."""
-
-    xy: Floats  # As in :class:`Imaged`
-    by_point: Floats
-    columns: Indices  # (n, k) indices among the p unknown parameters and knots
-    by_columns: Floats  # (n, 2, k) partials
-
-
-def touched(camera: Camera, points: Floats) -> Touched:
+def touched(camera: Camera, points: Floats) -> Imaged:
     """Return :func:`imaged` of a splined lens without zeros (16 or 9 knots per point)."""
     assert camera.knots is not None
     unknown, count = unknown_of(camera), len(camera.names)
@@ -137,7 +129,7 @@ def touched(camera: Camera, points: Floats) -> Touched:
     for axis, scale in enumerate(camera.values[:2].tolist()):
         free = unknown[both[:, axis::2]]
         found[:, axis, len(core) + axis :: 2] = np.where(free, scale * weights, 0.0)
-    return Touched(xy, by_u * TURNED, columns, found)
+    return Imaged(xy, by_u * TURNED, found, columns)
 
 
 def has_unknown_knots(camera: Camera) -> bool:
@@ -154,6 +146,11 @@ def unknown_of(camera: Camera) -> Bools:
     if camera.knot_sd is not None:
         knots = camera.knot_sd.any(axis=2).repeat(2)
     return np.append(unknown, knots)
+
+
+def names_of(camera: Camera) -> tuple[str, ...]:
+    """Return the names of the parameters of a camera, followed by its knots."""
+    return camera.names + camera.knot_names
 
 
 def values_of(camera: Camera) -> Floats:
